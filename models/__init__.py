@@ -27,6 +27,8 @@ Noise
     and belongs to the samples, never to the integrator's step.
 """
 
-from models.threads import use_one_thread
+from models.core.moved import tell_new_names
+from models.machine.threads import use_one_thread
 
 use_one_thread()
+tell_new_names()

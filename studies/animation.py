@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.figures import LABELS
+from models.drawing.figures import LABELS
 from studies.pictures.page import Page, difference, eight_bits
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing, still, write

@@ -6,11 +6,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.systems import DEFAULT, SYSTEMS, listed, load
 from models.measured.file_kinds import is_measurement
-from models.measured.finding import Finding
 
 SCENES = Path(__file__).parent / "scenes"
+KNOWN = SYSTEMS | listed(Path(__file__).parent, __package__)
+"""Systems of scenes: those of the models, and studies that have scenes of their own (folders with a ``scene``)."""
 
 ANY = "any"
 """System of a study that runs scenes of all systems."""
@@ -47,9 +50,7 @@ NOT_STUDIES = (
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
     """A scene that comes with twinrig by its name, or a file; a file's name ends in .toml."""
-    from models.systems import load
-
-    return load(scene_path(name), changes or ())
+    return load(scene_path(name), changes or (), KNOWN)
 
 
 def scene_path(name: str) -> Path:
@@ -80,9 +81,7 @@ def ready(scene: Any, engines: tuple[str, ...]) -> Any:
 
 def plan_of(scene: Any) -> Any:
     """The module that describes and checks scenes of this one's system."""
-    from models.systems import SYSTEMS
-
-    return import_module(SYSTEMS[scene.system].plan)
+    return import_module(KNOWN[scene.system].plan)
 
 
 def findings_of(scene: Any) -> tuple[Finding, ...]:
@@ -94,7 +93,7 @@ def findings_of(scene: Any) -> tuple[Finding, ...]:
 
 def _unended(scene: Any) -> Iterator[Finding]:
     """Remarks on the CSV files that a scene names whose last line has no line end."""
-    from models.tables import ended
+    from models.core.tables import ended
 
     for name in dict.fromkeys(_files(scene.table())):
         try:
@@ -121,9 +120,7 @@ def _files(table: Any) -> Iterator[str]:
 
 def engines_of(name: str | None, system: str) -> tuple[str, ...]:
     """The engines that were asked for; none for a system that no engine computes."""
-    from models.systems import SYSTEMS
-
-    engines = SYSTEMS[system].engines
+    engines = KNOWN[system].engines
     if name is not None and not engines:
         raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
@@ -137,8 +134,6 @@ def engines_of(name: str | None, system: str) -> tuple[str, ...]:
 
 def _outside(name: str, system: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
-    from models.systems import DEFAULT
-
     if system != DEFAULT:
         raise InputError("--engine", "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
     from models.engines.outside import register
@@ -149,8 +144,7 @@ def _outside(name: str, system: str) -> tuple[str, ...]:
 
 def study_of(scene: Any) -> Any:
     """The study's module, once the scene's options are known to be its own."""
-    from models.strict import read
-    from models.systems import DEFAULT
+    from models.core.strict import read
 
     names = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if path.stem not in NOT_STUDIES))
     if scene.study not in names:

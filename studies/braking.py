@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.adhesion import NoAdhesion, split, utilisation
-from models.braking.figures_of_merit import NOT_CHECKED
-from models.braking.hitch import of_hitch
-from models.braking.measured_pressures import MeasuredPressures, write_pressures
-from models.braking.of_scene import measured_of, plane_of
-from models.braking.plan import behind
-from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
-from models.braking.procedures import drive, engines_of, step_steer
-from models.braking.run import Path
-from models.braking.scene import BrakingScene
-from models.braking.stop_report import WHEELS, Stop
-from models.errors import RunFailed
-from models.strict import Strict, read
+from models.brake.figures_of_merit import NOT_CHECKED
+from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
+from models.core.errors import RunFailed
+from models.core.strict import Strict, read
+from models.systems.braking.adhesion import NoAdhesion, split, utilisation
+from models.systems.braking.hitch import of_hitch
+from models.systems.braking.measured_pressures import MeasuredPressures, write_pressures
+from models.systems.braking.of_scene import measured_of, plane_of
+from models.systems.braking.plan import behind
+from models.systems.braking.procedures import drive, engines_of, step_steer
+from models.systems.braking.run import Path
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import WHEELS, Stop
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -181,7 +181,7 @@ def save(scene: BrakingScene, name: str, path: Path, file: File) -> None:
 
     import xarray as xr
 
-    from models.result import Result, provenance
+    from models.core.result import Result, provenance
 
     units = ", ".join("rad" if name.split()[-1][0] in "hr" else "m" for name in path.coordinates)
     rates = ", ".join(f"{unit}/s" for unit in units.split(", "))

@@ -9,16 +9,16 @@ from typing import Any
 
 from pydantic import Field
 
-from models.braking.plan import check_reference
-from models.braking.procedures import drive
-from models.braking.scene import BrakingScene
-from models.braking.stop_report import Stop
-from models.braking.stops import Scatter, Stops, scatter
+from models.core.errors import InputError, RunFailed
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
-from models.errors import InputError, RunFailed
-from models.strict import Strict, quantity, read
-from models.whole_files import write_whole
+from models.systems.braking.plan import check_reference
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import Stop
+from models.systems.braking.stops import Scatter, Stops, scatter
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.plan import check as check_scene
-from models.braking.plan import check_reference
-from models.braking.procedures import drive
-from models.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
-from models.braking.stop_report import Stop
-from models.errors import RunFailed
-from models.strict import Strict, read
-from models.whole_files import write_whole
+from models.core.errors import RunFailed
+from models.core.strict import Strict, read
+from models.core.whole_files import write_whole
+from models.systems.braking.plan import check as check_scene
+from models.systems.braking.plan import check_reference
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
+from models.systems.braking.stop_report import Stop
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -153,7 +153,7 @@ PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw 
 
 def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     surfaces = list(dict.fromkeys(case.surface for case, _ in found))
     rights = read(Options, scene.options, scene.file, "options").surfaces

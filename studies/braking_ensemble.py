@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.plan import check_reference
-from models.braking.procedures import drive
-from models.braking.scene import BrakingScene, build
-from models.braking.stops import Scatter, Stops, Welch, scatter, welch
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity, read
+from models.core.tables import write_table
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
-from models.errors import InputError
-from models.strict import Strict, quantity, read
-from models.tables import write_table
+from models.systems.braking.plan import check_reference
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import BrakingScene, build
+from models.systems.braking.stops import Scatter, Stops, Welch, scatter, welch
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -134,7 +134,7 @@ def _figure(
     tests: dict[str, Welch],
     folder: Path,
 ) -> None:
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in found]), bins=24)

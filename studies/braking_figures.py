@@ -5,14 +5,14 @@ from pathlib import Path as File
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.braking.hitch import hitch, on_ground, outlines
-from models.braking.measured_pressures import MeasuredPressures
-from models.braking.of_scene import plane_of, sides
-from models.braking.plan import behind
-from models.braking.plane_step import LOAD, SLIP
-from models.braking.scene import BrakingScene
-from models.braking.stop_report import SLOWEST, WHEELS, Stop
-from studies.figures import save
+from models.brake.plane_step import LOAD, SLIP
+from models.drawing.figures import save
+from models.systems.braking.hitch import hitch, on_ground, outlines
+from models.systems.braking.measured_pressures import MeasuredPressures
+from models.systems.braking.of_scene import plane_of, sides
+from models.systems.braking.plan import behind
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
 
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#66c2a5", "#cc79a7", "#e7b5d1")
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
-from models.choice.variants import Variants, system_of
-from models.errors import InputError
-from models.strict import Strict, read
+from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
+from models.advice.choice.variants import Variants, system_of
+from models.core.errors import InputError
+from models.core.strict import Strict, read
 from studies.asked import ANY, load_scene, plan_of
 
 SYSTEM = ANY
@@ -97,7 +97,7 @@ def has_closed_form(scene: Any) -> bool:
     """Whether a scene's choice needs no runs."""
     if scene.system != "ride":
         return False
-    from models.ride.choice.in_time import goes_in_time
+    from models.advice.ride_choice.in_time import goes_in_time
 
     return not goes_in_time(scene)
 
@@ -133,10 +133,10 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
 
 def _linear(scene: Any) -> Found:
     """The same of a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
-    from models.ride.choice.activity import activity
-    from models.ride.choice.choose import Chooser as Linear
-    from models.ride.choice.held import Held
-    from models.ride.of_scene import told_by, vehicle_of
+    from models.advice.ride_choice.activity import activity
+    from models.advice.ride_choice.choose import Chooser as Linear
+    from models.systems.ride.of_scene import told_by, vehicle_of
+    from models.systems.ride.reduced_scene import Held
 
     with told_by(scene):
         chooser = Linear(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)

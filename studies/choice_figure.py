@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.figures import plt, save
+from models.drawing.figures import plt, save
 
 LOWEST, HIGHEST = 1e-3, 1e3
 """Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""

@@ -14,10 +14,10 @@ from typing import Annotated, Any, NoReturn, get_args
 import typer
 from typer.exceptions import TyperException
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
+from models.core.finding import Finding, lines, queries
+from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
-from models.measured.finding import Finding, lines, queries
-from models.whole_files import reason_of, write_whole
 from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
@@ -69,14 +69,14 @@ def _end(message: str, code: int) -> NoReturn:
 @app.command("list")
 def list_scenes() -> None:
     """List the scenes that come with twinrig, the effects, the parameter sets and the engines."""
+    from models.core.scene_effects import listing
+    from models.core.scene_file import parse
+    from models.core.systems import DEFAULT, SYSTEMS
     from models.engines.catalogue import CATALOGUE
-    from models.scene import parameter_sets
-    from models.scene_effects import listing
-    from models.scene_file import parse
-    from models.systems import DEFAULT, SYSTEMS
+    from models.systems.pitch_plane.scene import parameter_sets
 
     scenes = {path.stem: parse(path)["title"] for path in sorted(SCENES.glob("*.toml"))}
-    sets = {name: import_module(f"models.parameters.{name}").SOURCE for name in parameter_sets()}
+    sets = {name: import_module(f"models.vehicles.parameters.{name}").SOURCE for name in parameter_sets()}
     _print_list("scenes (twinrig run NAME, or a file of your own)", scenes)
     for system in SYSTEMS:
         named = "[effects.NAME] in a scene" if system == DEFAULT else "by the tables of its scenes"
@@ -109,7 +109,7 @@ def show(
     if not price and (engine is not None or as_json):
         raise InputError("--engine" if engine else "--json", "", engine, "belongs to --price here: name it too")
     if is_measurement(Path(scene)):
-        from models.measured.listing import describe
+        from models.systems.measured.listing import describe
 
         return print(describe(Path(scene)))
     loaded = load_scene(scene, changes)
@@ -117,9 +117,9 @@ def show(
         plan = plan_of(loaded).describe(loaded)
         return print("\n".join([plan, *_untold(findings_of(loaded), plan), *_search(loaded)]))
     _say_user_code(loaded)
-    from validation.price.effects import price_list
-    from validation.price.effects_text import as_dict
-    from validation.price.effects_text import lines as price_lines
+    from models.advice.price.effects import price_list
+    from models.advice.price.effects_text import as_dict
+    from models.advice.price.effects_text import lines as price_lines
 
     found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found, loaded.quantities)))
@@ -164,7 +164,7 @@ def run(
 @contextmanager
 def _queried(scene: Any) -> Iterator[None]:
     """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
-    from models.strict import Query
+    from models.core.strict import Query
 
     try:
         yield
@@ -218,9 +218,9 @@ def price(
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest engine, integrator and step that hold a scene's quantity to a tolerance."""
-    from validation.price.own_scene.recommendation import price as price_of
-    from validation.price.own_scene.text import as_dict
-    from validation.price.own_scene.text import lines as price_lines
+    from models.advice.price.recommendation import price as price_of
+    from models.advice.price.text import as_dict
+    from models.advice.price.text import lines as price_lines
 
     loaded = load_scene(scene, changes)
     _say_user_code(loaded)
@@ -261,8 +261,8 @@ def validate(
     """Run the validation cases and write report.html, results.json and results.csv."""
     if engine is not None:
         return _conformity(engine, quick or against is not None or resume is not None, out)
-    from validation.changes import read
-    from validation.kept_cases import KEPT
+    from validation.common.changes import read
+    from validation.common.kept_cases import KEPT
     from validation.run import validate as run_all
 
     earlier = None if against is None else read(against)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from models.result import load
-from models.whole_files import whole_file
+from models.core.errors import InputError
+from models.core.result import load
+from models.core.whole_files import whole_file
 
 SUFFIXES = (".nc", ".csv")
 SHOWN = 20
@@ -306,7 +306,7 @@ def _lines(found: list[Difference]) -> list[str]:
 
 def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
     """Both results and, below, their difference, of the three quantities that differ most."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     shown = found[:3]
     figure, axes = plt.subplots(2, len(shown), figsize=(4.2 * len(shown) + 0.6, 5.4), sharex="col", squeeze=False)

@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from models.contact.accuracy import Error, rolled
-from models.contact.of_scene import built_of, contact, creepages, touches
-from models.contact.scene import ContactScene, Method
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, Linear, Motion, OnEllipse, Rolled
-from models.errors import InputError
-from models.seconds import cost, duration
-from models.strict import Strict, read
-from models.tables import write_table
+from models.core.errors import InputError
+from models.core.strict import Strict, read
+from models.core.tables import write_table
+from models.machine.seconds import cost, duration
+from models.systems.contact.of_scene import built_of, contact, creepages, touches
+from models.systems.contact.scene import ContactScene, Method
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]

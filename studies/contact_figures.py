@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from models.contact.accuracy import Error
 from models.contact.fields import Fields
-from models.contact.scene import Sweep
 from models.contact.theories import Contact, Rolled
-from models.contact.work_precision import TARGETS, Point
-from studies.figures import plt, save
+from models.drawing.figures import plt, save
+from models.systems.contact.scene import Sweep
+from models.systems.contact.work_precision import TARGETS, Point
 
 MILLI, MEGA = 1e3, 1e-6
 STICK, SLIP = "#cfe3f2", "#f6c9a8"

@@ -7,13 +7,13 @@ from typing import Any
 
 from pydantic import Field
 
-from models.contact.of_scene import built_of, hertz_of
-from models.contact.scene import ContactScene
-from models.contact.work_precision import WAYS, cheapest_lines, ellipse_cases, exact, measure
-from models.errors import InputError
-from models.seconds import cost
-from models.strict import Strict, read
-from models.whole_files import write_whole
+from models.core.errors import InputError
+from models.core.strict import Strict, read
+from models.core.whole_files import write_whole
+from models.machine.seconds import cost
+from models.systems.contact.of_scene import built_of, hertz_of
+from models.systems.contact.scene import ContactScene
+from models.systems.contact.work_precision import WAYS, cheapest_lines, ellipse_cases, exact, measure
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -59,8 +59,8 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         points += [measure(way, cells, known) for cells in way.cells]
     table = _table(points, len(known), max(case.error for case in known))
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    from models.drawing.figures import save
     from studies.contact_figures import price_figure
-    from studies.figures import save
 
     title = f"What accuracy costs: a = {1e3 * hertz.a:.2f} mm, b = {1e3 * hertz.b:.2f} mm, {len(known)} contacts"
     save(price_figure(points, title), folder / "price.png")

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.cases_table import answer, compile_first
-from models.contact.scene import ContactScene
-from models.errors import InputError
-from models.scene_effects import extended
-from models.seconds import duration
+from models.core.errors import InputError
+from models.core.scene_effects import extended
+from models.machine.seconds import duration
+from models.systems.contact.cases_table import answer, compile_first
+from models.systems.contact.scene import ContactScene
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]

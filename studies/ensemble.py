@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.errors import InputError
+from models.core.result import Result, provenance
+from models.core.steps import divides
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
-from models.ensemble.engines import gap, mujoco_threads
-from models.ensemble.paths import NoisePaths, noise_paths
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import cluster, processes
-from models.errors import InputError
-from models.result import Result, provenance
-from models.scene import Scene
-from models.simulate import state_names
-from models.steps import divides
-from models.strict import Strict, quantity, read
-from models.whole_files import write_whole
+from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
+from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.run import state_names
+from models.systems.pitch_plane.scene import Scene
 from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -221,7 +221,7 @@ def _time(value: float) -> str:
 
 def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, folder: Path) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], percentiles(errors[:, 1:]))

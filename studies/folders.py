@@ -6,8 +6,8 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from models.errors import InputError
-from models.whole_files import FULL, drop_parts
+from models.core.errors import InputError
+from models.core.whole_files import FULL, drop_parts
 
 COMMAND = "command.txt"
 """First file of a folder that the user named: what made the others."""

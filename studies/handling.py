@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import RunFailed
-from models.handling import forces as at
-from models.handling.in_engines import Drive, driven
-from models.handling.scene import HandlingScene
+from models.core.errors import RunFailed
+from models.multibody import forces as at
+from models.systems.handling.in_engines import Drive, driven
+from models.systems.handling.scene import HandlingScene
 
 SYSTEM = "handling"
 Progress = Callable[[str, float], None]
@@ -100,7 +100,7 @@ REPORTS = {
 def _save(scene: HandlingScene, drives: dict[str, Drive], path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance, write
+    from models.core.result import provenance, write
 
     first = next(iter(drives.values()))
     axes = ("engine", "time")

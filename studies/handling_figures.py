@@ -5,9 +5,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.handling import forces as at
-from models.handling.in_engines import Drive
-from studies.figures import save
+from models.drawing.figures import save
+from models.multibody import forces as at
+from models.systems.handling.in_engines import Drive
 
 TYRES = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00")
 

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from models.damage import damage_ratio
-from models.engines.hub_forces import HubRun, build
-from models.errors import RunFailed
-from models.hub_forces.cut_vehicle import ANGLES, CutVehicle, X, Y, Z
-from models.hub_forces.halved import check_halved
-from models.hub_forces.measurement import Angles, HubForces
-from models.hub_forces.of_scene import measured
-from models.hub_forces.scene import COMPONENTS, HubScene, Method
-from models.hub_forces.stabilised import Stabilised
-from models.strict import Strict, read
-from models.time_series import write_time_series
+from models.core.errors import RunFailed
+from models.core.strict import Strict, read
+from models.core.time_series import write_time_series
+from models.engines.cut_vehicle import HubRun, build
+from models.fatigue.damage import damage_ratio
+from models.systems.hub_forces.halved import check_halved
+from models.systems.hub_forces.measurement import Angles, HubForces
+from models.systems.hub_forces.of_scene import measured
+from models.systems.hub_forces.scene import COMPONENTS, HubScene, Method
+from models.systems.hub_forces.stabilised import Stabilised
+from models.vehicles.cut_vehicle import ANGLES, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
-    from models.hub_forces.tilt_filter import Tilt
+    from models.systems.hub_forces.tilt_filter import Tilt
 
 SYSTEM = "hub-forces"
 Progress = Callable[[str, float], None]

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.hub_forces.cut_vehicle import ANGLES, X, Y, Z
-from studies.figures import plt, save
+from models.drawing.figures import plt, save
+from models.vehicles.cut_vehicle import ANGLES, X, Y, Z
 
 if TYPE_CHECKING:
     from studies.hub_forces import Found

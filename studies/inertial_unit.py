@@ -16,16 +16,16 @@ import numpy as np
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
-from models.damage import SLOPE, pseudo_damage
-from models.errors import InputError, RunFailed
-from models.noise import GYRO, normal
-from models.result import Result
-from models.scene import Scene
-from models.section_forces import CHANNELS, section_forces
+from models.core.errors import InputError, RunFailed
+from models.core.noise import GYRO, normal
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
+from models.drift.section_forces import CHANNELS, section_forces
+from models.fatigue.damage import SLOPE, pseudo_damage
 from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance, bias
-from models.simulate import simulate
-from models.strict import Strict, quantity, read
-from models.whole_files import write_whole
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
 Positive = Annotated[float, Field(gt=0)]
@@ -249,7 +249,7 @@ def _named(grade: float | None) -> str:
 
 
 def _figures(rows: list[dict[str, Any]], options: Options, curve: CubicSpline, folder: Path) -> None:
-    from studies.figures import save
+    from models.drawing.figures import save
 
     save(_figure_grades(rows, options), folder / "grades.png")
     save(_figure_curve(curve), folder / "damage_of_an_angle.png")
@@ -257,7 +257,7 @@ def _figures(rows: list[dict[str, Any]], options: Options, curve: CubicSpline, f
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options) -> Any:
     """Angle error and damage error over the length of the drive, a line per grade."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 4))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
@@ -285,7 +285,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options) -> Any:
 
 def _figure_curve(curve: CubicSpline) -> Any:
     """Damage over a constant angle error."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(7, 3.8))
     angles = np.linspace(curve.x[0], curve.x[-1], 401)

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
+from models.core.strict import Strict, quantity, read
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW
 from models.rail.limit_cycle import attained, bifurcation
 from models.rail.linear import NoCriticalSpeed
-from models.rail.of_scene import BESIDE, equations_of
 from models.rail.orbit import Orbit, beside, refined, solved
-from models.rail.scene import WheelsetScene
-from models.strict import Strict, quantity, read
+from models.systems.wheelset.of_scene import BESIDE, equations_of
+from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
 Progress = Callable[[str, float], None]
@@ -110,8 +110,8 @@ def _cycles(scene: WheelsetScene, engines: tuple[str, ...], speed: float) -> tup
 
 def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], folder: Path) -> None:
     """The branch as a table, one period of every engine's cycle as netCDF."""
-    from models.result import provenance, write
-    from models.tables import write_table
+    from models.core.result import provenance, write
+    from models.core.tables import write_table
     from studies.wheelset import dataset
 
     if orbits:

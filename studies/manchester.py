@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from models.contact.wheel_on_rail import DEEP
-from models.errors import InputError, RunFailed
-from models.rail.benchmark_plan import case_text
-from models.rail.benchmark_scene import WheelRailScene
+from models.core.errors import InputError, RunFailed
+from models.core.tables import write_table
+from models.machine.seconds import cost
 from models.rail.contact_table import Contact, Place, Placed, rolling_radius_difference
-from models.seconds import cost
-from models.tables import write_table
+from models.systems.wheel_rail.plan import case_text
+from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
 Progress = Callable[[str, float], None]

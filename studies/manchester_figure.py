@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.rail.benchmark_plan import case_text
-from models.rail.benchmark_scene import Case
+from models.drawing.figures import plt, save
 from models.rail.contact_table import Place, Placed
-from studies.figures import plt, save
+from models.systems.wheel_rail.plan import case_text
+from models.systems.wheel_rail.scene import Case
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222")
 PANELS: tuple[tuple[str, Callable[[Place], float]], ...] = (

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.effects.accelerometers import Parameters, names
-from models.errors import InputError, RunFailed
-from models.scene import Scene
+from models.core.errors import InputError, RunFailed
+from models.core.strict import Strict, quantity, read
+from models.core.tables import ACCELERATIONS
+from models.core.time_series import read_time_series, write_time_series
+from models.core.whole_files import write_whole
 from models.sensors.high_pass import check_cut_off
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import LIMIT, Motion, Quality, Start, motion, quality, spin, tilt_displacement
 from models.sensors.rotations import GimbalLock, from_cardan
-from models.sensors.sampling import write
 from models.sensors.sensor_array import SensorArray, sensor_array
-from models.simulate import simulate
-from models.strict import Strict, quantity, read
-from models.tables import ACCELERATIONS
-from models.time_series import read_time_series, write_time_series
-from models.whole_files import write_whole
+from models.systems.pitch_plane.effects.accelerometers import Parameters, names
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.sampling import write
+from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
 CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave": ("z3", "m")}
@@ -276,7 +276,7 @@ def _closing(options: Options) -> list[str]:
 
 def _figure(source: Source, path: Path) -> None:
     """Pitch, heave, error of the pitch or its rate, and the misfit of the readings, of one source."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     times = source.period * np.arange(len(source.readings))
     figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), sharex=True)

@@ -10,41 +10,41 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from models.core.errors import InputError, RunFailed
+from models.core.finding import Finding, gathered, queries
+from models.core.strict import Strict, read
+from models.core.systems import load
 from models.drift.score import Verdict, rms
-from models.drift.trust import ANGLE, Trust
-from models.errors import InputError, RunFailed
-from models.hub_forces.cut_vehicle import CutVehicle
-from models.hub_forces.kernel import WRENCH
-from models.measured import plan
+from models.fatigue.counting import Counted, count
 from models.measured.checks import findings as findings_of
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
 from models.measured.checks.weight import moments
-from models.measured.clock import record
-from models.measured.comparison import Compared, checks, compare
-from models.measured.consequences import Consequence, consequences, judged, told
-from models.measured.counting import Counted, count
-from models.measured.finding import Finding, gathered, queries
-from models.measured.hand_on import NAME, forces, hand_on
-from models.measured.hold_of import NOISE, hold_of, noise_of
-from models.measured.pattern import write_pattern
 from models.measured.recording import Recording
-from models.measured.rig import Rig
-from models.measured.scene import MeasuredScene
-from models.measured.section_run import Hold, Outcome, SectionRun
-from models.measured.section_run import check as check_run
-from models.measured.section_run import run as march
-from models.measured.sections import Answer, Sections, points
 from models.measured.signal import Signal
-from models.measured.trust import Drift, Level, drift
-from models.measured.verdict import judge, surprised
-from models.measured.virtual import VirtualMeasurement, virtual_measurement
-from models.strict import Strict, read
-from models.systems import load
+from models.multibody.cut_kernel import WRENCH
+from models.systems.measured import plan
+from models.systems.measured.clock import record
+from models.systems.measured.comparison import Compared, checks, compare
+from models.systems.measured.consequences import Consequence, consequences, judged, told
+from models.systems.measured.hand_on import NAME, forces, hand_on
+from models.systems.measured.hold_of import NOISE, hold_of, noise_of
+from models.systems.measured.pattern import write_pattern
+from models.systems.measured.rig import Rig
+from models.systems.measured.scene import MeasuredScene
+from models.systems.measured.section_run import Hold, Outcome, SectionRun
+from models.systems.measured.section_run import check as check_run
+from models.systems.measured.section_run import run as march
+from models.systems.measured.sections import Answer, Sections, points
+from models.systems.measured.trust import Drift, Level, drift
+from models.systems.measured.verdict import judge, surprised
+from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement
+from models.systems.pitch_plane.trust import ANGLE, Trust
+from models.vehicles.cut_vehicle import CutVehicle
 
 if TYPE_CHECKING:
-    from models.measured.pitch_plane import PlaneJob
+    from models.systems.measured.pitch_plane import PlaneJob
 
 SYSTEM = "measured"
 BLOCKS = "work"
@@ -176,7 +176,7 @@ def _in_space(found: Found, work: Path, progress: Progress) -> None:
 
 def _in_plane(found: Found, work: Path, progress: Progress) -> None:
     """Predict, run and judge the pitch plane."""
-    from models.measured.pitch_plane import run as run_plane
+    from models.systems.measured.pitch_plane import run as run_plane
 
     for i, name in enumerate(_holds(found)):
         progress(f"{name} run", 0.2 + 0.35 * i)
@@ -192,7 +192,7 @@ def _in_plane(found: Found, work: Path, progress: Progress) -> None:
 
 def _plane_job(found: Found, name: str) -> "PlaneJob":
     """A run of the pitch plane to be made."""
-    from models.measured.pitch_plane import PlaneJob
+    from models.systems.measured.pitch_plane import PlaneJob
 
     assert found.scene.vehicle.parameters is not None
     return PlaneJob(
@@ -344,7 +344,7 @@ def _make_in_space(found: Found, name: str, recording: Recording, folder: Path) 
 
 
 def _make_in_plane(found: Found, name: str, recording: Recording, folder: Path) -> Outcome:
-    from models.measured.pitch_plane import run as run_plane
+    from models.systems.measured.pitch_plane import run as run_plane
 
     return run_plane(replace(_plane_job(found, name), recording=recording), folder / "run").outcome
 

@@ -5,12 +5,12 @@ from textwrap import shorten
 
 import numpy as np
 
-from models.hub_forces.cut_vehicle import GRAVITY
+from models.core.finding import Finding
+from models.drawing.figures import plt, save
 from models.measured.checks.agreement import Agreement, Fault, Group
 from models.measured.checks.evidence import Evidence
-from models.measured.finding import Finding
 from models.measured.signal import UNITS, Signal
-from studies.figures import plt, save
+from models.vehicles.cut_vehicle import GRAVITY
 
 AROUND, LONGEST, MOST = 0.6, 15.0, 20_000
 """s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""

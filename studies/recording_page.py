@@ -10,16 +10,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.damage import SLOPE
-from models.drift.trust import Trust
-from models.measured.comparison import Band
-from models.measured.consequences import DAMAGE, FORCE
-from models.measured.counting import Counted
-from models.measured.finding import Finding
-from models.measured.section_run import Outcome
-from models.measured.sections import Answer
-from models.measured.verdict import DISAGREES, errors
-from models.whole_files import write_whole
+from models.core.finding import Finding
+from models.core.whole_files import write_whole
+from models.fatigue.counting import Counted
+from models.fatigue.damage import SLOPE
+from models.systems.measured.comparison import Band
+from models.systems.measured.consequences import DAMAGE, FORCE
+from models.systems.measured.section_run import Outcome
+from models.systems.measured.sections import Answer
+from models.systems.measured.verdict import DISAGREES, errors
+from models.systems.pitch_plane.trust import Trust
 from studies import recording_runs as draw
 from studies.recording import FREE, Found, handed_on
 from studies.recording_figures import figure

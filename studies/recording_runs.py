@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from models.measured.comparison import Compared, overlay
-from models.measured.counting import Counted
-from models.measured.section_run import Outcome
-from models.measured.sections import Answer
+from models.fatigue.counting import Counted
+from models.systems.measured.comparison import Compared, overlay
+from models.systems.measured.section_run import Outcome
+from models.systems.measured.sections import Answer
 from studies.recording import FREE, Found
 
 POINTS = 1200
@@ -41,7 +41,7 @@ def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def inputs_figure(found: Found, path: Path) -> Path:
     """Forces at all hubs along each axis."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     own, axes = found.recording, [a for a in "zxy" if found.recording.find("force", component=a)]
     figure, panels = plt.subplots(len(axes), 1, figsize=(9.5, 1.9 * len(axes) + 0.5), sharex=True, squeeze=False)
@@ -58,7 +58,7 @@ def inputs_figure(found: Found, path: Path) -> Path:
 
 def drift_figure(found: Found, path: Path) -> Path:
     """Roll and pitch of every run, beside what was measured and, of a virtual measurement, the truth."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     angles = found.rig.angles
     figure, panels = plt.subplots(len(angles), 1, figsize=(9.5, 2.0 * len(angles) + 0.6), sharex=True, squeeze=False)
@@ -101,7 +101,7 @@ def _angles(found: Found, angle: str) -> list[tuple[str, np.ndarray, np.ndarray]
         answer = next(a for a in run.answers if a.name == f"{found.rig.chassis} {angle}")
         out.append((name, run.period * np.arange(run.done), run.samples(answer)))
     if found.virtual is not None:
-        from models.hub_forces.cut_vehicle import ANGLES
+        from models.vehicles.cut_vehicle import ANGLES
 
         true = found.virtual.run
         out.append(("truth", true.times, true.states[:, ANGLES[angle]]))
@@ -116,7 +116,7 @@ def _bounded(panel: Any) -> None:
 
 def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str = "") -> Path:
     """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     times = run.period * np.arange(run.done)
     figure, panels = plt.subplots(
@@ -139,7 +139,7 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
 
 def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     """Level crossings and range pairs of some loads."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.6))
     for colour, (answer, own) in zip(WHEELS, counted.items(), strict=False):
@@ -159,7 +159,7 @@ def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
 
 def overlay_figure(found: Found, compared: Sequence[Compared], path: Path) -> Path:
     """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     assert found.held is not None
     figure, panels = plt.subplots(

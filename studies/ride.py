@@ -8,11 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from models.ride.excitation import excited
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
+from models.ride.excited import excited
 from models.ride.height_densities import variances
 from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
-from models.ride.of_scene import (
+from models.ride.sweep import Sweep, sweep
+from models.ride.weighting import weighted
+from models.road.isotropic import isotropic_like, spectral_matrix
+from models.systems.ride.of_scene import (
     GRAVITY,
     Linear,
     check_linear,
@@ -25,15 +30,10 @@ from models.ride.of_scene import (
     told_by,
     vehicle_of,
 )
-from models.ride.plan import doubts, met
-from models.ride.scene import RideScene
-from models.ride.sweep import Sweep, sweep
-from models.ride.weighting import weighted
-from models.road.isotropic import isotropic_like, spectral_matrix
-from models.strict import Strict, quantity, read
+from models.systems.ride.plan import doubts, met
+from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
-from models.whole_files import write_whole
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
@@ -148,7 +148,7 @@ def _save(
     """Deviations of every engine over case, speed and output; the system at one speed for other programs."""
     import xarray as xr
 
-    from models.result import provenance, write
+    from models.core.result import provenance, write
     from models.ride.covariance import stationary
     from models.ride.export import save
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from models.choice.systems.ride import opened
-from models.errors import InputError
-from models.ride.choice.activity import activity
-from models.ride.choice.choose import Choice, Chooser
-from models.ride.choice.held import Effect, Held, illegal
-from models.ride.choice.in_time import Samples, goes_in_time
-from models.ride.choice.reduced_files import SCENE, write
-from models.ride.of_scene import told_by, vehicle_of
-from models.ride.scene import RideScene
-from models.strict import read
+from models.advice.choice.systems.ride import opened
+from models.advice.ride_choice.activity import activity
+from models.advice.ride_choice.choose import Choice, Chooser
+from models.advice.ride_choice.in_time import Samples, goes_in_time
+from models.advice.ride_choice.reduced_files import SCENE, write
+from models.core.errors import InputError
+from models.core.strict import read
+from models.systems.ride.of_scene import told_by, vehicle_of
+from models.systems.ride.reduced_scene import Effect, Held, illegal
+from models.systems.ride.scene import RideScene
 from studies.choice import told
 
 SYSTEM = "ride"

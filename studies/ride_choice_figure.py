@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from models.ride.choice.choose import Choice
-from models.ride.scene import RideScene
-from studies.figures import plt, save
+from models.advice.ride_choice.choose import Choice
+from models.drawing.figures import plt, save
+from models.systems.ride.scene import RideScene
 
 LOWEST, HIGHEST = 1e-4, 1e3
 """Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""

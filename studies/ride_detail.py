@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.strict import Strict, read
+from models.machine.seconds import cost
 from models.ride.covariance import stationary
-from models.ride.excitation import excited
-from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
-from models.ride.scene import RideScene
+from models.ride.excited import excited
 from models.ride.sweep import Sweep, sweep
-from models.seconds import cost
-from models.strict import Strict, read
+from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle

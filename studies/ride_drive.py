@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.errors import InputError
-from models.ride.of_scene import check_linear, excitation_of, linear_vehicle, told_by, vehicle_of
-from models.ride.scene import RideScene
+from models.core.errors import InputError
+from models.core.strict import Strict, read
 from models.ride.varying_speed import VaryingSpeed, quasi_stationary, varying_speed
-from models.strict import Strict, read
+from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, told_by, vehicle_of
+from models.systems.ride.scene import RideScene
 from models.vehicles.spatial_linear import wheels
 
 SYSTEM = "ride"
@@ -87,7 +87,7 @@ def _units(scene: RideScene) -> list[tuple[Any, str]]:
 def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[str], path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance, write
+    from models.core.result import provenance, write
 
     axes = ("time", "output")
     data = xr.Dataset(

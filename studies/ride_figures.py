@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
+from models.drawing.figures import plt, save
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
+from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
 from models.road.isotropic import isotropic_like
 from models.road.two_track import TwoTrackRoad
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from studies.figures import plt, save
 
 COLOURS = ("#222222", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
 """One colour per correlation: the scene's own, then two of the axles and two of the tracks."""

@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity, read
 from models.engines.spatial_protocol import INTEGRATORS
-from models.errors import InputError
 from models.ride.covariance import stationary
-from models.ride.excitation import Excitation, excited
-from models.ride.in_engines import Ride, ridden
+from models.ride.excited import excited
 from models.ride.nonlinear_copies import Copies, copies_in_time, followed
-from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
 from models.ride.road_path import check_rates, road_path
-from models.ride.scene import RideScene
 from models.ride.statistical_linearisation import StatisticallyLinear, bent, statistically_linear
 from models.ride.time_averages import standard_errors
-from models.strict import Strict, quantity, read
+from models.road.excitation import Excitation
+from models.systems.ride.in_engines import Ride, ridden
+from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import preloads, wheels
 
@@ -164,7 +165,7 @@ def _in_engines(
 def _save(scene: RideScene, answer: Answer, path: Path) -> None:
     import xarray as xr
 
-    from models.result import provenance, write
+    from models.core.result import provenance, write
 
     axes, few = ("speed", "output"), ("speed_of_copies", "output")
     copies = list(answer.copies.values())

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.ride.excitation import Excitation
+from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.ride.frequency import spectra
-from models.ride.in_engines import Ride
-from models.ride.linear_vehicle import LinearVehicle, Output
 from models.ride.statistical_linearisation import GRADES
-from studies.figures import COLOURS, LABELS, plt, save
+from models.road.excitation import Excitation
+from models.systems.ride.in_engines import Ride
+from models.vehicles.linear_vehicle import LinearVehicle, Output
 
 if TYPE_CHECKING:
     from studies.ride_nonlinear import Answer

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
-from models.errors import RunFailed
-from models.plan import doubt_lines, trust_line
-from models.result import Result
-from models.scene import Scene
-from models.simulate import simulate, state_names, summary
+from models.core.errors import RunFailed
+from models.core.result import Result
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.plan import doubt_lines, trust_line
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.run import state_names, summary
+from models.systems.pitch_plane.scene import Scene
 
 Progress = Callable[[str, float], None]
 
@@ -83,7 +84,7 @@ def same_times(one: Result, other: Result) -> bool:
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
-    from studies.figures import COLOURS, LABELS, plt, save
+    from models.drawing.figures import COLOURS, LABELS, plt, save
 
     panels = [
         ("z3", "heave of the chassis, down [m]", 1.0),
@@ -115,7 +116,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
 
 def _differences(axis: Any, results: dict[str, Result]) -> None:
     """Difference to the first implementation, on a logarithmic scale, against time."""
-    from studies.figures import COLOURS, LABELS
+    from models.drawing.figures import COLOURS, LABELS
 
     (base, first), *others = results.items()
     for engine, result in others:

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.errors import RunFailed
-from models.result import Result
-from models.scene import Scene
-from models.simulate import simulate
-from models.strict import Strict, quantity, read
-from models.whole_files import write_whole
+from models.core.errors import RunFailed
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
 from studies.virtual_measurement import PAPER, check_road, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -198,7 +198,7 @@ def _heave(lines: list[dict[str, Any]]) -> str:
 
 def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
     """Figures like the paper's 4 to 8."""
-    from studies.figures import save
+    from models.drawing.figures import save
 
     save(_figure_measurement(measured), folder / "fig4_measurement.png")
     main = {
@@ -221,7 +221,7 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
 
 
 def _figure_measurement(measured: Result) -> Any:
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
     middle = round(float(measured.times[-1]) / 2, 1)
@@ -243,7 +243,7 @@ def _figure_measurement(measured: Result) -> Any:
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
     """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
     (name, measured), *runs = results.items()
@@ -263,7 +263,7 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
 
 
 def _figure_moment(result: Result) -> Any:
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.4))
     axes[0].plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)

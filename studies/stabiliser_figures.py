@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from models.drawing.figures import plt
 from models.drift.score import BAND, TUMBLED, Limits
-from models.section_forces import CHANNELS
-from studies.figures import plt
+from models.drift.section_forces import CHANNELS
 
 Row = dict[str, Any]
 

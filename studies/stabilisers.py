@@ -17,8 +17,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.assembly import assemble
-from models.damage import CONVENTION, SLOPE
+from models.core.errors import InputError, RunFailed
+from models.core.noise import PITCH_SENSOR, normal
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.core.time_series import write_time_series
+from models.core.whole_files import whole_file, write_whole
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.drift.score import (
     COARSEST,
@@ -32,17 +36,13 @@ from models.drift.score import (
     uncertainty,
     verdict,
 )
-from models.drift.trust import trust
-from models.errors import InputError, RunFailed
-from models.noise import PITCH_SENSOR, normal
-from models.result import Result
-from models.scene import Scene, build
-from models.section_forces import CHANNELS
-from models.simulate import simulate
-from models.strict import Strict, quantity, read
-from models.time_series import write_time_series
+from models.drift.section_forces import CHANNELS
+from models.fatigue.damage import CONVENTION, SLOPE
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.trust import trust
 from models.vehicles.pitch_plane import Parameters
-from models.whole_files import whole_file, write_whole
 from studies.virtual_measurement import PAPER, check_road, check_steps, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -90,7 +90,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     table = text(rows, benches, options)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     _write_csv(folder / "score.csv", rows)
-    from studies.figures import save
+    from models.drawing.figures import save
     from studies.stabiliser_figures import decision, stiffness
 
     progress("figures", 1.0)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.figures import COLOURS, LABELS, plt, save
+from models.drawing.figures import COLOURS, LABELS, plt, save
 
 if TYPE_CHECKING:
     from studies.sweep import Points

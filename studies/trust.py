@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.assembly import assemble
+from models.core.errors import InputError
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
-from models.drift.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
-from models.ensemble.paths import noise_paths
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.errors import InputError
-from models.result import Result
-from models.scene import Scene, build
-from models.simulate import simulate
-from models.strict import Strict, quantity, read
-from models.whole_files import write_whole
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.noise_paths import noise_paths
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
 from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -241,7 +241,7 @@ def _figure(
     curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options, path: Path
 ) -> None:
     """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
-    from studies.figures import plt, save
+    from models.drawing.figures import plt, save
 
     colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
     figure, axis = plt.subplots(figsize=(8.0, 4.6))

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from models.braking.of_scene import kinds_of, surfaces_of, table_of
-from models.braking.plan import check_reference
-from models.braking.scene import BrakingScene
-from models.braking.tyre_table import TyreTable
-from models.errors import InputError
-from models.strict import Strict, read
-from models.tables import write_table
+from models.core.errors import InputError
+from models.core.strict import Strict, read
+from models.core.tables import write_table
+from models.systems.braking.of_scene import kinds_of, surfaces_of, table_of
+from models.systems.braking.plan import check_reference
+from models.systems.braking.scene import BrakingScene
+from models.tyre.tyre_table import TyreTable
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.braking.tyre_table import TyreTable
-from studies.figures import plt, save
+from models.drawing.figures import plt, save
+from models.tyre.tyre_table import TyreTable
 
 SLIPS = np.linspace(0.0, 1.0, 1001)
 COLOURS = plt.get_cmap("viridis")

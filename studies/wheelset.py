@@ -7,30 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 from models.rail import wheel_forces as wf
 from models.rail.climbing import flange_share, nadal
 from models.rail.eigenvalues import growth, hunting, locus, wavelength
 from models.rail.energy import ledger
-from models.rail.equations import ROLL, SPIN, YAW, Y, Z
+from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import maxima
 from models.rail.linear import NoCriticalSpeed, critical_speed, kinematic_wavelength, klingel
-from models.rail.of_scene import equations_of, implementation, path_speeds, wheelset_of
-from models.rail.scene import WheelsetScene
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset.channels import CONTACTS, STATES
+from models.systems.wheelset.of_scene import equations_of, implementation, path_speeds, wheelset_of
+from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
 Progress = Callable[[str, float], None]
-STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {
-    "normal": (wf.LOAD, "N"),
-    "fx": (wf.FX, "N"),
-    "fy": (wf.FY, "N"),
-    "mz": (wf.MZ, "N m"),
-    "power": (wf.POWER, "W"),
-}
-"""What is saved of every path, with its place and unit."""
 
 
 def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -96,7 +88,7 @@ def _save(scene: WheelsetScene, linear: dict[str, Linear], paths: dict[str, dict
     """Eigenvalues over the speeds and every step of the paths as netCDF; damping and frequency as a table."""
     import xarray as xr
 
-    from models.result import provenance, write
+    from models.core.result import provenance, write
 
     origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
     if linear:
@@ -138,7 +130,7 @@ def dataset(paths: dict[str, dict[float, Motion]]) -> Any:
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
-    from models.tables import write_table
+    from models.core.tables import write_table
 
     columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
     for engine, one in linear.items():

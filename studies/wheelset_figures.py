@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.linear import klingel
 from models.rail.orbit import Orbit
 from models.rail.wheelset import Wheelset
-from studies.figures import COLOURS, LABELS, plt, save
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""

@@ -32,7 +32,7 @@ def twinrig(empty_folder):
 @pytest.fixture
 def new_file(tmp_path, monkeypatch):
     """Put a file among the effects of a system, in a folder of its own."""
-    from models.systems import SYSTEMS
+    from models.core.systems import SYSTEMS
 
     def put(system, name, text):
         package = SYSTEMS[system].effects

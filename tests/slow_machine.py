@@ -36,7 +36,7 @@ def rows(case, quick, folder):
 
 def judged(kind):
     """The row that a tenth of a second of ``kind`` by the true clock gives, judged by the clock that is told."""
-    from validation.rows import at_most
+    from validation.common.rows import at_most
 
     clock = getattr(time, kind)
     start, real = clock(), clock.real()

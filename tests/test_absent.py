@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import models
-from models.assembly import assemble
-from models.scene_effects import module_of, names_of
-from models.systems import DEFAULT
+from models.core.scene_effects import module_of, names_of
+from models.core.systems import DEFAULT
+from models.systems.pitch_plane.assembly import assemble
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, registered, user_functions
@@ -51,7 +51,7 @@ def test_a_bare_scene_imports_no_effect(bare):
 def test_a_scene_imports_its_own_effect_alone(forced):
     """Positive control: the modules that must be absent above do appear, but only those of the one effect."""
     found = {name for name in forced["modules"] if belongs_to_effects(name)}
-    assert found == {"models.effects.wheel_forces", "models.time_series", "models.tables"}
+    assert found == {"models.systems.pitch_plane.effects.wheel_forces", "models.core.time_series", "models.core.tables"}
 
 
 def test_only_the_kernel_of_the_scene_is_compiled(bare, forced):

@@ -2,11 +2,22 @@
 
 import pytest
 
-from models.braking.scene import build
-from models.errors import InputError
-from models.scene import build as build_half_car
-from models.scene_effects import absent, beside, check, listing, module_of, named, names_of, own_table, rebuilt, without
-from models.systems import DEFAULT, SYSTEMS, load
+from models.core.errors import InputError
+from models.core.scene_effects import (
+    absent,
+    beside,
+    check,
+    listing,
+    module_of,
+    named,
+    names_of,
+    own_table,
+    rebuilt,
+    without,
+)
+from models.core.systems import DEFAULT, SYSTEMS, load
+from models.systems.braking.scene import build
+from models.systems.pitch_plane.scene import build as build_half_car
 from studies.asked import SCENES, plan_of
 from validation.absence import of_systems
 from validation.absence.of_systems import FILES, added, bare, controlled, declared, file_of, seen
@@ -40,7 +51,7 @@ def test_a_bare_scene_names_nothing():
 
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
     """Positive control of the comparison: a file that declares too little is found out."""
-    from models.braking.effects import load_transfer
+    from models.systems.braking.effects import load_transfer
 
     monkeypatch.setattr(load_transfer, "COUNTS", {})
     found = added("braking", "load_transfer", quick=True)

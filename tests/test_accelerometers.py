@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.scene import build
+from models.core.errors import InputError
+from models.core.time_series import write_time_series
 from models.sensors import rigid_body_motion, sensor_array
 from models.sensors.virtual_accelerometers import on_bracket, readings
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 from validation.hard_cases import accelerometers as family
 from validation.hard_cases.case import judge
 

@@ -16,11 +16,11 @@ from bad_inputs import CUTS, FORCED, FREE, GOOD, GUIDED, ON_CRG, ON_CSV, ON_ROAD
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.errors import InputError
-from models.plan import check
+from models.core.errors import InputError
+from models.core.systems import SYSTEMS, load
 from models.road.opencrg import write_opencrg
 from models.road.study import study_road
-from models.systems import SYSTEMS, load
+from models.systems.pitch_plane.plan import check
 from models.vehicles.pitch_plane import Parameters
 from studies import command_line
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.braking.controller import AllApplied, Command
-from models.braking.port.ask import Asked
-from models.braking.procedures import ready
+from models.brake.controller import AllApplied, Command
+from models.brake.port.ask import Asked
+from models.systems.braking.procedures import ready
 from validation.absence.bare_stops import ratio_of_stops
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare

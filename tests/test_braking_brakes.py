@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.braking.brake import Brake, of_wheels, torque
-from models.braking.controller import APPLY, HOLD, RELEASE, SAMPLE
-from models.braking.pressure import Air, Chambers, by_pressures, by_valves, still
-from models.errors import InputError
+from models.brake.brake import Brake, of_wheels, torque
+from models.brake.controller import APPLY, HOLD, RELEASE, SAMPLE
+from models.brake.pressure import Air, Chambers, by_pressures, by_valves, still
+from models.core.errors import InputError
 
 BRAKE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
 BRAKES = of_wheels(BRAKE)

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from models.braking.brake import Brake
-from models.braking.controller import SAMPLE, Sample
-from models.braking.controllers import CONTROLLERS
-from models.braking.controllers.acceleration_phases import AccelerationPhases
-from models.braking.controllers.five_phase import FivePhase, end_of, rate
-from models.braking.controllers.slip_bang_bang import SlipBangBang
-from models.braking.controllers.slip_pi import SlipPI
-from models.braking.frozen import Frozen, limit_cycle
-from models.braking.magic_formula import surface
-from models.braking.speed_estimate import SpeedEstimate
-from models.errors import InputError, RunFailed
+from models.brake.brake import Brake
+from models.brake.controller import SAMPLE, Sample
+from models.brake.controllers import CONTROLLERS
+from models.brake.controllers.acceleration_phases import AccelerationPhases
+from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.slip_bang_bang import SlipBangBang
+from models.brake.controllers.slip_pi import SlipPI
+from models.brake.frozen import Frozen, limit_cycle
+from models.brake.speed_estimate import SpeedEstimate
+from models.core.errors import InputError, RunFailed
+from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import Wheel, cycle
 
 PHASES = FivePhase(1, e1=20.0, e2=30.0, e3=20.0, e4=2.0, e5=60.0, falling=60.0, fast=40.0, slow=8.0)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.braking import figures_of_merit as merit
-from models.braking.stops import Scatter, scatter, welch
-from models.errors import InputError
+from models.brake import figures_of_merit as merit
+from models.core.errors import InputError
+from models.systems.braking.stops import Scatter, scatter, welch
 
 PAPER = merit.Axles(front=33_600.0, rear=21_800.0, wheelbase=3.61, height=1.2)
 

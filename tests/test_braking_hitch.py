@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from models.braking.adhesion import utilisation
-from models.braking.hitch import of_hitch, on_ground, outlines
-from models.braking.of_scene import plane_of
-from models.braking.scene import build
-from models.braking.trailer import CHOSEN
+from models.brake.trailer import CHOSEN
+from models.systems.braking.adhesion import utilisation
+from models.systems.braking.hitch import of_hitch, on_ground, outlines
+from models.systems.braking.of_scene import plane_of
+from models.systems.braking.scene import build
 
 TABLE = {
     "title": "t",

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from models.braking.controller import SLOW, Command, Sample
-from models.braking.plane_step import BORNE, KNOWN, SIDE, share_out
-from models.braking.plane_vehicle import PAPER, truck
-from models.braking.port.ask import WITH_SLOW, ControllerFailed, checked
-from models.braking.procedures import drive, ready
-from models.braking.quarter import Quarter
-from models.braking.scene import build
-from models.braking.trailer import CHOSEN, train
-from models.errors import InputError, RunFailed
+from models.brake.controller import SLOW, Command, Sample
+from models.brake.plane_step import BORNE, KNOWN, SIDE, share_out
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.port.ask import WITH_SLOW, ControllerFailed, checked
+from models.brake.quarter import Quarter
+from models.brake.trailer import CHOSEN, train
+from models.core.errors import InputError, RunFailed
+from models.systems.braking.procedures import drive, ready
+from models.systems.braking.scene import build
 from validation.braking.random_stops import random_stop
 from validation.cases import braking_limits as rows
 

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.braking.controller import SAMPLE, Sample
-from models.braking.measured_pressures import read_pressures
-from models.braking.of_scene import measured_of
-from models.braking.plan import check, describe
-from models.braking.procedures import drive
-from models.braking.scene import build
-from models.braking.stop_report import Stop
-from models.errors import InputError
+from models.brake.controller import SAMPLE, Sample
+from models.core.errors import InputError
+from models.systems.braking.measured_pressures import read_pressures
+from models.systems.braking.of_scene import measured_of
+from models.systems.braking.plan import check, describe
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import build
+from models.systems.braking.stop_report import Stop
 from studies.braking import ended, run
 
 HEAD = "time [s], pressure_fl [bar], pressure_fr [kPa], pressure_rl [bar], pressure_rr [bar]"

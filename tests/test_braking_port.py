@@ -14,30 +14,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import models.braking.port as port
-from models.braking.brake import PAPER_FRONT, PAPER_REAR, of_wheels
-from models.braking.controller import SAMPLE, Command, Sample
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import PAPER, truck
-from models.braking.port import frame, socket_port
-from models.braking.port.ask import ControllerFailed, ask
-from models.braking.port.callable import named_controller
-from models.braking.port.client import serve
-from models.braking.port.example import Example
-from models.braking.port.faults import Fault, Faulty
-from models.braking.port.pace import WallClock
-from models.braking.port.sensors import Conversion, sensed
-from models.braking.port.setup import PortTable, Run, opened
-from models.braking.port.socket_port import connected
-from models.braking.port.teeth import Counted, Teeth
-from models.braking.pressure import Chambers
-from models.braking.procedures import drive
-from models.braking.run import Braked
-from models.braking.scene import build
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import stacked
-from models.errors import InputError, RunFailed
-from models.strict import read
+import models.brake.port as port
+from models.brake.brake import PAPER_FRONT, PAPER_REAR, of_wheels
+from models.brake.controller import SAMPLE, Command, Sample
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.port import frame, socket_port
+from models.brake.port.ask import ControllerFailed, ask
+from models.brake.port.callable import named_controller
+from models.brake.port.client import serve
+from models.brake.port.example import Example
+from models.brake.port.faults import Fault, Faulty
+from models.brake.port.pace import WallClock
+from models.brake.port.sensors import Conversion, sensed
+from models.brake.port.setup import PortTable, Run, opened
+from models.brake.port.socket_port import connected
+from models.brake.port.teeth import Counted, Teeth
+from models.brake.pressure import Chambers
+from models.brake.surfaces import Stretch, road
+from models.core.errors import InputError, RunFailed
+from models.core.strict import read
+from models.systems.braking.procedures import drive
+from models.systems.braking.run import Braked
+from models.systems.braking.scene import build
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import stacked
 
 HERE = Path(port.__path__[0])
 SHORT = 0.2
@@ -329,7 +329,7 @@ HOSTILE = {
 def test_prints_of_a_controller_leave_standard_output_to_the_results(tmp_path, capfd):
     """JSON of a run could not be read behind them."""
     (tmp_path / "talks.py").write_text(
-        "import numpy as np\nfrom models.braking.controller import Command\nclass Talks:\n"
+        "import numpy as np\nfrom models.brake.controller import Command\nclass Talks:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n        print('noise', flush=True)\n"
         "        return Command(valves=np.ones(4))\n"
     )
@@ -351,7 +351,7 @@ def test_a_hostile_callable_ends_by_name_and_in_time(kind, tmp_path):
     name, does = HOSTILE[kind]
     (tmp_path / "hostile.py").write_text(
         "import ctypes, os, signal, sys, threading, time\nimport numpy as np\n"
-        "from models.braking.controller import Command\nclass Hostile:\n    def __init__(self, wheels): pass\n"
+        "from models.brake.controller import Command\nclass Hostile:\n    def __init__(self, wheels): pass\n"
         f"    def sample(self, given):\n        {does}\n"
     )
     table = PortTable(callable="hostile.py:Hostile", timeout=time_out(name, 0.3), start=PATIENT)

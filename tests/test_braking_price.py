@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.braking.run import Braked
-from models.braking.tyre_table import stacked
+from models.advice.price import runner as cost
 from models.engines.braking import Carried
-from validation.price import runner as cost
+from models.systems.braking.run import Braked
+from models.tyre.tyre_table import stacked
 from validation.price.problems import braking_stop
 from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, VEHICLE, BrakingStop, Played
 

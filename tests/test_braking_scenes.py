@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.braking.adhesion import Adhesion, NoAdhesion, utilisation
-from models.braking.controller import Command
-from models.braking.of_scene import braked
-from models.braking.plan import check, check_reference, describe
-from models.braking.port.ask import ControllerFailed
-from models.braking.procedures import drive, ready
-from models.braking.scene import build
-from models.braking.stop_report import Stop
-from models.errors import InputError, Refused
-from models.systems import load
+from models.brake.controller import Command
+from models.brake.port.ask import ControllerFailed
+from models.core.errors import InputError, Refused
+from models.core.systems import load
+from models.systems.braking.adhesion import Adhesion, NoAdhesion, utilisation
+from models.systems.braking.of_scene import braked
+from models.systems.braking.plan import check, check_reference, describe
+from models.systems.braking.procedures import drive, ready
+from models.systems.braking.scene import build
+from models.systems.braking.stop_report import Stop
 from studies.braking import lines
 
 SCENES = Path(__file__).parents[1] / "studies" / "scenes"
@@ -129,7 +129,7 @@ def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all()
 
 def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_path):
     (tmp_path / "mine.py").write_text(
-        "import numpy as np\nfrom models.braking.controller import Command\nclass Released:\n"
+        "import numpy as np\nfrom models.brake.controller import Command\nclass Released:\n"
         "    def __init__(self, wheels): pass\n"
         "    def sample(self, given): return Command(pressures=np.full(4, 0.5))\n"
     )
@@ -200,7 +200,7 @@ def test_what_a_scene_names_is_read_before_its_plan_is_shown(tmp_path, tables, p
 @pytest.mark.parametrize(
     ("port", "place", "said"),
     [
-        ({"callable": "models.braking.port.example:Exampel"}, "port.callable", "Example"),
+        ({"callable": "models.brake.port.example:Exampel"}, "port.callable", "Example"),
         ({"command": ["/no/such/program"]}, "port.command", "cannot be started"),
         ({"replay": "s.log"}, "port.replay", "is no log"),
         ({"fmu": "s.log"}, "port.fmu", "is no FMU"),

@@ -2,9 +2,9 @@
 
 import pytest
 
-from models.braking.port.sensors import Conversion
-from models.errors import InputError
-from models.scene_effects import beside, legal, named, without
+from models.brake.port.sensors import Conversion
+from models.core.errors import InputError
+from models.core.scene_effects import beside, legal, named, without
 from validation.absence.of_systems import bare
 
 SENSORS = tuple(f"{what}_{how}" for what in ("signal", "pressure") for how in ("noise", "quantisation", "calibration"))

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.signal import lti, step
 
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import GRAVITY, PAPER
-from models.braking.procedures import drive, ready, step_steer
-from models.braking.scene import build
-from models.braking.steering import Steering, response
-from models.errors import InputError
+from models.brake.plane_vehicle import GRAVITY, PAPER
+from models.brake.steering import Steering, response
+from models.core.errors import InputError
+from models.systems.braking.procedures import drive, ready, step_steer
+from models.systems.braking.scene import build
+from models.tyre.magic_formula import surface
 
 STEPS = np.linspace(0.0, 8.0, 80_001)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from models.braking.quarter import Quarter, Stop
-from models.braking.relaxation import by_lagging_steps
-from models.braking.samples import by_steps
-from models.braking.tyre_table import TyreTable, stacked
-from models.errors import InputError
+from models.brake.quarter import Quarter, Stop
+from models.brake.relaxation import by_lagging_steps
+from models.brake.samples import by_steps
+from models.core.errors import InputError
+from models.tyre.tyre_table import TyreTable, stacked
 from validation.braking.braking_schemes import LITERAL, exact, stopped
 from validation.cases import braking_stop as case
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from models.braking.magic_formula import surface
-from models.braking.plan import check, describe
-from models.braking.plane_step import LOAD
-from models.braking.plane_vehicle import GRAVITY, truck
-from models.braking.procedures import drive, engines_of, ready
-from models.braking.scene import build
-from models.braking.sprung import PITCH, ROLL, sprung
-from models.braking.stop_report import Stop
-from models.errors import InputError, Refused, RunFailed
+from models.brake.plane_step import LOAD
+from models.brake.plane_vehicle import GRAVITY, truck
+from models.brake.sprung import PITCH, ROLL, sprung
+from models.core.errors import InputError, Refused, RunFailed
+from models.systems.braking.plan import check, describe
+from models.systems.braking.procedures import drive, engines_of, ready
+from models.systems.braking.scene import build
+from models.systems.braking.stop_report import Stop
+from models.tyre.magic_formula import surface
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
 

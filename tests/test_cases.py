@@ -8,7 +8,8 @@ from multiprocessing import get_context
 import pytest
 import slow_machine
 
-from validation.run import CASES, seeds
+from validation.cases import CASES
+from validation.run import seeds
 
 QUICK = (
     "audit",

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from models.errors import InputError
-from validation.changes import KINDS, against, changes, lines, read
+from models.core.errors import InputError
+from validation.common.changes import KINDS, against, changes, lines, read
+from validation.common.rows import at_most, behaves, within
 from validation.report.page import write
-from validation.rows import at_most, behaves, within
 
 ERROR = at_most("a.error", "drift", "an error", 1e-6, "m", 1e-5, "why", "native")
 VALUE = within("a.value", "drift", "a value", 2.0, "m", 2.0, 0.5, "why", "native")

@@ -7,24 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.choice import choose
-from models.choice.answer import Answer, Quantity, added, less, relative, rounding, sizes
-from models.choice.choose import Chooser
-from models.choice.screen import Screen
-from models.choice.variants import Variants
-from models.errors import InputError
-from models.systems import SYSTEMS
+from models.advice.choice import choose
+from models.advice.choice.answer import Answer, Quantity, added, less, relative, rounding, sizes
+from models.advice.choice.choose import Chooser
+from models.advice.choice.screen import Screen
+from models.advice.choice.variants import Variants
+from models.advice.price.effects import price_list
+from models.advice.price.effects_text import as_dict, lines
+from models.core.errors import InputError
+from models.core.systems import SYSTEMS
 from studies import choice as study
 from studies.asked import ready
 from validation.choice.drawn_scenes import drawn
-from validation.price.effects import price_list
-from validation.price.effects_text import as_dict, lines
 
 ROAD = {"source": "study", "speed": 20.0}
 
 
 def half_car(**more):
-    from models.scene import build
+    from models.systems.pitch_plane.scene import build
 
     table = {
         "title": "t",
@@ -152,7 +152,7 @@ def test_steps_of_the_screen_are_shorter_where_a_run_fails_late(monkeypatch):
 
 
 def hub_forces(**more):
-    from models.hub_forces.scene import build
+    from models.systems.hub_forces.scene import build
 
     table = {
         "title": "t",
@@ -221,7 +221,7 @@ def test_half_a_question_is_refused_with_its_place(change, place):
 
 
 def test_auto_alone_names_the_study():
-    from models.rail.scene import build
+    from models.systems.wheelset.scene import build
 
     scene = build(
         {

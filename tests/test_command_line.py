@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from models.errors import RunFailed
-from models.result import load
+from models.core.errors import RunFailed
+from models.core.result import load
 from studies import command_line, single_run
 
 HEAVY = ("numpy", "scipy", "numba", "exudyn", "mujoco", "xarray", "h5netcdf", "matplotlib", "pydantic", "jinja2")
@@ -46,7 +46,7 @@ def test_list_imports_no_engine_and_names_everything(twinrig, capsys):
     assert not imported("list") & {"exudyn", "mujoco", "numba", "xarray", "matplotlib"}
     assert twinrig("list") == 0
     said = capsys.readouterr().out
-    for path in [*STUDIES.glob("scenes/*.toml"), *STUDIES.parent.glob("models/effects/[a-z]*.py")]:
+    for path in [*STUDIES.glob("scenes/*.toml"), *STUDIES.parent.glob("models/systems/pitch_plane/effects/[a-z]*.py")]:
         assert f"  {path.stem} " in said
     assert all(word in said for word in ("itwm_drift", "asymmetric_twin", "GeneralizedAlpha", "implicitfast"))
 
@@ -198,7 +198,7 @@ def test_a_price_says_before_it_runs_code_of_the_user(twinrig, empty_folder, cap
         said.append(capsys.readouterr().err)
         raise ZeroDivisionError
 
-    monkeypatch.setattr("validation.price.effects.price_list", stop)
+    monkeypatch.setattr("models.advice.price.effects.price_list", stop)
     with pytest.raises(ZeroDivisionError):
         twinrig("show", "scene.toml", "--price")
     assert said == ["twinrig: this runs your own code, many times: [port] callable mine.py:Mine\n"]

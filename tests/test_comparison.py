@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.simulate import simulate
+from models.core.errors import InputError
+from models.systems.pitch_plane.run import run as simulate
 from studies.comparison import compare
-from validation.scenes import road_scene
+from validation.common.scenes import road_scene
 
 
 @pytest.fixture(scope="module")

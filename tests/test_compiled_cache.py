@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import models
-from models import compiled
 from models.engines.reference import derivative_of, march_of
+from models.machine import compiled
 
 MODES = (
     ("road", "exact"),
@@ -42,12 +42,12 @@ def test_every_kernel_is_compiled_that_way():
     own = {name for name, text in sources.items() if "numba.njit(" in text or "from numba import njit" in text}
     assert own == {"compiled.py"}
     nested = [name for name, text in sources.items() if re.search(r"^ +@(register_jitable|njit)", text, re.MULTILINE)]
-    assert not nested, "closures take a name of their own by models.compiled.named"
+    assert not nested, "closures take a name of their own by models.machine.compiled.named"
 
 
 FACTORY = """
 from numba.extending import register_jitable
-from models.compiled import named, njit
+from models.machine.compiled import named, njit
 
 def inner(factor):
     def times(x):
@@ -92,7 +92,7 @@ def test_a_change_of_the_equations_is_seen(tmp_path):
     shutil.copytree(Path(models.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     script = (
         "import numpy as np; from models.engines.reference import derivative_of; "
-        "from models.parameters.itwm_drift import PARAMETERS as p; "
+        "from models.vehicles.parameters.itwm_drift import PARAMETERS as p; "
         "print(derivative_of('road', 'exact')(np.full(8, 0.1), np.zeros(4), p.array())[7])"
     )
 
@@ -115,7 +115,7 @@ def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_
     ):
         path = tmp_path / "models" / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"from models.compiled import lean\n{text}\n")
+        path.write_text(f"from models.machine.compiled import lean\n{text}\n")
     monkeypatch.setattr(compiled, "ROOT", tmp_path)
     found = {}
     for changed in ("a/mine.py", "b/theirs.py", "c/deep.py", "c/other.py"):
@@ -128,7 +128,7 @@ def test_machine_code_is_as_old_as_the_kernels_that_its_file_imports_from_other_
 
 
 def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
-    from models.braking.sprung_step import compiled as stepping
+    from models.brake.sprung_step import compiled as stepping
     from models.engines.mujoco_native import accelerate, march
 
     files = compiled._files(stepping(accelerate, march, "in_a_test").py_func)

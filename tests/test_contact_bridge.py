@@ -10,11 +10,11 @@ import pytest
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_approach
 from models.contact.undeformed_distance import from_function
+from models.core.errors import InputError, Refused, RunFailed
 from models.engines.contact_bridge import SUNK, Wheels, add_forces, slopes
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
-from models.errors import InputError, Refused, RunFailed
 from validation.cases.contact_bridges import plain
 
 STEP, STEPS = 1e-4, 60

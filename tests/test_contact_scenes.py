@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.contact.of_scene import contact, hertz_of
-from models.contact.scene import build
-from models.errors import InputError
+from models.core.errors import InputError
+from models.systems.contact.of_scene import contact, hertz_of
+from models.systems.contact.scene import build
 
 ELLIPSE = """
 title = "a contact"

@@ -7,22 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
-from models.contact.cases_table import BY_AXES, HEADER, answer
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_fields import fastsim_fields
 from models.contact.material import Pair
-from models.contact.of_scene import contact
-from models.contact.scene import Method, build
-from models.contact.work_precision import Point, cheapest, exact
-from models.errors import InputError
-from models.table_stream import blocks
-from models.tables import NEWTONS, SHARES, read_table
+from models.core.errors import InputError
+from models.core.table_stream import blocks
+from models.core.tables import NEWTONS, SHARES, read_table
+from models.systems.contact.cases_table import BY_AXES, HEADER, answer
+from models.systems.contact.of_scene import contact
+from models.systems.contact.scene import Method, build
+from models.systems.contact.work_precision import Point, cheapest, exact
 from studies import contact_table
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
-from validation.price import runner as cost
 from validation.price.problems import contact_alone
 
 CASES = "a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [-],spin [1/mm]\n"

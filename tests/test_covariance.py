@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.linear_vehicle import Output
 from models.ride.marginal import Unstable, parts
 from models.ride.sweep import ASKED, sweep
 from models.ride.weighting import WEIGHTINGS, weighted
+from models.road.excitation import Excitation
 from models.road.two_track import CASES, excitation, road_of_level
+from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.ride_corners import corners

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from models.effects.contact_points import compression
+from models.core.noise import normal
+from models.core.time_series import write_time_series
 from models.engines.protocol import Settings
-from models.noise import normal
-from models.scene import build
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.effects.contact_points import compression
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 
 ENGINES = ("reference", "exudyn", "mujoco")
 

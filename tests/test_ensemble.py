@@ -15,18 +15,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models import whole_files
+from models.core import whole_files
+from models.core.errors import InputError, RunFailed
+from models.core.noise import normal
 from models.engines import protocol
 from models.ensemble import store
-from models.ensemble.engines import gap, mujoco_threads
-from models.ensemble.paths import NoisePaths, noise_paths
 from models.ensemble.runner import PathFailed, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.workers import cluster, processes
-from models.errors import InputError, RunFailed
-from models.noise import normal
-from models.simulate import simulate
-from validation.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
+from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 PATHS, BLOCK = 10, 3
 TIMES = np.array([0.0, 0.25, 0.5])
@@ -355,7 +355,7 @@ def test_what_cannot_be_an_ensemble_is_refused(folder):
 
 
 def _adaptive():
-    from models.scene import EngineTable
+    from models.systems.pitch_plane.scene import EngineTable
 
     return EngineTable(integrator="DOP853")
 

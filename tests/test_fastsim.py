@@ -13,7 +13,7 @@ from models.contact.fastsim_fields import fastsim_fields
 from models.contact.fastsim_grid import POWERS, grid, strips_of
 from models.contact.linear_theory import coefficients, flexibilities
 from models.contact.material import Pair
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.cases import fastsim as case
 from validation.contact.friction_limit import most_moment
 from validation.contact.fuzzed_creepage import OPTIONS, contacts, worst

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
-from models.scene import build
-from models.simulate import simulate
-from models.whole_files import PART
+from models.core.errors import InputError
+from models.core.whole_files import PART
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 from studies.folders import COMMAND, drop_if_empty, new_folder, resumed_folder
 from studies.single_run import difference
 

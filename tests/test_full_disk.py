@@ -4,10 +4,10 @@ import errno
 
 import pytest
 
-from models.whole_files import reason_of, whole_file, write_whole
+from models.core.whole_files import reason_of, whole_file, write_whole
 from studies.folders import COMMAND
-from validation import full_disk
-from validation.full_disk import files_of_at_most
+from validation.common import full_disk
+from validation.common.full_disk import files_of_at_most
 
 
 def sizes(folder):
@@ -54,5 +54,5 @@ def test_a_writer_that_leaves_its_part_is_seen(tmp_path, monkeypatch):
     """The fault to be seen: the file appears under its own name as it is written."""
     (tmp_path / "right").mkdir(), (tmp_path / "wrong").mkdir()
     assert full_disk.damage(tmp_path / "right") == 0
-    monkeypatch.setattr("models.result.write_whole", lambda path, content: path.write_bytes(content))
+    monkeypatch.setattr("models.core.result.write_whole", lambda path, content: path.write_bytes(content))
     assert full_disk.damage(tmp_path / "wrong") > full_disk.MOMENTS // 2

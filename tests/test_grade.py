@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from models.assembly import assemble
+from models.core.errors import InputError
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import Settings, build
-from models.errors import InputError
 from models.road import SineProfile, SplineProfile
 from models.road.grade import TRANSITION, Graded
 from models.road.signal import RoadUnderWheels
 from models.road.study import hills_road
-from models.scene import build as build_scene
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 
 FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")
 

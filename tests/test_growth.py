@@ -7,20 +7,21 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
-from models.assembly import assemble
+from models.core.noise import normal
+from models.core.systems import load
 from models.drift import growth as law
-from models.drift.covariance import covariance
-from models.drift.tangent import Path, path_of, swing, tilted
-from models.drift.trust import growth, interpolation, model, noise, trust
-from models.effects import pitch_spring
-from models.engines.protocol import build, settings_of
-from models.noise import normal
-from models.plan import describe, trust_line
-from models.simulate import simulate
-from models.systems import load
+from models.engines.protocol import build
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.covariance import covariance
+from models.systems.pitch_plane.effects import pitch_spring
+from models.systems.pitch_plane.plan import describe, trust_line
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.tangent import Path, path_of, swing, tilted
+from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
 from studies.asked import SCENES
 from studies.trust import run as run_study
-from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,7 @@ def test_drift_off_time_solves_the_law():
 
 def test_rigid_vehicle_about_the_common_centre_of_mass():
     """Momentum of the rigid linear vehicle: the pitch acceleration under forces, from the 2 x 2 mass matrix."""
-    from models.parameters.asymmetric_twin import PARAMETERS as p
+    from models.vehicles.parameters.asymmetric_twin import PARAMETERS as p
 
     rigid = law.rigid_pitch(p)
     c, mass = p.b * p.m1 - p.a * p.m2, p.m1 + p.m2 + p.m3
@@ -196,7 +197,7 @@ def test_study_on_a_file_of_ones_own(folder):
         "effects": {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}},
         "options": {"paths": 20, "noise_fraction": 0.02},
     }
-    from models.scene import build as build_scene
+    from models.systems.pitch_plane.scene import build as build_scene
 
     (folder / "out").mkdir()
     found = run_study(build_scene(table, "", folder), ("reference",), folder / "out", lambda text, part: None)

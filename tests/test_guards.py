@@ -7,15 +7,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from models.assembly import assemble
+from models.core.errors import InputError, Refused, RunFailed
+from models.core.signals import Smooth
+from models.core.time_series import write_time_series
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, balanced, build, guard
-from models.errors import InputError, Refused, RunFailed
-from models.scene import build as build_scene
-from models.signals import Smooth
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.cases import guards
 from validation.hard_cases import setups
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from control import lyap
 
-from models import signals
-from models.effects import contact_points as contact_effect
-from models.effects import lift_off
+from models.core import signals
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
 from models.rail import equations
 from models.rail.equations import Equations
 from models.ride import covariance, marginal
+from models.systems.pitch_plane.effects import contact_points as contact_effect
+from models.systems.pitch_plane.effects import lift_off
 from models.vehicles import pitch_plane
 from validation.cases import hard_cases
 from validation.hard_cases import (

@@ -5,10 +5,10 @@ import pytest
 
 from models.contact.hertz import aspect, by_approach, by_axes, by_load, integrals
 from models.contact.material import STEEL, Material, Pair
-from models.contact.of_scene import interpenetrating
 from models.contact.simplified_theory import roll
-from models.errors import InputError
-from models.strict import read
+from models.core.errors import InputError
+from models.core.strict import read
+from models.systems.contact.of_scene import interpenetrating
 from validation.cases.contact_hertz import ellipse, measure
 
 PAIR = Pair()

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.engines.hub_forces import HubRun, build
-from models.errors import InputError, Refused, RunFailed
-from models.hub_forces.cut_vehicle import PITCH, ROLL, cut
-from models.hub_forces.enforced import held
-from models.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
-from models.hub_forces.rigid import rigid
-from models.hub_forces.scene import build as scene_of
-from models.hub_forces.table import Drive
-from models.hub_forces.tilt_filter import estimate, pulled
+from models.core.errors import InputError, Refused, RunFailed
+from models.engines.cut_vehicle import HubRun, build
+from models.multibody.cut_rigid import rigid
+from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
+from models.systems.hub_forces.enforced import held
+from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.systems.hub_forces.scene import build as scene_of
+from models.systems.hub_forces.tilt_filter import estimate, pulled
+from models.vehicles.cut_vehicle import PITCH, ROLL, cut
 from models.vehicles.spatial_linear import linearise
 from validation.cases import hub_forces as case
 
@@ -124,7 +124,7 @@ def test_noise_is_the_same_in_any_frame_and_differs_from_path_to_path():
     ],
 )
 def test_one_clear_message(change, told):
-    from models.hub_forces.plan import check
+    from models.systems.hub_forces.plan import check
 
     with pytest.raises(InputError, match=told):
         check(scene_of({**ALL, **change}, "s.toml"), ("mujoco",))
@@ -142,7 +142,7 @@ def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told
 
 def test_steps_that_the_road_is_too_fast_for_are_told():
     """Steps of 4 ms at 60 m/s on class F mistake the bushes' forces by a tenth, on class C at 20 m/s by nothing."""
-    from models.hub_forces.of_scene import measured
+    from models.systems.hub_forces.of_scene import measured
 
     for road, held_true in (({}, True), ({"speed": 60.0, "iso8608": "F"}, False)):
         own = scene_of(
@@ -153,7 +153,7 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
 
 
 def test_no_step_is_too_long_for_a_vehicle_without_springs():
-    from models.hub_forces.halved import check_halved
+    from models.systems.hub_forces.halved import check_halved
 
     run = HubRun(np.arange(3.0), np.zeros((3, 12)), np.empty((3, 0)), np.zeros((3, 4, 6)), np.zeros((3, 2)))
     check_halved("mujoco", run, [], lambda step, steps: run)

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.choice.systems.hub_forces import answer
-from models.errors import InputError
-from models.hub_forces.measurement import recorded
-from models.hub_forces.of_scene import measured
-from models.hub_forces.scene import build
-from models.hub_forces.stabilised import Stabilised
-from models.scene_effects import beside, legal, named, without
+from models.advice.choice.systems.hub_forces import answer
+from models.core.errors import InputError
+from models.core.scene_effects import beside, legal, named, without
+from models.systems.hub_forces.measurement import recorded
+from models.systems.hub_forces.of_scene import measured
+from models.systems.hub_forces.scene import build
+from models.systems.hub_forces.stabilised import Stabilised
 from studies.asked import plan_of
 from studies.hub_forces import _planned
 
@@ -101,8 +101,8 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
     def missing(*given):
         raise AssertionError("was made")
 
-    monkeypatch.setattr("models.hub_forces.tilt_filter.estimate", missing)
-    monkeypatch.setattr("models.hub_forces.enforced.enforced", missing)
+    monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate", missing)
+    monkeypatch.setattr("models.systems.hub_forces.enforced.enforced", missing)
     own = scene()
     car = own.cut_vehicle()
     stabilised = Stabilised(own, car, *measured(own, car, "mujoco")[1:])

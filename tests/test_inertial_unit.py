@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.noise import GYRO, normal
+from models.core.noise import GYRO, normal
 from models.sensors import inertial_unit as unit
 from models.sensors.rotations import exponential, logarithm, matrix
 from validation.cases.inertial_unit import START, cone, measure, turning

@@ -5,14 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from models.damage import pseudo_damage
-from models.errors import InputError
-from models.scene import build
-from models.section_forces import CHANNELS, section_forces
+from models.core.errors import InputError
+from models.core.strict import read
+from models.core.systems import load
+from models.drift.section_forces import CHANNELS, section_forces
+from models.fatigue.damage import pseudo_damage
 from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
-from models.simulate import simulate
-from models.strict import read
-from models.systems import load
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study
 from studies.asked import SCENES
 

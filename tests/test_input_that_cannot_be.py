@@ -7,19 +7,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.tables import ended
+from models.core.time_series import read_time_series, write_time_series
 from models.measured.axle_forces import IN_FILE, AxleForces, check
-from models.measured.finding import Finding
 from models.measured.signal import Signal
-from models.parameters import asymmetric_twin, itwm_drift
-from models.simulate import simulate
-from models.tables import ended
-from models.time_series import read_time_series, write_time_series
+from models.systems.pitch_plane.run import run as simulate
+from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle, shipped
 from studies.asked import findings_of, load_scene
-from validation.scenes import road_scene
+from validation.common.scenes import road_scene
 
 TWIN, DURATION, PERIOD = asymmetric_twin.PARAMETERS, 20.0, 1e-3
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g
@@ -149,8 +149,8 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     result = simulate(own, "reference")
     assert "falls" in json.loads(result.data.attrs["doubts"])[0] and "doubt" in result.data.attrs["status"]
     assert abs(result["z3"][-1]) > 80.0  # as the doubt says
-    from models.assembly import assemble
-    from models.plan import trust_line
+    from models.systems.pitch_plane.assembly import assemble
+    from models.systems.pitch_plane.plan import trust_line
 
     assert "mean of the wheel forces" in trust_line(assemble(own))[0]
     accepted = scene(tmp_path, 0.95 * true()[0], 'accept = ["weight"]\n')

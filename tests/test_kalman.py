@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from models.assembly import assemble
-from models.drift import pitch_filter, pitch_step
+from models.core.errors import InputError, RunFailed
+from models.core.tables import NEWTONS
+from models.core.time_series import read_time_series, write_time_series
 from models.drift.innovations import LEVEL, consistency
-from models.drift.pitch_filter import INERTIA, PITCH, RATE, Measurement, estimate
-from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised
-from models.errors import InputError, RunFailed
-from models.plan import describe
-from models.scene import build as build_scene
-from models.simulate import simulate
-from models.tables import NEWTONS
-from models.time_series import read_time_series, write_time_series
+from models.systems.pitch_plane import pitch_filter, pitch_step
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.pitch_filter import INERTIA, PITCH, RATE, Measurement, estimate
+from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
+from models.systems.pitch_plane.plan import describe
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build as build_scene
 
 PERIOD, DURATION = 5e-3, 2.0
 ENGINES = ("reference", "exudyn", "mujoco")

@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from models.errors import InputError
-from validation.kept_cases import Cases, measured
-from validation.rows import within
+from models.core.errors import InputError
+from validation.common.kept_cases import Cases, measured
+from validation.common.rows import within
 
 NAMES = ("a_case", "bad_case", "one_more")
 

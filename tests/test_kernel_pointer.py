@@ -16,7 +16,7 @@ from models.contact.hertz import by_approach, by_load
 from models.contact.kernel_pointer import EXAMPLE, HEADER, Pointer, pointer
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
-from models.errors import InputError
+from models.core.errors import InputError
 
 PAIR = Pair(STEEL, Material(E=2.0e11, nu=0.29))
 GOOD = (1.1, 1.7, 8e4, 0.3, 1e-3, -5e-4, 0.3)

@@ -13,7 +13,7 @@ from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.simplified_theory import press, roll
 from models.contact.undeformed_distance import from_function, quadratic
-from models.errors import InputError
+from models.core.errors import InputError
 
 PAIR, SIZE = Pair(), (-0.03, 0.03)
 ELLIPSE = quadratic(1.1, 1.7, 0.03, 0.03, 61)

@@ -5,35 +5,36 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.assembly import assemble
-from models.choice.systems.ride import opened
-from models.effects import lift_off
+from models.advice.choice.systems.ride import opened
+from models.core.errors import InputError
+from models.core.scene_effects import without
 from models.engines import reference
 from models.engines.catalogue import RECOMMENDED as INTEGRATORS
-from models.engines.protocol import Settings, build, settings_of
+from models.engines.protocol import Settings, build
 from models.engines.spatial_protocol import build as build_spatial
 from models.engines.spatial_reference import SpatialReference
-from models.errors import InputError
-from models.hub_forces.measurement import truth, two_tracks
-from models.hub_forces.scene import build as build_hubs
-from models.ride.in_engines import ridden
 from models.ride.nonlinear_copies import March, copies_in_time
-from models.ride.of_scene import check_linear, excitation_of, vehicle_of
 from models.ride.road_path import road_path
-from models.ride.scene import build as build_ride
 from models.ride.statistical_linearisation import statistically_linear
 from models.road.iso8608 import iso8608_road
-from models.scene import build as build_scene
-from models.scene_effects import without
-from models.simulate import simulate
+from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.scene import build as build_hubs
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.effects import lift_off
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.scene import settings_of
+from models.systems.ride.in_engines import ridden
+from models.systems.ride.of_scene import check_linear, excitation_of, vehicle_of
+from models.systems.ride.scene import build as build_ride
 from models.vehicles import pitch_plane_equations
 from models.vehicles.pitch_plane import describe
 from models.vehicles.spatial_linear import preloads, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies import ride_nonlinear
-from validation import checks
-from validation.bounces import Bounces, energy
-from validation.scenes import gap
+from validation.common import checks
+from validation.common.bounces import Bounces, energy
+from validation.common.scenes import gap
 
 ENGINES = ("reference", "exudyn", "mujoco")
 ROAD = {"source": "study", "speed": 20.0}
@@ -188,7 +189,7 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
 
 
 def test_what_cannot_be_is_told_with_the_remedy(tmp_path):
-    from models.time_series import write_time_series
+    from models.core.time_series import write_time_series
 
     write_time_series(tmp_path / "f.csv", {"front": ("N", np.full(9, 4e3)), "rear": ("N", np.full(9, 4e3))}, 1e-3)
     with pytest.raises(InputError, match="lift_off: cannot stand beside 'wheel_forces', there is no tyre"):
@@ -339,7 +340,7 @@ def test_hub_loads_are_the_law_of_where_the_engine_says_the_hubs_are():
     """Independent of the compiled kernel: places and rates from MuJoCo's own Jacobians, the law written here."""
     import mujoco
 
-    from models.engines.hub_forces import EngineHubs
+    from models.engines.cut_vehicle import EngineHubs
 
     car = hubs(lift_off={})
     car = replace(car, whole=replace(car.whole, tyres=tuple(replace(t, damping=500.0) for t in car.whole.tyres)))

@@ -16,7 +16,7 @@ from models.contact.linear_theory import (
     forces,
 )
 from models.contact.material import STEEL, Material, Pair
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.cases import contact_coefficients as case
 
 PAIR = Pair()

@@ -1,6 +1,6 @@
 """Labels of logarithmic axes: plain text, powers where there are many decades, numbers that fit where there are few."""
 
-from studies.figures import plt
+from models.drawing.figures import plt
 
 
 def labels(low: float, high: float) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 from models.rail.contact_table import Contact, benchmark_side
 from validation.contact.manchester_references import searched
 

@@ -7,24 +7,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.hub_forces.rigid import rigid
-from models.hub_forces.tilt_filter import TiltFilter
+from models.core.finding import Finding, gathered, queries
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.place import Place
 from models.measured.checks.response import Response
 from models.measured.columns import Columns
-from models.measured.consequences import CORRECTIONS, Consequence, told
 from models.measured.faults_of_measurement import Faults
-from models.measured.finding import Finding, gathered, queries
-from models.measured.inputs import Inputs
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.section_run import Outcome
 from models.measured.signal import Quantity, Signal
-from models.measured.verdict import surprised
-from models.measured.virtual import VirtualMeasurement, recording
+from models.multibody.cut_rigid import rigid
+from models.systems.hub_forces.tilt_filter import TiltFilter
+from models.systems.measured.consequences import CORRECTIONS, Consequence, told
+from models.systems.measured.inputs import Inputs
+from models.systems.measured.section_run import Outcome
+from models.systems.measured.verdict import surprised
+from models.systems.measured.virtual import VirtualMeasurement, recording
 from validation.cases import measured_checks as case
 from validation.cases.hub_forces import r19
 

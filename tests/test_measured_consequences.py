@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.damage import SLOPE, damage_ratio
+from models.core.finding import Finding
 from models.drift.score import Verdict, rms
-from models.measured.consequences import DAMAGE, FORCE, Consequence, consequences, judged
+from models.fatigue.damage import SLOPE, damage_ratio
 from models.measured.faults_of_measurement import Faults
-from models.measured.finding import Finding
 from models.measured.recording import Recording
-from models.measured.section_run import Hold, Outcome, SectionRun, run
-from models.measured.sections import Sections
-from models.measured.virtual import VirtualMeasurement, recording
+from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, consequences, judged
+from models.systems.measured.section_run import Hold, Outcome, SectionRun, run
+from models.systems.measured.sections import Sections
+from models.systems.measured.virtual import VirtualMeasurement, recording
 from validation.cases import measured_checks as case
 
 SECTION = "rear right F"

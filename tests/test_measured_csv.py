@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.csv_header import find_head, heading, split
-from models.errors import InputError
+from models.core.csv_header import find_head, heading, split
+from models.core.errors import InputError
 from models.measured.formats import csv_layout, csv_rows, open_source
 from models.measured.formats.csv_layout import clock_heading, is_clock, is_other_clock
 from validation.cases import measured_formats as case

@@ -2,13 +2,13 @@
 
 import pytest
 
-from models.choice.choose import Chooser
-from models.choice.systems import measured
-from models.choice.variants import Variants
-from models.errors import InputError
-from models.measured.scene import build
-from models.scene_effects import absent, beside, named, without
-from models.systems import load
+from models.advice.choice.choose import Chooser
+from models.advice.choice.systems import measured
+from models.advice.choice.variants import Variants
+from models.core.errors import InputError
+from models.core.scene_effects import absent, beside, named, without
+from models.core.systems import load
+from models.systems.measured.scene import build
 from studies.asked import SCENES
 from validation.absence.measured import FAULTS, write
 from validation.absence.of_systems import bare

@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.formats import csv as csv_format
 from models.measured.formats import csv_rows, mdf4, open_source, tdms, write
 from models.measured.formats.opened import Opened

@@ -9,21 +9,21 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from rainflow import extract_cycles
 
-from models.damage import turning_points
-from models.errors import InputError, RunFailed
-from models.hub_forces.cut_vehicle import PITCH, ROLL
-from models.hub_forces.tilt_filter import TiltFilter
-from models.measured.checkpoint import Checkpoint
+from models.core.errors import InputError, RunFailed
+from models.core.signals import Sampled
+from models.fatigue.counting import count
+from models.fatigue.damage import turning_points
+from models.fatigue.rainflow_cycles import cycles
 from models.measured.columns import Columns
-from models.measured.comparison import checks, compare
-from models.measured.counting import count
-from models.measured.hand_on import hand_on
-from models.measured.inputs import Grid, Inputs
 from models.measured.recording import Recording
-from models.measured.section_run import Hold, SectionRun, run
-from models.measured.sections import Point, Sections, points
-from models.rainflow_cycles import cycles
-from models.signals import Sampled
+from models.systems.hub_forces.tilt_filter import TiltFilter
+from models.systems.measured.checkpoint import Checkpoint
+from models.systems.measured.comparison import checks, compare
+from models.systems.measured.hand_on import hand_on
+from models.systems.measured.inputs import Grid, Inputs
+from models.systems.measured.section_run import Hold, SectionRun, run
+from models.systems.measured.sections import Point, Sections, points
+from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
 from validation.cases.hub_forces import r19
 from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of

@@ -6,21 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.channel import Channel
-from models.measured.channel_map import signals
-from models.measured.clock import record
 from models.measured.formats import open_source
-from models.measured.guess import guess
-from models.measured.listing import describe
 from models.measured.no_value import without_absurd
 from models.measured.places import Places
-from models.measured.plan import check
 from models.measured.resampling import onto
-from models.measured.scene import build
 from models.measured.signal import Signal
 from models.measured.timing import timing
 from models.measured.units import conversion
+from models.systems.measured.channel_map import signals
+from models.systems.measured.clock import record
+from models.systems.measured.guess import guess
+from models.systems.measured.listing import describe
+from models.systems.measured.plan import check
+from models.systems.measured.scene import build
 from studies.recording import run
 from studies.summary_numbers import numbers
 

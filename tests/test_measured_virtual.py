@@ -7,28 +7,28 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from models.errors import InputError
-from models.hub_forces.cut_vehicle import CutVehicle, cut
-from models.hub_forces.rigid import rigid
+from models.core.errors import InputError
+from models.core.strict import read
 from models.measured.columns import Columns
-from models.measured.comparison import Band, Compared
 from models.measured.faults_of_measurement import Faults, check, measured
 from models.measured.gaps import filled
-from models.measured.inputs import Grid, Inputs
-from models.measured.pitch_plane import PlaneJob
-from models.measured.pitch_plane import run as plane_run
 from models.measured.recording import Recording
-from models.measured.section_run import DAMPING, Hold
-from models.measured.sections import Answer
 from models.measured.signal import Quantity, Signal
-from models.measured.trust import Level, drift, position
-from models.measured.verdict import disagreement, uncertainty
-from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
-from models.measured.virtual import check as check_virtual
-from models.simulate import simulate
-from models.strict import read
+from models.multibody.cut_rigid import rigid
+from models.systems.measured.comparison import Band, Compared
+from models.systems.measured.inputs import Grid, Inputs
+from models.systems.measured.pitch_plane import PlaneJob
+from models.systems.measured.pitch_plane import run as plane_run
+from models.systems.measured.section_run import DAMPING, Hold
+from models.systems.measured.sections import Answer
+from models.systems.measured.trust import Level, drift, position
+from models.systems.measured.verdict import disagreement, uncertainty
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.systems.measured.virtual import check as check_virtual
+from models.systems.pitch_plane.run import run as simulate
+from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.vehicle_file import load_vehicle
-from validation.scenes import road_scene
+from validation.common.scenes import road_scene
 
 PERIOD = 2e-3
 

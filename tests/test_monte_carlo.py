@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.covariance import stationary
 from models.ride.monte_carlo import ACCURACY, MODES, _Cells, along, at_constant_speed, path_cell
 from models.ride.road_in_path import at_speed

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.systems import load
+from models.core.errors import InputError
+from models.core.systems import load
 from studies.asked import SCENES
 from studies.motion import run
 

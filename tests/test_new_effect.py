@@ -5,11 +5,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.plan import describe
-from models.scene_effects import beside, extended, names_of, own_table, rebuilt
-from models.simulate import simulate
-from models.systems import DEFAULT, SYSTEMS
+from models.core.errors import InputError
+from models.core.scene_effects import beside, extended, names_of, own_table, rebuilt
+from models.core.systems import DEFAULT, SYSTEMS
+from models.systems.pitch_plane.plan import describe
+from models.systems.pitch_plane.run import run as simulate
 from studies.command_line import list_scenes
 from validation.absence.of_systems import added, bare, declared
 from validation.cases import absent
@@ -18,7 +18,7 @@ ANCHOR = '''"""A rope that draws the chassis level."""
 
 from dataclasses import replace
 
-from models.strict import Strict, quantity
+from models.core.strict import Strict, quantity
 from models.vehicles.description import PitchSpring
 
 COST = "one native spring, and one product after the run"
@@ -45,7 +45,7 @@ SLOW = '''"""Chambers that are clogged."""
 import numpy as np
 
 from dataclasses import replace
-from models.strict import Strict, quantity
+from models.core.strict import Strict, quantity
 
 COST = "two exponentials per wheel and sample"
 EXAMPLE = {"time": 0.2}

@@ -7,29 +7,29 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from models.choice.variants import system_of
-from models.contact.cases_table import answer
-from models.contact.of_scene import contact
-from models.contact.scene import build as build_contact
-from models.errors import InputError
-from models.handling.in_engines import driven, unaccounted
-from models.handling.numbers import Handling, Push
-from models.ride.choice.held import Held, effects_of, illegal
-from models.ride.choice.held import without as without_effects
-from models.ride.choice.reduced import Whole
-from models.ride.in_engines import ridden
-from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.advice.choice.variants import system_of
+from models.advice.price import effects, effects_of_ride, effects_text
+from models.advice.price.effects import Changed, price_list
+from models.advice.ride_choice.reduced import Whole
+from models.core.errors import InputError
+from models.core.scene_effects import beside, extended, listing, own_table, rebuilt, without
+from models.core.systems import SYSTEMS, load
+from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
-from models.ride.scene import build as build_ride
-from models.scene_effects import beside, extended, listing, own_table, rebuilt, without
-from models.systems import SYSTEMS, load
+from models.systems.contact.cases_table import answer
+from models.systems.contact.of_scene import contact
+from models.systems.contact.scene import build as build_contact
+from models.systems.handling.in_engines import driven, unaccounted
+from models.systems.ride.in_engines import ridden
+from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.reduced_scene import Held, effects_of, illegal
+from models.systems.ride.reduced_scene import without as without_effects
+from models.systems.ride.scene import build as build_ride
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
-from validation.price import effects, effects_of_ride, effects_text
-from validation.price.effects import Changed, price_list
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.strict import Strict, quantity
+from models.core.strict import Strict, quantity
 
 EXCLUDES = ("{self.excludes}",)
 WHY = "which it would be twice"
@@ -119,7 +119,7 @@ NEW = {
         900.0,
         '{"all": {"pushes": 1}}',
         """
-    from models.handling.numbers import Push
+    from models.multibody.numbers import Push
 
     wind = Push("body", (0.3, 0.0, 0.8), (0.0, 1.0, 0.0), ((0.0, 0.0), (5e-3, p.force)))
     return replace(built, pushes=(*built.pushes, wind))

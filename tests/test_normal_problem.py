@@ -8,7 +8,7 @@ from models.contact.half_space import influence
 from models.contact.hertz import by_load
 from models.contact.material import Pair
 from models.contact.normal_problem import TOLERANCE, centres, solve_normal
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 
 PAIR = Pair()
 STEP = 0.4e-3

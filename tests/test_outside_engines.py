@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.assembly import assemble
+from models.core.errors import InputError, Refused, RunFailed
 from models.engines import beside_reference
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
 from models.engines.protocol import Settings, build
-from models.errors import InputError, Refused, RunFailed
-from models.simulate import simulate
-from validation import checks, conformity, wrong_engines
-from validation.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from validation import conformity
+from validation.common import checks, wrong_engines
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 
 def of_the_readme():

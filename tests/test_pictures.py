@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.systems import load
 from models.rail.wheelset import CHOSEN
-from models.systems import load
 from studies import animation
 from studies.asked import SCENES
 from studies.pictures import video

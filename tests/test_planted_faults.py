@@ -5,8 +5,8 @@ import pytest
 
 from models.engines import exudyn, mujoco, reference
 from models.vehicles import pitch_plane_equations as equations
-from validation import checks
 from validation.cases import planted_faults
+from validation.common import checks
 from validation.faults import pitch_plane as case
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.planting import CLEAN, FAULTS, planted

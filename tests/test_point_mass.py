@@ -42,7 +42,7 @@ def test_series_and_closed_form_meet(x):
 def test_paths_follow_the_scheme():
     """One path, step by step."""
     x = v = 0.0
-    from models.noise import normal
+    from models.core.noise import normal
 
     for kick in normal(3, 0, 5, 1)[:, 0]:
         x, v = x + 0.5 * v, v + 0.5 * (3.0 * kick / 2.0 - 0.4 * v)

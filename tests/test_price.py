@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from models.errors import Refused, RunFailed
-from validation.price import curves
-from validation.price import runner as cost
-from validation.price.problems import Setting
+from models.advice.price import curves
+from models.advice.price import runner as cost
+from models.advice.price.problem import Setting
+from models.core.errors import Refused, RunFailed
+from models.machine.timing import describe, interleave, paired_ratio
 from validation.price.rows import rows_of
 from validation.price.tables import rounds_of, tables
-from validation.timing import describe, interleave, paired_ratio
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
 
@@ -342,7 +342,7 @@ def test_description_of_seconds():
 
 def test_force_calls_seen_from_outside():
     """Each adapter's counts against MuJoCo's timers and Exudyn's own calls of a load, 50 steps each."""
-    from models.assembly import assemble
+    from models.systems.pitch_plane.assembly import assemble
     from validation.price.force_calls import counted
     from validation.price.problems.road_excited import scene, setting, settings_of
 
@@ -385,10 +385,10 @@ def test_defaults_are_those_of_the_installed_engines():
 
 
 def test_every_force_in_one_callback_gives_the_native_path():
-    from models.assembly import assemble
     from models.engines.protocol import Settings, build
+    from models.systems.pitch_plane.assembly import assemble
+    from validation.common.scenes import VEHICLES, road_scene
     from validation.price.compiled_forces import CompiledForces
-    from validation.scenes import VEHICLES, road_scene
 
     settings = Settings("RK4", 1e-3, 0.5)
     for parameters in VEHICLES:

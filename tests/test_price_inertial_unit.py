@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from validation.price import runner as cost
+from models.advice.price import runner as cost
 from validation.price.problems import inertial_unit
 from validation.price.problems.inertial_unit import FULL, QUICK, InertialUnit, attitude, gyro
 

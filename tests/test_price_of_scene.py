@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from models.advice.price import Answer, Ladder
+from models.advice.price.pitch_plane import own
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import price, recommend
+from models.advice.price.text import as_dict, lines
+from models.advice.price.truth import at
+from models.core.errors import InputError, RunFailed
 from models.engines.outside import register
-from models.errors import InputError, RunFailed
-from models.scene import build
-from validation.price.own_scene import Answer, Ladder
-from validation.price.own_scene.pitch_plane import own
-from validation.price.own_scene.recommendation import price, recommend
-from validation.price.own_scene.text import as_dict, lines
-from validation.price.own_scene.truth import at
-from validation.price.own_scene.unseen import true_errors
-from validation.price.problems import Setting
+from models.systems.pitch_plane.scene import build
+from validation.price.unseen import true_errors
 
 STEPS = tuple(0.1 / 2**k for k in range(12))
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from models.errors import InputError, RunFailed
-from models.systems import SYSTEMS, load
+from models.advice.price.meshed import Meshed, first_part
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import SYSTEMS as PRICED
+from models.advice.price.recommendation import price, recommend
+from models.advice.price.text import lines
+from models.core.errors import InputError, RunFailed
+from models.core.systems import SYSTEMS, load
 from studies.asked import SCENES
-from validation.price.own_scene.meshed import Meshed, first_part
-from validation.price.own_scene.recommendation import SYSTEMS as PRICED
-from validation.price.own_scene.recommendation import price, recommend
-from validation.price.own_scene.text import lines
-from validation.price.problems import Setting
 
 STOP = {
     "title": "a stop",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from models.advice.price import runner as cost
 from models.engines.spatial_protocol import METHODS
-from validation.price import runner as cost
 from validation.price.problems import free_vehicle
 from validation.price.problems.free_vehicle import FULL, GRID, FreeVehicle, heights
 

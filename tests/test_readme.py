@@ -32,8 +32,8 @@ def test_every_study_is_listed_with_its_duration_and_run_by_ci():
 
 def test_every_effect_that_is_listed_is_one_and_every_folder_is_listed():
     """An effect need not be listed: its file is all that it takes, and `twinrig list` reads that."""
-    from models.scene_effects import names_of
-    from models.systems import DEFAULT
+    from models.core.scene_effects import names_of
+    from models.core.systems import DEFAULT
 
     table = README.partition("\n## Effects\n")[2].partition("\n## ")[0]
     rows = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
@@ -45,7 +45,7 @@ def test_every_effect_that_is_listed_is_one_and_every_folder_is_listed():
 def test_the_scene_of_the_readme_is_a_valid_scene(tmp_path):
     import tomllib
 
-    from models.scene import build
+    from models.systems.pitch_plane.scene import build
 
     table = tomllib.loads(re.search(r"```toml\n(.*?)```", README, flags=re.DOTALL).group(1))
     assert set(build(table, "README.md", tmp_path).effects) == {"road"}
@@ -54,7 +54,7 @@ def test_the_scene_of_the_readme_is_a_valid_scene(tmp_path):
 def test_the_contact_of_the_readme_is_a_valid_scene_and_its_python_runs(tmp_path, capsys):
     import tomllib
 
-    from models.contact.scene import build
+    from models.systems.contact.scene import build
 
     table = tomllib.loads(re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)[1])
     assert build(table, "README.md", tmp_path).geometry == "radii"

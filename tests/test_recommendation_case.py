@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from models.errors import InputError, RunFailed
+from models.advice.price import Ladder, recommendation
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import recommend
+from models.advice.price.search import Search, Tried
+from models.advice.price.text import as_dict, lines
+from models.advice.price.truth import truth
+from models.core.errors import InputError, RunFailed
 from validation.cases import recommendation as case
 from validation.faults.advice import LOOSE, Swing
-from validation.price.own_scene import Ladder, recommendation
-from validation.price.own_scene.recommendation import recommend
-from validation.price.own_scene.search import Search, Tried
-from validation.price.own_scene.text import as_dict, lines
-from validation.price.own_scene.truth import truth
-from validation.price.own_scene.unseen import Verdict, slower
-from validation.price.problems import Setting
+from validation.price.unseen import Verdict, slower
 
 GOOD = Verdict("a scene", "mujoco RK4", "2 ms", 1.0, 0.5, 0.5, 0.01, False)
 

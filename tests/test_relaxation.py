@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.braking.controller import AllApplied
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import PAPER, truck
-from models.braking.procedures import ready
-from models.braking.relaxation import lag_on, taken_up
-from models.braking.scene import build
+from models.brake.controller import AllApplied
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.relaxation import lag_on, taken_up
+from models.systems.braking.procedures import ready
+from models.systems.braking.scene import build
+from models.tyre.magic_formula import surface
 
 
 def test_the_law_is_exact_whatever_the_step():
@@ -74,5 +74,5 @@ def test_it_damps_at_rest():
 
 
 def test_a_run_without_it_imports_nothing_of_it():
-    code = "import sys, models.braking.run; sys.exit('models.braking.relaxation' in sys.modules)"
+    code = "import sys, models.systems.braking.run; sys.exit('models.brake.relaxation' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

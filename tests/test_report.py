@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.cases import point_mass
-from validation.changes import changes
-from validation.changes import read as read_earlier
+from validation.common.changes import changes
+from validation.common.changes import read as read_earlier
+from validation.common.rows import STATUSES, Row, aim, at_most, behaves, finding, not_run, within
 from validation.report import page as report
 from validation.report import shares
 from validation.report.numbers import margin, number, numeric_columns, powers, share
-from validation.rows import STATUSES, Row, aim, at_most, behaves, finding, not_run, within
 from validation.run import save as _save
 from validation.run import say
 

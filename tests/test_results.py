@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from models.errors import InputError
-from models.result import Result, load
-from models.scene import build
-from models.simulate import simulate
+from models.core.errors import InputError
+from models.core.result import Result, load
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 
 STUDY = {"road": {"source": "study", "speed": 15.0}}
 ROAD = {"title": "test", "run": {"duration": 0.5, "step": 1e-3}, "effects": STUDY}

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 import xarray
 
+from models.advice.ride_choice.choose import Chooser
+from models.advice.ride_choice.cost import stable_step
+from models.advice.ride_choice.march import March
+from models.advice.ride_choice.marched import confirms, marched
+from models.advice.ride_choice.neighbourhood import Neighbourhood, changed
+from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.screen import Screen, confirmed
+from models.core.errors import InputError
 from models.engines.spatial_protocol import build as build_engine
-from models.errors import InputError
-from models.ride.choice.choose import Chooser
-from models.ride.choice.cost import stable_step
-from models.ride.choice.held import Held, effects_of, illegal, without
-from models.ride.choice.march import March
-from models.ride.choice.marched import confirms, marched
-from models.ride.choice.neighbourhood import Neighbourhood, changed
-from models.ride.choice.reduced import Whole
-from models.ride.choice.screen import Screen, confirmed
 from models.ride.covariance import stationary
-from models.ride.excitation import excited
-from models.ride.of_scene import vehicle_of
-from models.ride.scene import build
+from models.ride.excited import excited
+from models.systems.ride.of_scene import vehicle_of
+from models.systems.ride.reduced_scene import Held, effects_of, illegal, without
+from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES

@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.choice.answer import by_chance
-from models.choice.choose import Chooser
-from models.choice.screen import Screen
-from models.choice.systems.ride import opened
-from models.choice.variants import Variants
-from models.errors import InputError
-from models.ride.choice.held import Held
-from models.ride.choice.in_time import FEWEST, left
-from models.ride.scene import build
+from models.advice.choice.answer import by_chance
+from models.advice.choice.choose import Chooser
+from models.advice.choice.screen import Screen
+from models.advice.choice.systems.ride import opened
+from models.advice.choice.variants import Variants
+from models.advice.price import effects
+from models.advice.price.effects import price_list
+from models.advice.price.effects_text import lines
+from models.advice.ride_choice.in_time import FEWEST, left
+from models.core.errors import InputError
 from models.ride.statistical_linearisation import bent
+from models.systems.ride.reduced_scene import Held
+from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.price import effects
-from validation.price.effects import price_list
-from validation.price.effects_text import lines
 from validation.ride.drawn_bent_rides import drawn_bent
 
 LAWS = ("curves over rate", "curves over travel", "friction")

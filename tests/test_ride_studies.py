@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.export import state_space
 from models.ride.measures import exceedances, share_beyond
-from models.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
-from models.ride.scene import build
+from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
+from models.systems.ride.scene import build
 from models.vehicles.curve import Curve
 from models.vehicles.spatial_linear import wheels
 from studies import ride_nonlinear
@@ -114,7 +114,7 @@ def test_a_road_of_an_iso_class_has_its_level():
 
 
 def test_the_system_as_python_control_has_it():
-    from models.ride.excitation import excited
+    from models.ride.excited import excited
     from models.vehicles.spatial_linear import linearise
 
     scene = build(TABLE)
@@ -157,7 +157,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("change", "said"), REFUSED, ids=[said[:30] for _, said in REFUSED])
 def test_a_scene_that_cannot_be_is_told_why(change, said):
-    from models.ride.plan import check
+    from models.systems.ride.plan import check
 
     table = {key: value for key, value in {**TABLE, **change}.items() if value is not None}
     with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
@@ -254,7 +254,7 @@ def test_a_wheel_in_the_middle_is_on_neither_of_two_tracks(twinrig, capsys):
 def test_a_mass_in_grams_is_asked_about_and_no_shipped_vehicle_is():
     from dataclasses import replace
 
-    from models.ride.plan import doubts
+    from models.systems.ride.plan import doubts
     from models.vehicles.vehicle_file import load_vehicle, shipped
 
     assert not any(doubts(load_vehicle(name)) for name in shipped())

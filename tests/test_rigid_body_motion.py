@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.sensors import rigid_body_motion as motion
 from models.sensors.high_pass import high_pass
 from models.sensors.rate_filter import filter_rates

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road import SplineProfile
 from models.road.continuation import continued, reference_height, run_in
 from models.road.polyline import PolylineProfile, polyline

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road import SplineProfile
 from models.road.csv_road import read_csv_road, read_csv_tracks
 from models.road.opencrg import read_opencrg, write_opencrg

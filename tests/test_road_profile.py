@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road import SineProfile, SplineProfile, kernels
 from models.road.iso8608 import CLASSES, iso8608_road, random_phases, rough_road
 from models.road.polyline import polyline

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models import tables
-from models.errors import InputError
+from models.core import tables
+from models.core.errors import InputError
 
 FORCES = {"time": tables.SECONDS, "front": tables.NEWTONS, "rear": tables.NEWTONS}
 GOOD = "# rig 3\ntime [s], front [N], rear [kN]\n0, 1, 2\n\n0.5, 3.5, -4e-1\n"

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from models.core.errors import RunFailed
 from models.ensemble import runner
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
-from models.errors import RunFailed
 from studies.sweep import Points
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail.wheelset import CHOSEN
 from validation.hard_cases.rolling import KINDS

@@ -11,7 +11,7 @@ from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import Pressed, centres, solve_normal
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 from validation.cases.contact_exact import CASES, carter, measure, roll
 
 PAIR, LOAD, A, B, MU = Pair(), 8e4, 6e-3, 4e-3, 0.3

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.damage import damage_ratio, pseudo_damage, turning_points
+from models.core.errors import InputError
+from models.core.result import Result
 from models.drift.score import (
     Errors,
     Limits,
@@ -18,11 +19,10 @@ from models.drift.score import (
     rms,
     verdict,
 )
-from models.errors import InputError
-from models.result import Result
-from models.section_forces import CHANNELS, section_forces
-from models.simulate import simulate
-from validation.scenes import force_scene, road_scene, write_forces
+from models.drift.section_forces import CHANNELS, section_forces
+from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 DURATION = 4.0
 OWN = Own(

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from models.assembly import assemble
+from models.core.errors import InputError
+from models.core.noise import GYRO, PITCH_SENSOR, normal
+from models.core.time_series import read_time_series
 from models.engines.protocol import Settings
-from models.errors import InputError
-from models.noise import GYRO, PITCH_SENSOR, normal
-from models.scene import build
 from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
-from models.sensors.sampling import write
-from models.simulate import simulate
-from models.time_series import read_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.sampling import write
+from models.systems.pitch_plane.scene import build
 
 ENGINES = ("reference", "exudyn", "mujoco")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from models.signals import Sampled, Smooth, Stacked
+from models.core.signals import Sampled, Smooth, Stacked
 
 RAMP = np.column_stack([np.arange(50.0), 2 * np.arange(50.0)])
 

@@ -13,7 +13,7 @@ from models.contact.patches import separate
 from models.contact.simplified_kernels import displacement, drag, march, step_on
 from models.contact.simplified_theory import PAPER, Options, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.cases.contact_simplified import _largest_jump
 from validation.contact.contact_shapes import Shape, exact_normal
 

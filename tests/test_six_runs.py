@@ -2,8 +2,8 @@
 
 import pytest
 
-from models.errors import InputError
-from models.systems import load
+from models.core.errors import InputError
+from models.core.systems import load
 from studies.asked import SCENES
 from studies.six_runs import run
 

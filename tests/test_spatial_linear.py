@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.vehicles.curve import Curve
 from models.vehicles.spatial import (
     FREEDOMS,

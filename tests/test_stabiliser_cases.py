@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from models.core.errors import RunFailed
 from models.engines import exudyn, mujoco, reference
-from models.errors import RunFailed
 from validation.cases import index_reduction as index_case
 from validation.cases import stabilisers as case
 from validation.drift import index_reduction

@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.assembly import Assembly, assemble
+from models.core.errors import InputError
+from models.core.signals import sampled
+from models.core.time_series import write_time_series
+from models.engines.assembly import Assembly
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised, step_matrix
-from models.errors import InputError
-from models.plan import describe
-from models.scene import build as build_scene
-from models.signals import sampled
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.plan import describe
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
-from validation import checks
+from validation.common import checks
 
 ENGINES = ("reference", "exudyn", "mujoco")
 STEP, SAMPLING, DURATION = 1e-3, 4e-3, 0.2

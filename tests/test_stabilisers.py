@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.systems import load
+from models.core.errors import InputError
+from models.core.systems import load
 from studies.asked import SCENES
 from studies.stabilisers import Bench, Options, run
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.braking.run import Path
-from models.braking.stop_report import Stop
+from models.systems.braking.run import Path
+from models.systems.braking.stop_report import Stop
 
 SPEED, RADIUS, SLIP, STEP = 15.0, 60.0, 0.04, 1e-3
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.braking.plane_vehicle import PAPER, truck
-from models.braking.surfaces import Stretch, check_way, road, under_wheels
-from models.errors import InputError
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.surfaces import Stretch, check_way, road, under_wheels
+from models.core.errors import InputError
 
 PLANE = truck(PAPER)
 KINDS = np.array([0, 0, 1, 1])

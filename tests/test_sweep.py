@@ -2,9 +2,9 @@
 
 import pytest
 
+from models.core.errors import InputError
+from models.core.scene_file import changed
 from models.ensemble.named_files import named_files
-from models.errors import InputError
-from models.scene_file import changed
 from studies.summary_numbers import numbers
 from studies.sweep import asked
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.tables import METRES, SECONDS, read_table
-from models.time_series import read_time_series
+from models.core.errors import InputError
+from models.core.tables import METRES, SECONDS, read_table
+from models.core.time_series import read_time_series
 
 COLUMNS = {"time": SECONDS, "left": METRES, "right": METRES}
 TIMES, LEFT, RIGHT = 0.125 * np.arange(12), 1.5 * np.arange(12.0), -0.25 * np.arange(12.0)

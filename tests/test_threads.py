@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from models.ensemble.workers import processes
-from models.threads import VARIABLES
+from models.machine.threads import VARIABLES
 
 
 def counts():

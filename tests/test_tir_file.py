@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from models.braking.tir_file import tir_table
-from models.errors import InputError
+from models.core.errors import InputError
+from models.tyre.tir_file import tir_table
 
 TRUCK = """[MDI_HEADER]
 FILE_TYPE = 'tir'

@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import csd
 
-from models.errors import InputError
-from models.ride.linear_vehicle import Wheel
+from models.core.errors import InputError
 from models.road.fitted import fit
 from models.road.iso8608 import CLASSES, level_of_class
 from models.road.isotropic import IsotropicRoad, Part
@@ -25,6 +24,7 @@ from models.road.two_track import (
     on_track,
     road_of_level,
 )
+from models.vehicles.linear_vehicle import Wheel
 from validation.cases.ride_road import WHEELS, heights_covariance, measure
 
 ROAD = TwoTrackRoad(ShapeFilter(0.3, 5e-5), ShapeFilter(1.5, 8e-5))

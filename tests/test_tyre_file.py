@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from models.braking.tyre_file import tyre_table
-from models.errors import InputError
+from models.core.errors import InputError
+from models.tyre.tyre_file import tyre_table
 
 HEADER = "slip angle [deg], slip [%], load [kN], mu_x [-], mu_y [-]"
 SLIPS, ANGLES, LOADS = (0, 20, 100), (0, 4, 90), (10, 30)

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from models.braking.of_scene import braked, table_of
-from models.braking.scene import build
-from models.braking.tyre_file import tyre_table
-from models.errors import InputError
+from models.core.errors import InputError
+from models.systems.braking.of_scene import braked, table_of
+from models.systems.braking.scene import build
+from models.tyre.tyre_file import tyre_table
 
 SCENE = {"title": "t", "system": "braking", "procedures": {"straight": {}}}
 

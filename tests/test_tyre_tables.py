@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from models.braking.magic_formula import PACEJKA, SURFACES, Curve, filled, surface
-from models.braking.tyre_table import TyreTable, across, along, place, stacked
-from models.errors import InputError
+from models.core.errors import InputError
+from models.tyre.magic_formula import PACEJKA, SURFACES, Curve, filled, surface
+from models.tyre.tyre_table import TyreTable, across, along, place, stacked
 
 
 def small(peak=0.8):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.covariance import stationary
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile

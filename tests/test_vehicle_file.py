@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.scene_file import parse
+from models.core.errors import InputError
+from models.core.scene_file import parse
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle, shipped
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.covariance import stationary
 from models.ride.delayed_system import DelayedSystem
 from models.ride.weighting import HEALTH, WEIGHTINGS, total_value, weighted

@@ -11,9 +11,9 @@ from models.contact.profiles import Profile, profile
 from models.contact.simplified_theory import press
 from models.contact.standard_profiles import built_in, s1002, s1002_height, uic60
 from models.contact.wheel_on_rail import Track, Wheelset, laid, wheel_on_rail
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.cases.contact_profiles import NEAR, RAIL_FILE, WHEEL_FILE, _rail_off, _wheel_off
-from validation.scenes import data_folder
+from validation.common.scenes import data_folder
 
 FOLDER = data_folder()
 needs_data = pytest.mark.skipif(FOLDER is None, reason="TWINRIG_DATA names no folder with the benchmark's profiles")

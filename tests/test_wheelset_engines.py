@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 import pytest
 
+from models.core.errors import InputError, RunFailed
 from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.mujoco_callback import installed
 from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset, rail_law
-from models.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, wavelength

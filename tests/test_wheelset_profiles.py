@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from models.core.errors import InputError
 from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset
-from models.errors import InputError
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.contact_table import BENCHMARK_SHIFTS, manchester

@@ -8,20 +8,20 @@ from functools import partial
 import numpy as np
 import pytest
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
+from models.core.scene_effects import named, without
 from models.rail import equations as eq
-from models.rail import plan
 from models.rail import wheel_forces as wf
 from models.rail.climbing import flange_share, nadal
 from models.rail.eigenvalues import free, growth
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
 from models.rail.linear import NoCriticalSpeed, critical_speed
-from models.rail.of_scene import path_speeds, wheelset_of
 from models.rail.orbit import beginning, branch, refined, solved
-from models.rail.scene import build
 from models.rail.wheelset import CHOSEN
-from models.scene_effects import named, without
+from models.systems.wheelset import plan
+from models.systems.wheelset.of_scene import path_speeds, wheelset_of
+from models.systems.wheelset.scene import build
 from studies import limit_cycle, wheelset
 from validation.absence import wheelset as absence
 

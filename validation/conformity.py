@@ -14,18 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.errors import InputError, RunFailed
+from models.core.result import provenance
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.outside import register
 from models.engines.protocol import Settings
-from models.errors import InputError, RunFailed
-from models.result import provenance
-from models.simulate import simulate
-from validation import checks
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from validation.common import checks
+from validation.common.rows import Independence, Row, System, at_most, behaves, not_run
+from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
 from validation.hard_cases.case import Outcome, judge
-from validation.rows import Independence, Row, System, at_most, behaves, not_run
 from validation.run import save, say
-from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
 
 SYSTEM: System = "pitch-plane"
 FAMILIES = ("stepping", "sampled_input", "contact_points", "prescribed_pitch", "stabilisers", "invariants", "extremes")
@@ -202,7 +203,7 @@ def _off(name: str, assembly: Assembly, settings: Settings) -> float:
 
 
 def _at_rest(name: str, settings: Settings) -> float:
-    from models.scene import build
+    from models.systems.pitch_plane.scene import build
 
     flat = assemble(build({"title": "at rest", "run": {"duration": DURATION, "step": STEP}}))
     _run(name, flat, settings)

@@ -9,81 +9,32 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from models.core.result import provenance
+from models.core.whole_files import whole_file, write_whole
 from models.ensemble.store import locked
 from models.ensemble.workers import processes
-from models.result import provenance
-from models.whole_files import whole_file, write_whole
-from validation.changes import against, lines
-from validation.kept_cases import Cases, Outcomes, measured
+from validation.cases import CASES
+from validation.common.changes import against, lines
+from validation.common.kept_cases import Cases, Outcomes, measured
+from validation.common.rows import STATUSES, Row
+from validation.common.scenes import data_folder
 from validation.report.shares import full
-from validation.rows import STATUSES, Row
-from validation.scenes import data_folder
 
-CASES = (
-    "audit",
-    "twin",
-    "order",
-    "tight",
-    "enforced_moment",
-    "guards",
-    "roads",
-    "drift_paper",
-    "growth",
-    "drift_off",
-    "drift_solvers",
-    "holding_spring",
-    "point_mass",
-    "lift_off",
-    "inertial_unit",
-    "motion",
-    "stabilisers",
-    "index_reduction",
-    "kalman",
-    "score",
-    "hard_cases",
-    "planted_faults",
-    "absent",
-    "effect_prices",
-    "price",
-    "instruction_counts",
-    "recommendation",
-    "ensemble",
-    "contact_hertz",
-    "contact_coefficients",
-    "contact_exact",
-    "contact_simplified",
-    "contact_profiles",
-    "manchester",
-    "ride_road",
-    "ride_covariance",
-    "ride_engines",
-    "ride_varying_speed",
-    "ride_nonlinear",
-    "choice_linear",
-    "choice_nonlinear",
-    "hub_forces",
-    "contact_price",
-    "fastsim",
-    "wheelset",
-    "contact_bridges",
-    "handling",
-    "braking_stop",
-    "braking_limits",
-    "braking_port",
-    "braking_controllers",
-    "braking_engines",
-    "braking_suspension",
-    "measured_formats",
-    "measured_virtual",
-    "measured_long",
-    "measured_checks",
+SEEDED = (
+    "models.machine.timing",
+    "validation.choice.drawn_scenes",
+    "validation.common.checks",
+    "validation.contact.contact_set",
+    "validation.measured.long_recording",
+    "validation.price.unseen",
+    "validation.price.unseen_systems",
+    "validation.ride.fitted_roads",
 )
-"""Case modules in the order of the report."""
-
-
+"""Modules beside the cases that draw at random by a seed of their own."""
 ALONE = {True: ("recommendation",), False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges")}
 """Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
 of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
@@ -166,79 +117,9 @@ def _written(pool: Executor, folder: Path) -> Path:
 
 def seeds() -> dict[str, int]:
     """Every seed that the rows depend on; with them and the versions all counts and states repeat exactly."""
-    from studies.six_runs import Options
-    from validation import checks, timing
-    from validation.cases import (
-        braking_controllers,
-        contact_price,
-        drift_off,
-        drift_solvers,
-        ensemble,
-        fastsim,
-        growth,
-        handling,
-        holding_spring,
-        hub_forces,
-        index_reduction,
-        inertial_unit,
-        kalman,
-        measured_checks,
-        measured_formats,
-        measured_virtual,
-        motion,
-        point_mass,
-        ride_covariance,
-        ride_engines,
-        ride_nonlinear,
-        ride_varying_speed,
-        roads,
-        score,
-        stabilisers,
-        wheelset,
-    )
-    from validation.choice import drawn_scenes
-    from validation.contact import contact_set
-    from validation.measured import long_recording
-    from validation.price.own_scene import unseen, unseen_systems
-    from validation.ride import fitted_roads
-
-    return {
-        "random states": checks.SEED,
-        "class C road": roads.SEED,
-        "six runs": Options.model_fields["seed"].default,
-        "order of timing": timing.SEED,
-        "point mass": point_mass.SEED,
-        "inertial unit": inertial_unit.SEED,
-        "noise paths": ensemble.SEED,
-        "accelerometers": motion.SEED,
-        "Kalman filter": kalman.SEED,
-        "loads of the score": score.SEED,
-        "stabilisers": stabilisers.SEED,
-        "index reduction": index_reduction.SEED,
-        "growth of noise": growth.SEED,
-        "drift-off": drift_off.SEED,
-        "drift by solver": drift_solvers.SEED,
-        "holding spring": holding_spring.SEED,
-        "hub forces": hub_forces.SEED,
-        "random contacts": fastsim.SEED,
-        "drawn contacts": contact_set.SEED,
-        "table of contacts": contact_price.SEED,
-        "made road": fitted_roads.SEED,
-        "states of ride": ride_engines.SEED,
-        "twins of ride": ride_covariance.SEED,
-        "copies of ride": ride_varying_speed.SEED,
-        "nonlinear ride": ride_nonlinear.SEED,
-        "drawn wheelsets": wheelset.SEED,
-        "rough road of handling": handling.SEED,
-        "speeds on ice": braking_controllers.SEED,
-        "measurement files": measured_formats.SEED,
-        "virtual measurements": measured_virtual.SEED,
-        "checks of recordings": measured_checks.SEED,
-        "long recordings": long_recording.SEED,
-        "scenes never seen": unseen.SEED,
-        "scenes of other systems": unseen_systems.SEED,
-        "drawn questions": drawn_scenes.SEED,
-    }
+    modules = {name: import_module(name) for name in (*(f"validation.cases.{case}" for case in CASES), *SEEDED)}
+    drawn = {name.rpartition(".")[2].replace("_", " "): module for name, module in modules.items()}
+    return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
 def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
+from models.machine.compiled import njit
 
 
 @njit(cache=True)

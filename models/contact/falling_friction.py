@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import Field
 
-from models.strict import Strict
+from models.core.strict import Strict
 
 
 class Falling(Strict):

@@ -36,7 +36,7 @@ from models.contact.hertz import LEAST_AXIS
 from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
 from models.contact.linear_theory import flexibilities as linear_flexibilities
 from models.contact.material import Pair
-from models.errors import InputError
+from models.core.errors import InputError
 
 Flexibilities = Literal["blended", "one", "three"]
 March = Literal["second-order", "plain"]

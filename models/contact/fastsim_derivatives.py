@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness
@@ -42,6 +41,7 @@ from models.contact.fastsim_many import (
 )
 from models.contact.inputs import Array
 from models.contact.material import Pair
+from models.machine.compiled import njit
 
 
 @dataclass(frozen=True)

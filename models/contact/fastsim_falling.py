@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
 from models.contact.fastsim_many import (
     HALF,
@@ -26,6 +25,7 @@ from models.contact.fastsim_many import (
     rigid_slip,
     touches,
 )
+from models.machine.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")

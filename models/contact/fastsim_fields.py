@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.falling_friction import Falling
 from models.contact.fastsim import (
     KINDS,
@@ -20,7 +19,8 @@ from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN,
 from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_slip
 from models.contact.fields import Fields
 from models.contact.material import Pair
-from models.errors import InputError
+from models.core.errors import InputError
+from models.machine.compiled import njit
 
 
 def fastsim_fields(

@@ -12,7 +12,7 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
-from models.compiled import njit
+from models.machine.compiled import njit
 
 LANES = 24
 """Strips that are marched at once; the last ones may be empty."""

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from models.compiled import lean, njit
 from models.contact.fastsim_kernels import (
     LANES,
     ROWS,
@@ -23,6 +22,7 @@ from models.contact.fastsim_kernels import (
     march_second_order,
 )
 from models.contact.inputs import NOTHING
+from models.machine.compiled import lean, njit
 
 A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""

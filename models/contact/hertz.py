@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_LOAD, Array, quantity, together
 from models.contact.material import Pair
-from models.errors import InputError
+from models.core.errors import InputError
+from models.machine.compiled import njit
 
 FLATTEST = 0.01
 """The larger curvature (1/m) of real bodies is not below this, a radius of 50 m: one in 1/mm usually is."""

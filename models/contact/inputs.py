@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LARGEST_LOAD = 1e10

@@ -17,7 +17,6 @@ from functools import lru_cache
 import numpy as np
 from numba import carray
 
-from models.compiled import njit
 from models.contact.fastsim import LEAST_CELLS, MOST_CELLS
 from models.contact.fastsim_grid import MOST_STRIPS, grid, strips_of
 from models.contact.fastsim_kernels import LANES, ROWS, march_second_order
@@ -42,8 +41,9 @@ from models.contact.fastsim_many import (
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
-from models.errors import InputError
-from models.stack import ask, beyond, doubles
+from models.core.errors import InputError
+from models.machine.compiled import njit
+from models.machine.stack import ask, beyond, doubles
 
 (SHAPE_X, SHAPE_Y, PRESSING, FRICTION, CREEP_X, CREEP_Y, TURNING, MODULUS, POISSON) = range(9)
 """What goes in: A, B (1/m) or a, b (m); load (N) or approach (m); mu; xi_x, xi_y; spin (1/m); G (Pa), nu."""

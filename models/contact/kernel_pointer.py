@@ -21,7 +21,7 @@ from models.contact.inputs import Array
 from models.contact.kernel import contact, net
 from models.contact.kernel_simplified import table
 from models.contact.undeformed_distance import Distance
-from models.stack import DOUBLES
+from models.machine.stack import DOUBLES
 
 SIGNATURE = types.int32(types.int32, DOUBLES, DOUBLES, DOUBLES)
 HEADER = Path(__file__).with_name("kernel.h")

@@ -12,7 +12,6 @@ from functools import cache
 import numpy as np
 from numba import carray, cfunc, types
 
-from models.compiled import njit
 from models.contact.distance_kernels import sides
 from models.contact.inputs import Array, whole_number
 from models.contact.kernel import (
@@ -49,8 +48,9 @@ from models.contact.simplified_kernels import (
 )
 from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
 from models.contact.undeformed_distance import Distance
-from models.errors import InputError
-from models.stack import DOUBLES, beyond
+from models.core.errors import InputError
+from models.machine.compiled import njit
+from models.machine.stack import DOUBLES, beyond
 
 _CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
 _LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(13, 18)

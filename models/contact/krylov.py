@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.compiled import njit
-from models.errors import RunFailed
+from models.core.errors import RunFailed
+from models.machine.compiled import njit
 
 Map = Callable[[np.ndarray], np.ndarray]
 

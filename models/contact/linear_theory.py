@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.inputs import Array, quantity, together
 from models.contact.material import Pair
+from models.machine.compiled import njit
 
 STEPS = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
 RATIOS = np.concatenate((STEPS, 1.0 / STEPS[-2::-1]))

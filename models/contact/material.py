@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from models.errors import InputError
-from models.strict import Strict, message
+from models.core.errors import InputError
+from models.core.strict import Strict, message
 
 LARGEST_MISMATCH = 0.01
 """Theories that leave K out refuse a pair beyond this |K|: at mu = 0.3 the forces would be off by 7 % of mu N."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
 from models.contact.inputs import number, quantity
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 
 if TYPE_CHECKING:
     from models.contact.material import Pair

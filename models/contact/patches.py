@@ -13,7 +13,7 @@ import numpy as np
 
 from models.contact.distance_kernels import sides
 from models.contact.undeformed_distance import Distance
-from models.errors import InputError
+from models.core.errors import InputError
 
 RIDGE = 1e-6
 """Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""

@@ -18,7 +18,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from models.contact.profiles import Profile, profile
-from models.errors import InputError, similar_file
+from models.core.errors import InputError, similar_file
 
 MM = 1e-3
 Kind = Literal["wheel", "rail"]

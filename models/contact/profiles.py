@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 SPACING = 1e-4
 """Distance (m) of the points along a profile's contour."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.compiled import njit
+from models.machine.compiled import njit
 
 
 @njit(cache=True, fastmath=True, nogil=True)

@@ -33,7 +33,7 @@ from models.contact.inputs import NOTHING, creepages, number
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 
 if TYPE_CHECKING:
     from models.contact.material import Pair

@@ -31,7 +31,7 @@ from models.contact.simplified_kernels import (
     resultant,
     slope_products,
 )
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 
 CLOSE = 1e-11
 """Share of approach and load to which patches settle."""

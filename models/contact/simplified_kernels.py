@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.distance_kernels import along, row_at, value_and_slopes
+from models.machine.compiled import njit
 
 PARABOLIC, ELLIPTIC = 0, 1
 """Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""

@@ -54,7 +54,7 @@ from models.contact.simplified_kernels import (
     tangential_fit,
 )
 from models.contact.undeformed_distance import Distance
-from models.errors import InputError
+from models.core.errors import InputError
 
 NET = 15
 """Meshes of the crude net along each axis."""

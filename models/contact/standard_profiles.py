@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from models.contact.profiles import SPACING, Profile
-from models.errors import InputError
+from models.core.errors import InputError
 
 MM = 1e-3
 

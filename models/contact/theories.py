@@ -22,7 +22,7 @@ from models.contact.normal_problem import NormalSolution, Pressed, centres, solv
 from models.contact.rolling_problem import RollingSolution, solve_rolling
 from models.contact.simplified_theory import NormalContact, PatchPressure
 from models.contact.simplified_theory import roll as roll_simplified
-from models.errors import InputError
+from models.core.errors import InputError
 
 Motion = tuple[float, float, float]
 """xi_x, xi_y and spin (1/m)."""

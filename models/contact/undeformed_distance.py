@@ -13,7 +13,7 @@ import numpy as np
 
 from models.contact.distance_kernels import valley, values
 from models.contact.inputs import quantity
-from models.errors import InputError
+from models.core.errors import InputError
 
 NODES = 97
 """Nodes along each axis of a distance that is made here: 48 spacings on each side of the centre."""

@@ -27,7 +27,7 @@ from models.contact.inputs import quantity
 from models.contact.patches import RIDGE, Patch, ridges
 from models.contact.profiles import Profile
 from models.contact.undeformed_distance import Distance
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 
 DEEP = 2e-4
 """Distance (m) up to which the surroundings of a touching place are taken in; steel yields long before."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.vehicles.pitch_plane import Parameters
 
 CUTOFF = 0.2

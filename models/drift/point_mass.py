@@ -14,8 +14,8 @@ import math
 import numpy as np
 from scipy.signal import lfilter
 
-from models.errors import InputError
-from models.noise import normal
+from models.core.errors import InputError
+from models.core.noise import normal
 
 SMALL = 1.0
 """Damping times time below which a series is used: 20 terms there, and no digit lost by the closed form above."""

@@ -15,11 +15,11 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from models.damage import SLOPE, damage_ratio
-from models.errors import InputError
-from models.result import Result
-from models.section_forces import CHANNELS, section_forces
-from models.strict import Strict
+from models.core.errors import InputError
+from models.core.result import Result
+from models.core.strict import Strict
+from models.drift.section_forces import CHANNELS, section_forces
+from models.fatigue.damage import SLOPE, damage_ratio
 from models.vehicles.pitch_plane import Parameters
 
 BAND = 15.0
@@ -91,8 +91,8 @@ class Errors:
 
     Attributes
     ----------
-    damage : pseudo-damage by the true one, per body-frame section force (models/section_forces.py), with the
-        exponent and the residue convention of models/damage.py
+    damage : pseudo-damage by the true one, per body-frame section force (models/drift/section_forces.py), with the
+        exponent and the residue convention of models/fatigue/damage.py
     force_rms : rms error of each in N
     vertical_damage : the same ratio for the vertical forces f3, f4: blind to the pitch, never judged
     pitch_max, pitch_rms : pitch error in rad; heave_max : error of the chassis' heave in m

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.assembly import Assembly
+from models.core.errors import InputError, RunFailed
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.protocol import Settings, Trajectory, build
-from models.errors import InputError, RunFailed
 
 TIGHT = 1e-10
 """Tolerance of the reference's own run."""

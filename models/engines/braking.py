@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from models.braking.advance import FINE, advance
-from models.braking.plane_step import FORCE_X, FORCE_Y
-from models.braking.plane_vehicle import Plane
-from models.braking.samples import moved
-from models.compiled import lean, njit
+from models.brake.advance import FINE, advance
+from models.brake.plane_step import FORCE_X, FORCE_Y
+from models.brake.plane_vehicle import Plane
+from models.brake.samples import moved
 from models.engines.free_vehicle import Driven, FreeModel, free_model
-from models.stack import array, at, beyond, start
+from models.machine.compiled import lean, njit
+from models.machine.stack import array, at, beyond, start
 from models.vehicles.spatial import Body, SpatialVehicle
 
 HEADER, ROW = 2, 6
@@ -93,7 +93,7 @@ class Carried:
     def advance(
         self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray, *rest: Any
     ) -> tuple[int, float]:
-        """As ``models.braking.advance.advance``, a step at a time, each moved by the engine."""
+        """As ``models.brake.advance.advance``, a step at a time, each moved by the engine."""
         time, report = 0.0, rest[-1]
         for n in range(len(torques) - 1):
             before = state.copy()
@@ -106,7 +106,7 @@ class Carried:
         return FINE, time
 
     def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.braking.samples.samples``."""
+        """As ``models.brake.samples.samples``."""
         return moved(self.advance)(*given)
 
     def _moved(self, before: np.ndarray, step: float) -> np.ndarray:

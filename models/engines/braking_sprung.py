@@ -1,6 +1,6 @@
 """A braked vehicle on its suspension in an engine: "exudyn" or "mujoco" has bodies, joints, masses and weights.
 
-Its steps are those of ``models.braking.sprung_step``; compiled code calls MuJoCo, and all of a sample is compiled.
+Its steps are those of ``models.brake.sprung_step``; compiled code calls MuJoCo, and all of a sample is compiled.
 """
 
 from collections.abc import Iterator
@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.plane_step import KNOWN, REPORTED, begin
-from models.braking.plane_vehicle import Plane
-from models.braking.samples import moved
-from models.braking.sprung import Sprung
-from models.braking.sprung_forces import ROW, STEER, fill, held, held_forces, hold
-from models.braking.sprung_step import GAVE_UP, OVER, UPRIGHT, OnEngine, advance
-from models.braking.surfaces import under_wheels
+from models.brake.plane_step import KNOWN, REPORTED, begin
+from models.brake.plane_vehicle import Plane
+from models.brake.samples import moved
+from models.brake.sprung import Sprung
+from models.brake.sprung_forces import ROW, STEER, fill, held, held_forces, hold
+from models.brake.sprung_step import GAVE_UP, OVER, UPRIGHT, OnEngine, advance
+from models.brake.surfaces import under_wheels
+from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, _check_step
 from models.engines.stability import LONG_RUN
-from models.errors import RunFailed
 from models.vehicles.spatial_linear import linearise, mass
 
 BLINK = 1e-5
@@ -73,7 +73,7 @@ class OnSprings:
     def advance(
         self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, *rest: Any
     ) -> tuple[int, float]:
-        """As ``models.braking.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
+        """As ``models.brake.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
 
         A run begins with zeros in the accelerations ``found``. Raises RunFailed where the vehicle turns over.
         """
@@ -85,7 +85,7 @@ class OnSprings:
     def moving(
         self, told: Any, kept: Any, sample: float, braking: Any, *rest: Any
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.braking.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
+        """As ``models.brake.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
         own, _, by_steps = self._parts
         step = sample / (braking.torques.shape[0] - 1)
         self.check_step(step)

@@ -1,7 +1,7 @@
 """A braked vehicle on its suspension in MuJoCo, compiled as a whole: steps, and samples of them."""
 
-from models.braking import samples
-from models.braking.sprung_step import compiled
+from models.brake import samples
+from models.brake.sprung_step import compiled
 from models.engines.mujoco_native import accelerate, march
 
 advance = compiled(accelerate, march, "in_mujoco")

@@ -25,7 +25,6 @@ from typing import Literal, get_args
 import numpy as np
 from numba import carray
 
-from models.compiled import njit
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.contact.kernel import (
@@ -52,10 +51,11 @@ from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.simplified_theory import press
 from models.contact.undeformed_distance import Distance, quadratic
+from models.core.errors import InputError, Refused
 from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
-from models.errors import InputError, Refused
+from models.machine.compiled import njit
+from models.machine.stack import at, beyond, doubles, start
 from models.rail.wheel_forces import REGULAR
-from models.stack import at, beyond, doubles, start
 
 X, Y, Z, YAW = range(4)
 FREEDOMS = 4

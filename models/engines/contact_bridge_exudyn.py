@@ -15,8 +15,8 @@ import exudyn.itemInterface as items
 import numpy as np
 
 from models.contact.inputs import Array
+from models.core.errors import RunFailed
 from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
-from models.errors import RunFailed
 
 exu.config.printToConsole = False
 Law = Callable[[Array, Array, Array, Array], Any]

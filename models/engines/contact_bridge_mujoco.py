@@ -10,10 +10,10 @@ from mujoco import rollout
 from numba import cfunc, types
 
 from models.contact.inputs import Array
+from models.core.errors import RunFailed
 from models.engines.contact_bridge import Wheels, check_step, forces
 from models.engines.mujoco_callback import _array_at
 from models.engines.mujoco_layout import check, offset
-from models.errors import RunFailed
 
 JOINTS = (
     ("slide", (1.0, 0.0, 0.0)),

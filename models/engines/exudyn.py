@@ -13,7 +13,7 @@ import exudyn as exu
 import exudyn.itemInterface as items
 import numpy as np
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
 from models.engines.protocol import Settings, Trajectory, balanced, guard, landings_followed

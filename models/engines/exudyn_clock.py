@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from models.core.signals import Signal
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings
-from models.signals import Signal
 
 
 class Clock:

@@ -2,7 +2,7 @@
 
 The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
 positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
-of ``models.handling.kernel`` and ``models.hub_forces.kernel`` are. Both engines march by the classical Runge-Kutta
+of ``models.multibody.kernel`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
 method.
 """
 
@@ -15,9 +15,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from models.core.errors import InputError
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
-from models.errors import InputError
 from models.vehicles.spatial import SpatialVehicle
 
 MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}

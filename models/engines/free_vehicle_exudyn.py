@@ -7,9 +7,9 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.spatial_exudyn_build import KINDS, Build, _tree, items
-from models.errors import RunFailed
 from models.vehicles.spatial_linear import Preloads
 
 

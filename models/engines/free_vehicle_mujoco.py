@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 from numba import carray, cfunc, types
 
+from models.core.errors import RunFailed
 from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.mujoco_callback import _array_at, _double_at, installed
 from models.engines.mujoco_layout import check, offset
 from models.engines.mujoco_native import Native, native
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
-from models.errors import RunFailed
 from models.vehicles.spatial import Body, SpatialVehicle
 
 

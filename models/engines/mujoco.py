@@ -16,10 +16,10 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from models.assembly import Assembly
+from models.core.errors import RunFailed
+from models.engines.assembly import Assembly
 from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import Settings, Trajectory, guard, landings_followed
-from models.errors import RunFailed
 from models.vehicles.description import Strut, Vehicle
 
 INTEGRATORS = {

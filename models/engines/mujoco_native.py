@@ -11,8 +11,8 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from models.compiled import lean
 from models.engines.mujoco_layout import offset
+from models.machine.compiled import lean
 
 _intrinsic: Any = intrinsic
 

@@ -28,11 +28,11 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.core.errors import InputError, RunFailed
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
 from models.engines.protocol import Model, Settings, Trajectory, guard
 from models.engines.reference import Reference, derivative_of
-from models.errors import InputError, RunFailed
 
 HIGHEST = 20
 """Order that a method may claim."""

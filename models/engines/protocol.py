@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from models.core.errors import Refused, RunFailed
+from models.core.resolved import check_resolved
+from models.core.signals import Signal
+from models.core.steps import divides, fitting
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
 from models.engines.stability import check_step
-from models.errors import Refused, RunFailed
-from models.resolved import check_resolved
-from models.signals import Signal
-from models.steps import divides, fitting
 
 if TYPE_CHECKING:
-    from models.assembly import Assembly
-    from models.scene import Scene
+    from models.engines.assembly import Assembly
 
 BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
 """Rows at which a multiplier is checked, rows at the start that may ring, and the accepted share of its rms.
@@ -87,13 +86,6 @@ class Model(Protocol):
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
         ...
-
-
-def settings_of(scene: "Scene", engine: str) -> Settings:
-    """Settings of a scene for one engine."""
-    own = scene.settings(engine)
-    assert own.integrator is not None and own.step is not None
-    return Settings(own.integrator, own.step, scene.run.duration, own.tolerance, own.spectral_radius)
 
 
 def build(engine: str, assembly: "Assembly", settings: Settings) -> Model:

@@ -11,12 +11,12 @@ import numpy as np
 from numba.extending import register_jitable
 from scipy.integrate import solve_ivp
 
-from models.assembly import Assembly
-from models.compiled import named, njit
+from models.core.errors import RunFailed
+from models.core.signals import Stacked
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, Trajectory, guard, landings_followed
-from models.errors import RunFailed
-from models.signals import Stacked
+from models.machine.compiled import named, njit
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
 NO_INPUT = np.zeros((1, 4))

@@ -18,7 +18,7 @@ from models.engines.spatial_protocol import (
     sound,
     timed,
 )
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
 
 

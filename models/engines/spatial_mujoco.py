@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from models.core.errors import RunFailed
 from models.engines.mujoco import CHUNK
 from models.engines.mujoco import INTEGRATORS as OWN_NAMES
 from models.engines.mujoco_callback import installed
@@ -32,8 +33,7 @@ from models.engines.spatial_protocol import (
     sound,
     timed,
 )
-from models.errors import RunFailed
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector
 
 

@@ -14,7 +14,7 @@ from numba.extending import register_jitable
 
 from models.engines.mujoco_callback import _array_at, _double_at
 from models.engines.mujoco_layout import offset
-from models.stack import beyond, doubles
+from models.machine.stack import beyond, doubles
 
 PER_TIME, ROWS, TYRES, BODIES, ELEMENTS, POINTS, ROAD, HEADER = range(8)
 """Header: road rows per second; counts of rows, tyres, bodies that may turn or carry such, elements and points; where

@@ -13,13 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
+from models.core.errors import Refused, RunFailed
+from models.core.steps import divides, fitting
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, guard
 from models.engines.stability import GROWTH, growth, limit
-from models.errors import Refused, RunFailed
-from models.ride.linear_vehicle import LinearVehicle
-from models.steps import divides, fitting
 from models.vehicles.kinematics import Kinematics
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
 from models.vehicles.spatial_linear import linearise, outputs, wheels
 

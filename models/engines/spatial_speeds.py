@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.core.errors import InputError
 from models.engines.spatial_protocol import build
-from models.errors import InputError
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
 SPEEDS = (5.0, 15.0, 45.0)

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.errors import Refused
+from models.core.errors import Refused
 from models.vehicles.description import Vehicle
 from models.vehicles.linear import matrices
 
 if TYPE_CHECKING:
-    from models.assembly import Assembly
+    from models.engines.assembly import Assembly
     from models.engines.protocol import Settings
 
 Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]

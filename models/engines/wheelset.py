@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 from models.rail.equations import LEAN, LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
 

@@ -13,9 +13,9 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from models.core.errors import RunFailed
 from models.engines.spatial_exudyn_build import KINDS, items, lists
 from models.engines.wheelset import EngineWheelset, leaning
-from models.errors import RunFailed
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
 from models.rail.joint_forces import JOINTS, set_joint_forces, table
 from models.rail.wheelset import GRAVITY

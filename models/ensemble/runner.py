@@ -18,9 +18,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from models.core.errors import RunFailed
+from models.core.whole_files import FULL, reason_of
 from models.ensemble.store import Arrays, Store
-from models.errors import RunFailed
-from models.whole_files import FULL, reason_of
 
 BLOCK = 50
 """Paths per block: half a second of work of the pitch plane over 60 s, which a killed run may lose."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 FEWEST = 3
 ERRORS_95 = 1.959964

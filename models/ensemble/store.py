@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from models.result import PACKAGES
-from models.whole_files import drop_parts, write_whole
+from models.core.errors import InputError
+from models.core.result import PACKAGES
+from models.core.whole_files import drop_parts, write_whole
 
 Arrays = dict[str, np.ndarray]
 JOB = "job.json"

@@ -15,12 +15,12 @@ from functools import cached_property
 
 import numpy as np
 
+from models.core.finding import Finding, Weight
+from models.core.time_series import sparse
 from models.drift.growth import RigidPitch, rigid_pitch
-from models.measured.finding import Finding, Weight
 from models.measured.ratios import EMPTY, Wrong, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.time_series import sparse
 from models.vehicles.pitch_plane import Parameters
 
 CHECKS = ("weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped")

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from models.measured.finding import Finding
+from models.core.finding import Finding
 
 BLOCK = 60_000
 """Samples of a block: a minute at 1 kHz."""

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
-from models.whole_files import write_whole
+from models.core.errors import InputError
+from models.core.whole_files import write_whole
 
 ITEM = np.dtype("<f8")
 

@@ -11,10 +11,10 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field
 
-from models.errors import InputError, suggestion
+from models.core.errors import InputError, suggestion
+from models.core.noise import DROPOUTS, TRANSDUCERS, normal
+from models.core.strict import Strict, quantity
 from models.measured.signal import Signal
-from models.noise import DROPOUTS, TRANSDUCERS, normal
-from models.strict import Strict, quantity
 
 Amounts = dict[str, float]
 """Name of a channel, a transducer or a quantity -> amount in SI."""

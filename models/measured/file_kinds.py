@@ -5,7 +5,7 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 EXTENSIONS = {
     ".csv": "CSV",

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+BRIDGED = 0.1
+"""s: the longest gap in a hub force that is bridged."""
 SPAN = 0.3
 """s of neighbours on either side that the filling is drawn from: several waves of wheel hop and the chassis' roll."""
 MOST = 200

@@ -6,7 +6,7 @@ is taken as not measured, NaN, before anything is resampled: it would drown what
 
 import numpy as np
 
-from models.measured.finding import Finding
+from models.core.finding import Finding
 from models.measured.gaps import gaps
 from models.measured.signal import Quantity, Signal
 

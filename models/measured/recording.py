@@ -6,9 +6,9 @@ from datetime import datetime
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.channel import BLOCK
 from models.measured.columns import Columns, MemoryColumns
-from models.measured.finding import Finding
 from models.measured.signal import Signal
 
 

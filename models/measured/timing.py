@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.errors import InputError
-from models.measured.finding import Finding, Weight
+from models.core.errors import InputError
+from models.core.finding import Finding, Weight
 
 GAP = 1.5
 """Periods: two samples farther apart have a gap between them."""

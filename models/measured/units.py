@@ -4,7 +4,7 @@ import re
 from functools import cache
 from typing import Any
 
-from models.errors import InputError, suggestion
+from models.core.errors import InputError, suggestion
 from models.measured.signal import UNITS, Quantity
 
 SPELT = {

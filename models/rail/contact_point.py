@@ -8,7 +8,7 @@ cylinder's axis, seen along the normal, at the place of contact, which is taken 
 
 import math
 
-from models.compiled import inlined
+from models.machine.compiled import inlined
 
 RIGHT, LEFT = 1.0, -1.0
 

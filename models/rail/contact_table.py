@@ -28,7 +28,7 @@ from models.contact.simplified_theory import NormalContact, PatchPressure, press
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, Side, Touch, Track, Wheelset, laid, placed, touches_of
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
 BENCHMARK_SHIFTS = tuple(0.5e-3 * k for k in range(21))

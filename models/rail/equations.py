@@ -24,13 +24,13 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.compiled import inlined, lean, njit
 from models.contact.inputs import number, quantity
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
+from models.core.resolved import check_resolved
+from models.core.steps import divides
+from models.machine.compiled import inlined, lean, njit
 from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, room_for, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
-from models.resolved import check_resolved
-from models.steps import divides
 
 STATES = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)

@@ -15,7 +15,7 @@ from models.contact.material import Pair
 from models.contact.normal_problem import centres, solve_normal
 from models.contact.patches import Box, Patch
 from models.contact.simplified_theory import PatchPressure
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 
 CELLS_X, CELLS_Y, MOST_CELLS_Y = 36, 24, 180
 """Cells along x, and along y over the narrowest patch; along y at most."""

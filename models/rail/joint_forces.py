@@ -12,10 +12,10 @@ import math
 import numpy as np
 from numba import carray
 
-from models.compiled import njit
+from models.machine.compiled import njit
+from models.machine.stack import at, beyond
 from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
 from models.rail.wheel_forces import REPORTED, room_for, wheel_forces
-from models.stack import at, beyond
 
 JOINTS = 5
 SPEED, LAW, MIDDLE, NUMBERS, STRIPS, CELLS, HEADER = range(7)

@@ -12,8 +12,8 @@ from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
 from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, placed
-from models.errors import InputError
-from models.strict import Strict, quantity
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity
 
 SPACING, OF_KNOTS = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""

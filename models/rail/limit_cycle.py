@@ -9,7 +9,7 @@ from itertools import count
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.core.errors import RunFailed
 from models.rail.equations import Equations, Y
 from models.rail.orbit import Orbit, beginning, branch, near, refined, solved
 

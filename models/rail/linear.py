@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.linear_theory import coefficients
-from models.errors import InputError
+from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
 
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 200.0

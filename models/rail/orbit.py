@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
 from models.rail.linear import critical_speed
 

@@ -25,8 +25,8 @@ import math
 
 import numpy as np
 
-from models.compiled import lean, njit
 from models.contact.hertz import aspect
+from models.machine.compiled import lean, njit
 
 ZONES, NODES, KNOTS, SPACING, ARM, LEVEL, HEADER = range(7)
 """Head of a profile's numbers: counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes

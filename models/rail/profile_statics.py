@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 from models.rail.contact_table import equivalent_conicity
 from models.rail.profile_contact import ACROSS, ALONG, DEPTH, N_Z, TOUCH, X_, Z_, pressed
 from models.rail.wheel_forces import MODULUS, contact_points, numbers, patches

@@ -22,12 +22,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.compiled import inlined, lean, njit
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
 from models.contact.fastsim_many import SPIN, XI_X, forces
 from models.contact.linear_theory import coefficient_at, flexibilities_at
-from models.errors import InputError
+from models.core.errors import InputError
+from models.machine.compiled import inlined, lean, njit
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.laid_profiles import profile_numbers
 from models.rail.profile_contact import ACROSS, ALONG, N_Y, N_Z, TOUCH, X_, Y_, Z_, ZONES, pressed, profile_on_rail

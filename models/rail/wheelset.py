@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 
 from models.contact.hertz import Hertz, by_load
 from models.contact.material import STEEL, Material, Pair
+from models.core.strict import Strict, message, quantity
 from models.rail.laid_profiles import Profiles
-from models.strict import Strict, message, quantity
 
 GRAVITY = 9.81
 """m/s^2"""

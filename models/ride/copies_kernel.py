@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.compiled import lean, njit
+from models.machine.compiled import lean, njit
 
 TRAVEL, RATE = 0, 1
 """What a curve is over: the first index of its hinges."""

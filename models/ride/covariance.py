@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.delayed_system import DelayedSystem
 from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
 

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from models.core.whole_files import whole_file
 from models.ride.covariance import Covariance
 from models.ride.delayed_system import DelayedSystem
-from models.whole_files import whole_file
 
 if TYPE_CHECKING:
     import control

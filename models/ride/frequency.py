@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import eval_legendre, spherical_jn
 
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.marginal import Unstable
 from models.ride.operating_point import poles
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 POINTS = 16
 """Gauss points of a panel."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from models.ride.frequency import transfer
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 
 Densities = Callable[[np.ndarray], np.ndarray]
 """From wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of heights, see models/road/isotropic.py."""

@@ -15,7 +15,7 @@ from math import factorial
 import numpy as np
 from scipy.linalg import expm, matrix_balance, schur, svd, svdvals
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 ACCURACY = 1e-10
 """Relative accuracy of a system matrix where nothing else is known: formulas reach 1e-15, engines that differentiate

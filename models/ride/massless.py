@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.delayed_system import DelayedSystem
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 
 if TYPE_CHECKING:
-    from models.ride.excitation import Excitation
+    from models.road.excitation import Excitation
 
 NOTHING = 1e-10
 """Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which there is none."""

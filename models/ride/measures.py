@@ -6,7 +6,7 @@ All for Gaussian processes of zero mean, which the linear vehicle makes of a Gau
 
 import math
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 
 def share_beyond(deviation: float, limit: float) -> float:

@@ -16,16 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from models.errors import InputError
-from models.noise import BLOCK, ROAD, normal
+from models.core.errors import InputError
+from models.core.noise import BLOCK, ROAD, normal
 from models.ride.covariance import FINITE, stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.marginal import ACCURACY
 from models.ride.responses import powers
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 MODES = 8
 """Legendre coefficients of noise in a cell: the next one adds 1e-9 of a cell's variance where REACH is full."""

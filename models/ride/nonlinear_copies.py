@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.ride.copies_kernel import POWERS, Laws, march
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.road_path import check_rates, road_path
 from models.ride.statistical_linearisation import bent, statistically_linear
+from models.road.excitation import Excitation
 from models.vehicles.curve import Curve
 from models.vehicles.kinematics import Kinematics
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, linearise, preloads
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from models.ride.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 
 
 def poles(vehicle: LinearVehicle) -> np.ndarray:

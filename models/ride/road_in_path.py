@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
-from models.ride.linear_vehicle import LinearVehicle
+from models.ride.excited import excited
 from models.ride.weighting import weighted
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from math import ceil, log2
 import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 
-from models.errors import InputError
-from models.noise import ROAD, normal
-from models.ride.excitation import Excitation
+from models.core.errors import InputError
+from models.core.noise import ROAD, normal
 from models.ride.monte_carlo import path_cell
+from models.road.excitation import Excitation
 from models.vehicles.spatial import SpatialVehicle
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 
 class SpeedProfile:

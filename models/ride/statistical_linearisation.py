@@ -15,12 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 from models.ride.covariance import Covariance, stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.gaussian_laws import of_rate, of_travel
-from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import PartKind, PartOutput, SpatialVehicle, SpringDamper
 from models.vehicles.spatial_linear import Gains, linearise
 

@@ -7,11 +7,12 @@ import numpy as np
 
 from models.ride.covariance import FINITE, Covariance, hits, stationary, verdicts
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
-from models.ride.linear_vehicle import LinearVehicle
+from models.ride.excited import excited
 from models.ride.marginal import ACCURACY, Growth, Unstable
 from models.ride.modal import Shared, modal
 from models.ride.weighting import weighted
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 LOSS = 1e-9
 """Largest relative error that the fast route may suspect of itself; it overstates it ten to a thousand times."""

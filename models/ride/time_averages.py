@@ -11,9 +11,9 @@ the second for a Gaussian output of zero mean and a time long beside its memory 
 
 import numpy as np
 
-from models.ride.excitation import Excitation
 from models.ride.frequency import spectra
-from models.ride.linear_vehicle import LinearVehicle
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 HIGHEST = 60.0
 """Hz up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""

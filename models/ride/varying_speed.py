@@ -20,16 +20,16 @@ from itertools import combinations, pairwise
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.marginal import ACCURACY
 from models.ride.noise_cells import nodes, steps
 from models.ride.responses import Responses
 from models.ride.road_in_path import RoadInPath, at_speed, road_in_path
 from models.ride.speed_profile import SpeedProfile
 from models.ride.sweep import sweep
+from models.road.excitation import Excitation
+from models.vehicles.linear_vehicle import LinearVehicle
 
 REACH = 1.0
 """Fastest rate of vehicle or road times the step; half of it changes nothing above 1e-10."""

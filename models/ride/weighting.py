@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.ride.delayed_system import DelayedSystem
 
 

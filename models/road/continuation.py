@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road.profile import SLACK, Profile, SplineProfile
 
 RULES = ("mirrored", "refused")

@@ -6,16 +6,16 @@
     0.1, 12.9, 10.2
 
 Heights are positive **up** in the file, as surveyors write them, and become zeta = -height here. The
-stations may begin anywhere; the first one becomes s = 0. How strict the text is: models/tables.py.
+stations may begin anywhere; the first one becomes s = 0. How strict the text is: models/core/tables.py.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.tables import DISTANCES, METRES, read_table
 from models.road.profile import SplineProfile
-from models.tables import DISTANCES, METRES, read_table
 
 TRACKS = ("left", "right", "mean")
 

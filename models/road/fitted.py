@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import digamma
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road.measured_tracks import MeasuredTracks, TrackSpectra, spectra
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import TwoTrackRoad

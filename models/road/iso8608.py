@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 if TYPE_CHECKING:
     from models.road.profile import SineProfile

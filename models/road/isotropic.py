@@ -22,10 +22,10 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import gamma, kv
 
-from models.errors import InputError
-from models.ride.linear_vehicle import Wheel
+from models.core.errors import InputError
 from models.road.iso8608 import level_of_class
 from models.road.two_track import TwoTrackRoad
+from models.vehicles.linear_vehicle import Wheel
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from models.compiled import njit
+from models.machine.compiled import njit
 
 RESYNCHRONISE = 128
 """Samples between two exact sin/cos in :func:`sines_uniform`.

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import csd
 from scipy.stats import chi2
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road.csv_road import read_csv_tracks
 from models.road.opencrg import TRACK_WIDTH, read_opencrg
 

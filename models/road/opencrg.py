@@ -23,7 +23,7 @@ import numpy as np
 import pyopencrg
 from pyopencrg.io import IplData, cut_block, read_ipl
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road import TRACK_WIDTH
 from models.road.profile import Profile, SplineProfile
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road import kernels
 
 Samples = tuple[np.ndarray, np.ndarray]

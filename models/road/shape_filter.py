@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 
 @dataclass(frozen=True)

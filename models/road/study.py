@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.road.profile import SineProfile
 
 STUDY_GD = 2.4e-3

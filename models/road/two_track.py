@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from models.errors import InputError
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import Wheel
+from models.core.errors import InputError
+from models.road.excitation import Excitation
 from models.road.iso8608 import class_at_level
 from models.road.shape_filter import ShapeFilter
+from models.vehicles.linear_vehicle import Wheel
 
 MEAN_CORNER, ROLL_CORNER = 0.3, 1.5
 """Corners of the paper, rad/m."""

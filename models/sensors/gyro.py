@@ -12,8 +12,8 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.special import hyp1f1
 
-from models.errors import InputError
-from models.noise import GYRO_BIAS, normal
+from models.core.errors import InputError
+from models.core.noise import GYRO_BIAS, normal
 
 DEGREES_PER_HOUR = math.pi / 180 / 3600
 """In rad/s."""

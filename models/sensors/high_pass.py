@@ -5,7 +5,7 @@ It takes out whatever is slow, be it an error or a hill: the cut-off is a choice
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 ORDER = 2
 """Order of the Butterworth filter, which runs forwards and backwards: no phase, half the amplitude at the cut-off."""

@@ -13,8 +13,8 @@ quaternion then grows, by exp(k s^2 t / 8) for k noisy axes, as eq. (28) has it,
 
 import numpy as np
 
-from models.errors import InputError
-from models.noise import GYRO, normal
+from models.core.errors import InputError
+from models.core.noise import GYRO, normal
 from models.sensors.rotations import conjugate, integrate, matrix, product, skew
 
 

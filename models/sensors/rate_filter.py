@@ -9,7 +9,7 @@ outgrows the rates themselves can settle on the wrong sign.
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.sensors.rigid_body_motion import Spin, own_acceleration
 
 PAIRS = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))

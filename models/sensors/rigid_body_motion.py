@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.sensors.high_pass import high_pass
 from models.sensors.rotations import cardan, from_cardan, integrals, integrate, matrix, skew
 from models.sensors.sensor_array import SensorArray, sensor_array

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from models.compiled import njit
-from models.errors import InputError
+from models.core.errors import InputError
+from models.machine.compiled import njit
 
 Rule = Literal["held", "mean", "cubic"]
 """How a rate runs between its samples; order 1, 2, 4 of the orientation in the sampling period."""

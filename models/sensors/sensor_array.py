@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 
 Formula = Literal["auto", "spatial", "plane"]
 LINE = 1e-3

@@ -36,7 +36,7 @@ class Strut:
 
     Its force k e + d e' with the compression e = z_upper - z_lower (m, z counts down) is positive in compression: it
     pushes the upper point up and the lower one down. stiffness in N/m, damping in N s/m. A strut that ``pushes_only``
-    has the force max(0, min(k e + d e', 2 k e)) instead; ``models.effects.lift_off`` says why.
+    has the force max(0, min(k e + d e', 2 k e)) instead; ``models.systems.pitch_plane.effects.lift_off`` says why.
     """
 
     name: str

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.vehicles.spatial import FREEDOMS, AntiRollBar, Body, Freedom, SpatialVehicle, Vector
 
 CARRIER, SWAY, ROTOR = "carrier", "sway", "rotor"

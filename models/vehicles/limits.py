@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import null_space
 
-from models.errors import InputError
-from models.ride.linear_vehicle import LinearVehicle
+from models.core.errors import InputError
+from models.vehicles.linear_vehicle import LinearVehicle
 
 if TYPE_CHECKING:
     from models.vehicles.spatial import Freedom, SpatialVehicle

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from models.strict import Strict, quantity
+from models.core.strict import Strict, quantity
 from models.vehicles.description import Axle, Body, Geometry, Point, Strut, Vehicle
 
 STATES = ("z1", "z2", "z3", "pitch")

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from models.errors import InputError
-from models.measured.finding import Finding
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
 from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest

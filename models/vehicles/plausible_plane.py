@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from models.measured.finding import Finding
+from models.core.finding import Finding
 from models.vehicles.pitch_plane import Parameters
 from models.vehicles.plausible import plausible
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre

@@ -102,7 +102,7 @@ class Tyre:
     h is how far the point has risen from its design position, zeta the height of the road under it (m). ``axle``
     counts from the front, 0 first. The point is the centre of a wheel, or one end of a rigid axle. A tyre that
     ``pushes_only`` has max(0, min(F, 2 S)) instead, S = F0 + stiffness (zeta - h) what its spring alone has: the law
-    of ``models.effects.lift_off``.
+    of ``models.systems.pitch_plane.effects.lift_off``.
     """
 
     name: str

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.errors import InputError
-from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.core.errors import InputError
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.limits import limited
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import (
     AntiRollBar,
     PartOutput,

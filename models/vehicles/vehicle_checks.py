@@ -4,7 +4,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import mass

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
-from models.scene_file import existing, parse
-from models.strict import read
+from models.core.errors import InputError
+from models.core.scene_file import existing, parse
+from models.core.strict import read
 from models.vehicles.curve import Curve
 from models.vehicles.limits import Limits
 from models.vehicles.spatial import (
@@ -42,7 +42,7 @@ from models.vehicles.vehicle_tables import (
 )
 
 GROUND = "ground"
-SHIPPED = Path(__file__).parents[1] / "parameters" / "vehicles"
+SHIPPED = Path(__file__).parent / "parameters" / "vehicles"
 
 
 def shipped() -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from models.strict import LARGEST, Strict, quantity
+from models.core.strict import LARGEST, Strict, quantity
 from models.vehicles.spatial import Freedom
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]

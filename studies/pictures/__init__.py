@@ -5,3 +5,5 @@ renderer wants OpenGL from the system, which a machine without a screen may lack
 two engines can only be compared by eye where both are drawn in one way. Any run can be drawn: give its ``Motion`` and
 the ``Stage`` that it happens on to ``page``.
 """
+
+ENGINES = ("exudyn", "mujoco")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrow
 from matplotlib.transforms import IdentityTransform
 
-from studies.figures import COLOURS, LABELS
+from models.drawing.figures import COLOURS, LABELS
 from studies.pictures.drawing import drawn
 from studies.pictures.film import Motion, Stage, gaps
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
-from models.ride.of_scene import GRAVITY, excitation_of, vehicle_of
 from models.ride.road_path import RoadPath, road_path
-from models.ride.scene import build as ride_scene
+from models.systems.ride.of_scene import GRAVITY, excitation_of, vehicle_of
+from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera

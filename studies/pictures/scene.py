@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.errors import InputError
-from models.scene_file import SceneFile, checked
-from models.strict import Strict
+from models.core.errors import InputError
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Strict
 
 MOST_FRAMES = 3000
 """Two minutes of film; each frame takes a fifth of a second to draw."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.image import imsave
 
-from models.whole_files import whole_file
+from models.core.whole_files import whole_file
 
 PACKAGES = ("imageio", "imageio_ffmpeg")
 

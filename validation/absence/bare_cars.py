@@ -6,11 +6,11 @@ from collections.abc import Callable
 import numpy as np
 
 from models.engines.protocol import guard
-from models.handling.in_engines import build
-from models.handling.numbers import Handling
+from models.machine.timing import interleave, paired_ratio
+from models.multibody.numbers import Handling
+from models.systems.handling.in_engines import build
 from validation.absence import hand_built_handling, handling
 from validation.absence.of_systems import bare
-from validation.timing import interleave, paired_ratio
 
 STEP, SPEED = 1e-3, 15.0
 """Step of the runs (s); speed (m/s)."""

@@ -8,17 +8,17 @@ import numpy as np
 
 from models.engines.protocol import Settings, guard
 from models.engines.spatial_protocol import INTEGRATORS, build
+from models.machine.timing import interleave, paired_ratio
 from models.ride.copies_kernel import POWERS, march
 from models.ride.nonlinear_copies import laws_of
-from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.road_path import RoadPath, road_path
+from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from validation.absence import ride
 from validation.absence.hand_built_ride import Car, exudyn_run, mujoco_run, numbers
 from validation.absence.hand_built_ride import march as march_written
 from validation.absence.of_systems import bare
-from validation.timing import interleave, paired_ratio
 
 STEP = 1e-3
 """Step of the runs (s)."""

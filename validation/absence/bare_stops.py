@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.braking.procedures import controller_of, ready
-from models.braking.run import Path
+from models.machine.timing import interleave, paired_ratio
+from models.systems.braking.procedures import controller_of, ready
+from models.systems.braking.run import Path
 from validation.absence import hand_built_braking
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare
-from validation.timing import interleave, paired_ratio
 
 STEER, SUPPLY = 0.02, 0.5
 """Angle of the front wheels (rad); pressure of the brakes (bar): all wheels roll down to walking pace, so that their

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from models.braking.scene import BrakingScene
+from models.systems.braking.scene import BrakingScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 STOP = "stop"
@@ -32,8 +32,8 @@ def write(folder: Path) -> None:
 
 def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Counts of what is handed to the run of a stop, and its path."""
-    from models.braking.procedures import drive
-    from models.braking.run import Braked
+    from models.systems.braking.procedures import drive
+    from models.systems.braking.run import Braked
 
     found, run = dict[str, int](), Braked.run
 
@@ -48,9 +48,9 @@ def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int]
 
 def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
     """What a run is made of."""
-    from models.braking.controllers import CONTROLLERS
-    from models.braking.measured_pressures import MeasuredPressures
-    from models.braking.pressure import still
+    from models.brake.controllers import CONTROLLERS
+    from models.brake.pressure import still
+    from models.systems.braking.measured_pressures import MeasuredPressures
 
     plane, brakes, chambers = vehicle.plane, vehicle.brakes, vehicle.chambers
     chain = [controller]

@@ -5,7 +5,7 @@ from unittest import mock
 
 import numpy as np
 
-from models.contact.scene import ContactScene
+from models.systems.contact.scene import ContactScene
 
 ENGINES = ("reference",)
 BARE: dict[str, Any] = {
@@ -24,8 +24,8 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the theory that computes, and forces at all motions."""
-    from models.contact import of_scene
     from models.contact.theories import Exact, ExactOnEllipse, Linear, Simplified
+    from models.systems.contact import of_scene
 
     with mock.patch.object(of_scene, "touches", wraps=of_scene.touches) as searched:
         own, motions = of_scene.contact(scene), of_scene.creepages(scene)

@@ -2,7 +2,7 @@
 
 One rigid body on four wheels whose loads stay, brakes that are all applied from the start and whose torques follow at
 once, front wheels held at one angle. No trailer, load transfer, second surface, brake dynamics, hysteresis, controller
-or engine, and no way to have them. The method is that of ``models.braking.plane_step``; how a wheel goes through a step
+or engine, and no way to have them. The method is that of ``models.brake.plane_step``; how a wheel goes through a step
 and what a tyre's table says are the tyre's.
 """
 
@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.run import Path
-from models.braking.tyre_table import across, place
-from models.braking.wheel_step import wheel_step
-from models.compiled import inlined, lean, njit
+from models.brake.wheel_step import wheel_step
+from models.machine.compiled import inlined, lean, njit
+from models.systems.braking.run import Path
+from models.tyre.tyre_table import across, place
 
 CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12
 START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, EAST, NORTH, ARM, SIDE = range(11)
-"""Columns of what a step knows of each wheel: see ``models.braking.plane_step``; where it heads, and arms of its forces
+"""Columns of what a step knows of each wheel: see ``models.brake.plane_step``; where it heads, and arms of its forces
 about the centre of mass."""
 COLUMNS, LOCKED = 7, 5
 MOST_PARTS = 64
@@ -218,7 +218,7 @@ def march(speed, course, torque, sample, steps, slope, truck, tables, times, sta
 
 def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], Path]:
     """One stop from a speed (m/s) with the front wheels at an angle (rad) of the numbers of a bare vehicle
-    (``models.braking.run.Braked``), in at most so many samples, the start included."""
+    (``models.systems.braking.run.Braked``), in at most so many samples, the start included."""
     p, tyres, pressure = vehicle.plane, vehicle.tables.packed, vehicle.chambers.supply
     truck = (p.place[:, 0].copy(), p.place[:, 1].copy(), p.static, p.radius, p.spin, p.masses[0], p.inertias[0])
     course, torque = (math.cos(steer), math.sin(steer)), vehicle.brakes.rising * pressure

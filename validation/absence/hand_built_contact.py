@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim import Ellipse
 from models.contact.fastsim_grid import grid
 from models.contact.linear_theory import flexibilities
 from models.contact.material import Pair
-from validation.timing import interleave, paired_ratio
+from models.machine.compiled import njit
+from models.machine.timing import interleave, paired_ratio
 
 CELLS, AXIS, LOAD, FRICTION = 21, 5e-3, 8e4, 0.3
 """Cells of a strip, semi-axes (m), load (N), coefficient of friction."""

@@ -14,15 +14,15 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from models.compiled import lean
 from models.contact.fastsim_many import PER_SLIP, ROOM, forces_within
 from models.engines.contact_bridge_mujoco import native_law
 from models.engines.mujoco_callback import installed
 from models.engines.spatial_mujoco import _principal
-from models.handling.numbers import Handling
-from models.handling.tree import cross, dot, plus, three, times
-from models.handling.tyre import ORDER, THREE, net, shape_factor
-from models.stack import array, beyond, doubles, row
+from models.machine.compiled import lean
+from models.machine.stack import array, beyond, doubles, row
+from models.multibody.numbers import Handling
+from models.multibody.tree import cross, dot, plus, three, times
+from models.tyre.bristles import ORDER, THREE, net, shape_factor
 from models.vehicles.free_vehicle import SPECK
 
 SIZE, CELLS = 23, 21

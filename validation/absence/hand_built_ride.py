@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import lean, njit
+from models.machine.compiled import lean, njit
 from models.vehicles.spatial import SpatialVehicle
 from validation.absence.hand_built import exudyn_march
 

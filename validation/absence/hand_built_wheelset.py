@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import lean, njit
 from models.contact.linear_theory import coefficient_at
+from models.machine.compiled import lean, njit
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.profile_contact import pressed
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from models.handling.scene import HandlingScene
+from models.systems.handling.scene import HandlingScene
 
 ENGINES = ("mujoco", "exudyn")
 ROLLING = "rolling"
@@ -15,7 +15,7 @@ BARE: dict[str, Any] = {
 
 def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a manoeuvre as both engines are handed it, and its path."""
-    from models.handling.in_engines import driven
+    from models.systems.handling.in_engines import driven
 
     own, said = scene.handling(ROLLING), scene.manoeuvres[ROLLING]
     controls = (own.controls.steer, own.controls.brake, own.controls.drive)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from models.hub_forces.scene import ANGLES, COMPONENTS, HubScene
-from models.time_series import write_time_series
+from models.core.time_series import write_time_series
+from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
@@ -45,10 +45,10 @@ def write(folder: Path) -> None:
 
 def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the scene's run, as an engine is handed it, and its path."""
-    from models.engines.hub_forces import build
-    from models.hub_forces import kernel
-    from models.hub_forces.of_scene import measured
-    from models.hub_forces.stabilised import Stabilised
+    from models.engines.cut_vehicle import build
+    from models.multibody import cut_kernel as kernel
+    from models.systems.hub_forces.of_scene import measured
+    from models.systems.hub_forces.stabilised import Stabilised
 
     vehicle, own = scene.cut_vehicle(), scene.run
     truth, forces, angles = measured(scene, vehicle, engine)
@@ -75,8 +75,8 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
     """A run of the scene over so many of its steps, built beforehand."""
-    from models.engines.hub_forces import build
-    from models.hub_forces.of_scene import measured
+    from models.engines.cut_vehicle import build
+    from models.systems.hub_forces.of_scene import measured
 
     vehicle, own = scene.cut_vehicle(), scene.run
     drive = measured(scene, vehicle, engine)[1].drive(own.step, steps, scene.forces.interpolation)
@@ -85,7 +85,7 @@ def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
 
 def _noisy(scene: HubScene, truth: Any, forces: Any, angles: Any) -> tuple[int, int]:
     """Columns of forces and of angles that are not those of the true run; none of files, which have no true one."""
-    from models.hub_forces.measurement import recorded
+    from models.systems.hub_forces.measurement import recorded
 
     if truth is None:
         return 0, 0

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numba.core.runtime import _nrt_python, rtsys  # type: ignore[attr-defined]
 
+from models.machine.timing import interleave, paired_ratio
 from models.rail.equations import Path
-from models.rail.of_scene import equations_of
 from models.rail.wheel_forces import LOAD, MZ
+from models.systems.wheelset.of_scene import equations_of
 from validation.absence import braking, hand_built_wheelset, hub_forces, wheelset
 from validation.absence.bare_cars import cars
 from validation.absence.bare_rides import copies, rides
 from validation.absence.of_systems import bare
-from validation.rows import Row, System, at_most
-from validation.timing import interleave, paired_ratio
+from validation.common.rows import Row, System, at_most
 
 SYSTEM: System = "effects"
 STEP, SHORT = 5e-4, 40
@@ -93,7 +93,7 @@ def made_by_hubs(engine: str) -> int:
 
 def made_by_braking(engine: str) -> tuple[int, int]:
     """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
-    from models.braking.procedures import drive
+    from models.systems.braking.procedures import drive
 
     slow, fast = (
         bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})

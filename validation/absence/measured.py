@@ -7,11 +7,11 @@ from unittest import mock
 
 import numpy as np
 
-from models.hub_forces.scene import ANGLES
+from models.core.systems import load
+from models.core.time_series import write_time_series
 from models.measured.recording import Recording
-from models.measured.scene import MeasuredScene
-from models.systems import load
-from models.time_series import write_time_series
+from models.systems.hub_forces.scene import ANGLES
+from models.systems.measured.scene import MeasuredScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
 HUBS = ("fl", "fr", "rl", "rr")
@@ -65,9 +65,9 @@ def write(folder: Path) -> None:
 
 def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the run that a recording drives, as an engine is handed it, and its answers."""
-    from models.hub_forces import kernel
-    from models.measured import section_run
-    from models.measured.sections import Sections
+    from models.multibody import cut_kernel as kernel
+    from models.systems.measured import section_run
+    from models.systems.measured.sections import Sections
 
     tables, build, said = list[np.ndarray](), section_run.build, scene.stabilise
 
@@ -95,11 +95,11 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, dict[str, int]]:
     """The scene's files, or those of its virtual measurement, on one clock; how many channels do not tell the truth."""
-    from models.measured import plan
-    from models.measured.clock import record
     from models.measured.faults_of_measurement import Faults
-    from models.measured.pattern import write_pattern
-    from models.measured.virtual import virtual_measurement
+    from models.systems.measured import plan
+    from models.systems.measured.clock import record
+    from models.systems.measured.pattern import write_pattern
+    from models.systems.measured.virtual import virtual_measurement
 
     rig, own, faulty = scene.rig(), scene.virtual, np.zeros((2, 1), bool)
     if own is not None and rig.vehicle is not None:

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from models.errors import Refused
-from models.scene_effects import beside, module_of, names_of
-from models.systems import SYSTEMS
+from models.core.errors import Refused
+from models.core.scene_effects import beside, module_of, names_of
+from models.core.systems import SYSTEMS
 from validation.absence.probes import registered
-from validation.rows import Row, System, at_most, behaves
+from validation.common.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
 FILES = {
@@ -167,7 +167,8 @@ def _removed(system: str, modules: list[str]) -> Iterator[None]:
     assert not _loaded(modules), "the process is not fresh"
     blocked: dict[str, Any] = dict.fromkeys(modules)
     sys.modules.update(blocked)
-    with mock.patch.object(import_module(SYSTEMS[system].effects), "__path__", []):
+    package = import_module(SYSTEMS[system].effects)
+    with mock.patch.object(package, "__path__", []), mock.patch.object(package, "TABLE", {}, create=True):
         assert not names_of(system)
         yield
     for name in modules:

@@ -21,10 +21,11 @@ CALLBACKS = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "pas
 
 PROBE = """
 import json, sys
-from models.assembly import assemble
-from models.engines.protocol import build, settings_of
-from models.scene import build as build_scene
-from models.simulate import outputs
+from models.systems.pitch_plane.assembly import assemble
+from models.engines.protocol import build
+from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.run import outputs
 scene = build_scene(json.loads(sys.argv[1]), "probe", sys.argv[2])
 states = {}
 for engine in ("reference", "exudyn", "mujoco"):
@@ -53,15 +54,15 @@ def probe(table: Mapping[str, Any], folder: str = ".", **options: Any) -> dict[s
 def belongs_to_effects(module: str) -> bool:
     """Whether a module exists for the sake of an effect: none of these may be imported for a bare scene."""
     owners = (
-        "models.effects.",
+        "models.systems.pitch_plane.effects.",
         "models.road",
         "models.contact",
         "models.tyre",
         "models.brake",
         "models.sensors",
-        "models.time_series",
-        "models.tables",
-        "models.prescribed",
+        "models.core.time_series",
+        "models.core.tables",
+        "models.systems.pitch_plane.prescribed",
         "models.engines.mujoco_callback",
         "models.engines.mujoco_layout",
         "pyopencrg",

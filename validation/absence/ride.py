@@ -14,19 +14,19 @@ from unittest import mock
 
 import numpy as np
 
+from models.core.tables import write_table
 from models.engines.spatial_protocol import build
-from models.ride import of_scene
-from models.ride.excitation import excited
-from models.ride.linear_vehicle import LinearVehicle
-from models.ride.scene import RideScene
+from models.ride.excited import excited
 from models.ride.sweep import sweep
 from models.ride.weighting import weighted
 from models.road.two_track import excitation, half_track, on_track, road_of_level
-from models.tables import write_table
+from models.systems.ride import of_scene
+from models.systems.ride.scene import RideScene
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
-from validation.rows import Row, System, at_most, behaves
+from validation.common.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
 SPEEDS = (10.0, 20.0, 30.0)
@@ -38,7 +38,7 @@ FOREIGN = (
     "slycot",
     "models.engines",
     "models.contact",
-    "models.effects",
+    "models.systems.pitch_plane.effects",
     "models.drift",
     "models.road.fitted",
     "models.road.isotropic",
@@ -97,7 +97,7 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         from models.ride.varying_speed import varying_speed
 
         return counts, varying_speed(linear(SPEED), road, scene.drive.profile()).deviation.tobytes()
-    from models.ride.effects import curves
+    from models.systems.ride.effects import curves
 
     counts["tyres that lift"] = sum(tyre.pushes_only for tyre in vehicle.tyres)
     if vehicle.lifts:
@@ -115,10 +115,10 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 PROBE = """
 import json, sys
-from models.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
-from models.ride.scene import build
+from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.scene import build
 from models.ride.sweep import sweep
-from models.tables import write_table
+from models.core.tables import write_table
 from models.vehicles.spatial_linear import wheels
 scene = build({"title": "probe", "system": "ride", "vehicle": {"file": "r19_ride"},
                "speeds": {"start": 10.0, "stop": 20.0, "count": 2}})

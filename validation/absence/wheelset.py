@@ -13,9 +13,9 @@ from models.rail import equations as eq
 from models.rail import wheel_forces as forces
 from models.rail.eigenvalues import free
 from models.rail.equations import Equations
-from models.rail.scene import WheelsetScene
 from models.rail.wheelset import CHOSEN, Wheelset
-from validation.rows import Row, System, behaves
+from models.systems.wheelset.scene import WheelsetScene
+from validation.common.rows import Row, System, behaves
 
 SYSTEM: System = "effects"
 SPEED, SHIFT = 60.0, 3e-3
@@ -34,7 +34,7 @@ BARE: dict[str, Any] = {
 
 def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a wheelset, in its numbers and in what an engine builds of it, and its path."""
-    from models.rail.of_scene import equations_of
+    from models.systems.wheelset.of_scene import equations_of
 
     own = equations_of(scene, engine, SPEED)
     _, body, contact, *_, law = own.given

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE, advance
-from models.braking.magic_formula import surface
-from models.braking.plane_step import LOAD, REPORTED
-from models.braking.plane_vehicle import GRAVITY, PAPER, Plane, truck
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import Tables, TyreTable, stacked
-from models.errors import RunFailed
+from models.brake.advance import AT_REST, FINE, advance
+from models.brake.plane_step import LOAD, REPORTED
+from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
+from models.brake.surfaces import Stretch, road
+from models.core.errors import RunFailed
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked
 
 ICE = surface("ice")
 LOCKS = 1e9

@@ -10,10 +10,10 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.quarter import Quarter
-from models.braking.tyre_table import TyreTable, place
-from models.compiled import njit
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.quarter import Quarter
+from models.machine.compiled import njit
+from models.tyre.tyre_table import TyreTable, place
 
 EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
 SCHEMES = (EULER, RK4, LITERAL)

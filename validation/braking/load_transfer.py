@@ -9,9 +9,9 @@ to first order, whatever springs do: contacts go with their wheels, spins slow d
 
 import numpy as np
 
-from models.handling.forces import PRESS
-from models.handling.in_engines import Drive
-from models.handling.numbers import GRAVITY, Controls, Handling, Tyres
+from models.multibody.forces import PRESS
+from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
+from models.systems.handling.in_engines import Drive
 from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
 

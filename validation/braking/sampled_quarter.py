@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.braking.brake import Brake, of_wheels
-from models.braking.controller import SAMPLE, Controller, Sample
-from models.braking.magic_formula import SURFACES, surface
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.pressure import APPLY, RELEASE, Chambers
-from models.braking.quarter import Quarter
-from models.braking.run import Braked
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import stacked
+from models.brake.brake import Brake, of_wheels
+from models.brake.controller import SAMPLE, Controller, Sample
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.pressure import APPLY, RELEASE, Chambers
+from models.brake.quarter import Quarter
+from models.brake.surfaces import Stretch, road
+from models.systems.braking.run import Braked
+from models.tyre.magic_formula import SURFACES, surface
+from models.tyre.tyre_table import stacked
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
 SLOWEST = 0.06

@@ -5,15 +5,15 @@ from functools import cache
 
 import numpy as np
 
-from models.braking.brake import Brake, of_wheels
-from models.braking.controller import Command, Sample
-from models.braking.plane_vehicle import GRAVITY, truck
-from models.braking.pressure import Chambers
-from models.braking.run import Braked, Path
-from models.braking.sprung import Sprung, sprung
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import TyreTable, stacked
+from models.brake.brake import Brake, of_wheels
+from models.brake.controller import Command, Sample
+from models.brake.plane_vehicle import GRAVITY, truck
+from models.brake.pressure import Chambers
+from models.brake.sprung import Sprung, sprung
+from models.brake.surfaces import Stretch, road
 from models.engines.braking_sprung import OnSprings
+from models.systems.braking.run import Braked, Path
+from models.tyre.tyre_table import TyreTable, stacked
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
 

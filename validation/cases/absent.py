@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
-from models.engines.protocol import Model, build, settings_of
-from models.scene import Scene
-from models.scene import build as build_scene
-from models.scene_effects import module_of, names_of, without
-from models.simulate import outputs
-from models.systems import DEFAULT
-from models.time_series import write_time_series
+from models.core.scene_effects import module_of, names_of, without
+from models.core.systems import DEFAULT
+from models.core.time_series import write_time_series
+from models.engines.protocol import Model, build
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
-from validation.rows import Row, System, at_most, behaves
+from validation.common.rows import Row, System, at_most, behaves
 
 TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-from models.assembly import assemble
-from models.engines.protocol import settings_of
-from models.scene import build as build_scene
-from validation import checks
-from validation.rows import Row, System, at_most
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.scene import settings_of
+from validation.common import checks
+from validation.common.rows import Row, System, at_most
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 from scipy.stats import ttest_ind
 
-from models.braking.brake import PAPER_FRONT, PAPER_REAR, Brake, of_wheels, torque
-from models.braking.controller import SAMPLE
-from models.braking.controllers import CONTROLLERS
-from models.braking.controllers.five_phase import FivePhase, end_of, rate
-from models.braking.frozen import Cycle, Frozen, limit_cycle, sampled
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import GRAVITY, PAPER, truck
-from models.braking.pressure import APPLY, RELEASE, Chambers, by_valves, still
-from models.braking.quarter import Quarter
-from models.braking.run import Braked
-from models.braking.run import Path as Recorded
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import stacked
+from models.brake.brake import PAPER_FRONT, PAPER_REAR, Brake, of_wheels, torque
+from models.brake.controller import SAMPLE
+from models.brake.controllers import CONTROLLERS
+from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.frozen import Cycle, Frozen, limit_cycle, sampled
+from models.brake.plane_vehicle import GRAVITY, PAPER, truck
+from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
+from models.brake.quarter import Quarter
+from models.brake.surfaces import Stretch, road
+from models.systems.braking.run import Braked
+from models.systems.braking.run import Path as Recorded
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import stacked
 from validation.braking.five_phase_exact import Wheel, cycle
 from validation.braking.sampled_quarter import own_distance, reference_distance
-from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Row, System, Table, at_most, behaves, finding
 
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"

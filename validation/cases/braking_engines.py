@@ -7,20 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.advance import FINE, advance
-from models.braking.brake import PAPER_FRONT, PAPER_REAR, of_wheels
-from models.braking.controllers.slip_bang_bang import SlipBangBang
-from models.braking.plane_step import REPORTED
-from models.braking.plane_vehicle import PAPER, truck
-from models.braking.pressure import Chambers
-from models.braking.run import Braked
-from models.braking.surfaces import Stretch, road
-from models.braking.trailer import CHOSEN, follow, hooked
-from models.braking.tyre_table import Tables, TyreTable, stacked
-from models.braking.written import Turned, turned
+from models.brake.advance import FINE, advance
+from models.brake.brake import PAPER_FRONT, PAPER_REAR, of_wheels
+from models.brake.controllers.slip_bang_bang import SlipBangBang
+from models.brake.plane_step import REPORTED
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.pressure import Chambers
+from models.brake.surfaces import Stretch, road
+from models.brake.trailer import CHOSEN, follow, hooked
+from models.brake.written import Turned, turned
 from models.engines.braking import Carried
+from models.systems.braking.run import Braked
+from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braked_truck import ICE, sideways_with_locked_front_wheels, transfer_errors
-from validation.rows import Row, System, Table, aim, at_most
+from validation.common.rows import Row, System, Table, aim, at_most
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"

@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.brake import Brake, of_wheels
-from models.braking.controller import SLOW
-from models.braking.controllers.five_phase import FivePhase, end_of, rate
-from models.braking.controllers.slip_pi import SlipPI
-from models.braking.frozen import Frozen, limit_cycle
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.pressure import Chambers, by_valves, still
-from models.braking.procedures import drive
-from models.braking.scene import build
-from models.braking.trailer import CHOSEN
-from models.errors import InputError, RunFailed
+from models.brake.brake import Brake, of_wheels
+from models.brake.controller import SLOW
+from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.slip_pi import SlipPI
+from models.brake.frozen import Frozen, limit_cycle
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.pressure import Chambers, by_valves, still
+from models.brake.trailer import CHOSEN
+from models.core.errors import InputError, RunFailed
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import build
+from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import Wheel, cycle
 from validation.braking.random_stops import random_stop
-from validation.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow ones, and what cannot be"
 SYSTEM: System = "anti-lock"

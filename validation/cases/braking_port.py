@@ -15,21 +15,21 @@ from typing import Any
 
 import numpy as np
 
-import models.braking.port as port
-from models.braking.controller import SAMPLE, Controller, Sample
-from models.braking.port.ask import ControllerFailed, ask
-from models.braking.port.example import Example
-from models.braking.port.setup import PortTable, Run, opened
-from models.braking.procedures import drive
-from models.braking.run import Path as Driven
-from models.braking.scene import build
+import models.brake.port as port
+from models.brake.controller import SAMPLE, Controller, Sample
+from models.brake.port.ask import ControllerFailed, ask
+from models.brake.port.example import Example
+from models.brake.port.setup import PortTable, Run, opened
+from models.machine.timing import median
+from models.systems.braking.procedures import drive
+from models.systems.braking.run import Path as Driven
+from models.systems.braking.scene import build
 from validation.braking import misbehaving_client
-from validation.rows import Row, System, Table, aim, behaves, finding, not_run
-from validation.timing import median
+from validation.common.rows import Row, System, Table, aim, behaves, finding, not_run
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
-EXAMPLE = "models.braking.port.example:Example"
+EXAMPLE = "models.brake.port.example:Example"
 TIMEOUT = 0.5
 """s for one answer of a controller that falls silent; it shall have ended within twice that, as any that fails."""
 PATIENT = 600.0
@@ -118,7 +118,7 @@ def _ways(folder: Path, second: bool) -> dict[str, dict[str, Any] | str]:
     ways: dict[str, dict[str, Any] | str] = {"callable": {"callable": EXAMPLE}}
     if second:
         ways["second process in Python"] = {
-            "command": [sys.executable, "-m", "models.braking.port.client", EXAMPLE, "{port}"]
+            "command": [sys.executable, "-m", "models.brake.port.client", EXAMPLE, "{port}"]
         }
     ways["second process in C"] = _built_c(folder)
     ways["FMU"] = _built_fmu(folder)
@@ -210,7 +210,7 @@ def _class(kind: str, folder: Path) -> dict[str, Any]:
     name, does = CLASSES[kind]
     well = f"        if given.number < {misbehaving_client.WELL}: return Command(valves=np.ones(4))\n"
     (folder / "fails.py").write_text(
-        "import ctypes, os, signal, time\nimport numpy as np\nfrom models.braking.controller import Command\n"
+        "import ctypes, os, signal, time\nimport numpy as np\nfrom models.brake.controller import Command\n"
         "class Fails:\n"
         "    def __init__(self, wheels): pass\n    def sample(self, given):\n" + well + f"        {does}\n"
     )
@@ -257,7 +257,7 @@ class _Watch:
     """Notes when each exchange begins."""
 
     def __enter__(self) -> "_Watch":
-        import models.braking.run as run
+        import models.systems.braking.run as run
 
         self.last, self._run, self._ask = time.perf_counter(), run, run.ask
         run.ask = self._noted  # type: ignore[assignment]

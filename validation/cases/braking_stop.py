@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.magic_formula import SURFACES, surface
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import Tables, TyreTable, stacked
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
+from models.brake.surfaces import Stretch, road
+from models.tyre.magic_formula import SURFACES, surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braking_schemes import PATIENCE, SCHEMES, exact, stopped
-from validation.rows import Row, System, Table, at_most, finding, within
+from validation.common.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Braking to a stop"
 SYSTEM: System = "anti-lock"
@@ -304,7 +304,7 @@ def _errors(curve: dict[str, Any], scheme: str) -> list[tuple[float, float]]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True, sharey=True)
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.controller import Command, Controller, Sample
-from models.braking.controllers.slip_bang_bang import SlipBangBang
-from models.braking.magic_formula import surface
-from models.braking.plane_step import LOAD
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.run import Path as Run
-from models.braking.sprung import PITCH, Sprung
-from models.braking.stop_report import Stop
-from models.braking.tyre_table import TyreTable
+from models.brake.controller import Command, Controller, Sample
+from models.brake.controllers.slip_bang_bang import SlipBangBang
+from models.brake.plane_step import LOAD
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.sprung import PITCH, Sprung
+from models.systems.braking.run import Path as Run
+from models.systems.braking.stop_report import Stop
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import TyreTable
 from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
-from validation.rows import Row, System, Table, aim, at_most, finding, within
+from validation.common.rows import Row, System, Table, aim, at_most, finding, within
 
 TITLE = "Braking on the suspension"
 SYSTEM: System = "anti-lock"

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from models.ride.choice.activity import activity
-from models.ride.choice.choose import WORTH, Choice, Chooser, largest
-from models.ride.choice.held import Effect, Held, without
-from models.ride.choice.reduced import Whole
-from models.ride.choice.screen import Screen, confirmed
+from models.advice.ride_choice.activity import activity
+from models.advice.ride_choice.choose import WORTH, Choice, Chooser, largest
+from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.screen import Screen, confirmed
+from models.core.systems import load
 from models.ride.frequency import road, transfer
-from models.ride.of_scene import vehicle_of
-from models.systems import load
+from models.systems.ride.of_scene import vehicle_of
+from models.systems.ride.reduced_scene import Effect, Held, without
 from studies.asked import SCENES
 from validation.choice.nearby import measured_step, worst_nearby
+from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
 from validation.ride.drawn_rides import Drawn, drawn
-from validation.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "Effects that a ride scene calls for, chosen with a certificate"
 SYSTEM: System = "effects"
@@ -384,7 +384,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
     predicted, confirmed_ = (

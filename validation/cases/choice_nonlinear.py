@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from models.choice.choose import Choice, Chooser
-from models.choice.variants import Variants
-from models.errors import InputError
-from models.ride.choice.in_time import FEWEST
+from models.advice.choice.choose import Choice, Chooser
+from models.advice.choice.variants import Variants
+from models.advice.ride_choice.in_time import FEWEST
+from models.core.errors import InputError
 from validation.choice.drawn_scenes import Asked, drawn
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
 from validation.ride.drawn_bent_rides import COPIES, Bent, drawn_bent
-from validation.rows import Row, System, Table, aim, at_most, behaves, finding, within
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -254,7 +254,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
     ends = np.array([1e-4, 6.0])

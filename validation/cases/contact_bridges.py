@@ -10,7 +10,6 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_approach
 from models.contact.inputs import Array
@@ -20,10 +19,11 @@ from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Theory, Wheels, X
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
-from models.stack import start
+from models.machine.compiled import njit
+from models.machine.stack import start
+from models.machine.timing import interleave, median, spelled
+from validation.common.rows import Row, System, Table, aim, at_most, behaves
 from validation.contact import slow_wheels
-from validation.rows import Row, System, Table, aim, at_most, behaves
-from validation.timing import interleave, median, spelled
 
 TITLE = "What a contact kernel costs inside an engine"
 SYSTEM: System = "rolling-vehicle"

@@ -15,8 +15,8 @@ from models.contact.material import Material, Pair
 from models.contact.normal_problem import centres
 from models.contact.rolling_operator import FreeSystem, SlipOperator
 from models.contact.rolling_problem import rigid_slip
-from models.errors import RunFailed
-from validation.rows import Row, System, Table, at_most, behaves
+from models.core.errors import RunFailed
+from validation.common.rows import Row, System, Table, at_most, behaves
 
 TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
@@ -226,7 +226,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Coefficients over the ratio of axes, and how far the library is from the exact theory."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
     ratio = np.geomspace(0.01, 100.0, 201)

@@ -11,10 +11,10 @@ from models.contact.hertz_cells import hertzian
 from models.contact.material import Material, Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
-from models.contact.work_precision import Case
-from models.errors import RunFailed
-from validation.rows import Row, System, Table, at_most, not_run, within
-from validation.scenes import data_folder
+from models.core.errors import RunFailed
+from models.systems.contact.work_precision import Case
+from validation.common.rows import Row, System, Table, at_most, not_run, within
+from validation.common.scenes import data_folder
 
 TITLE = "The exact theory of contact on cells"
 SYSTEM: System = "contact"
@@ -355,7 +355,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
     x, traction = data["strip"]

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.contact.hertz import Hertz, by_approach, by_load
 from models.contact.material import STEEL, Material, Pair
-from models.errors import InputError
-from validation.rows import Row, System, Table, at_most, behaves, within
+from models.core.errors import InputError
+from validation.common.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
@@ -222,7 +222,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Axes over the ratio of curvatures, and the error over the ratio of axes."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import BEST, left, rolled
-from models.contact.cases_table import answer
 from models.contact.hertz import by_axes
-from models.contact.scene import Method
 from models.contact.theories import Fastsim
-from models.contact.work_precision import Case, exact
+from models.machine.timing import paired_ratio
+from models.systems.contact.cases_table import answer
+from models.systems.contact.scene import Method
+from models.systems.contact.work_precision import Case, exact
+from validation.common.rows import Row, System, Table, aim, at_most, finding
 from validation.contact.contact_bands import FASTSIM, ROUNDING, SHARE, held, kept
 from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read, read_drawn, read_wide
 from validation.contact.programs import compare, table
-from validation.rows import Row, System, Table, aim, at_most, finding
-from validation.timing import paired_ratio
 
 TITLE = "Stated errors of rolling contact"
 SYSTEM: System = "contact"

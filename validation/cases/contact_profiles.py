@@ -13,10 +13,10 @@ from models.contact.profiles import Profile
 from models.contact.simplified_theory import press
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.wheel_on_rail import Track, wheel_on_rail
-from models.errors import InputError
+from models.core.errors import InputError
+from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.scenes import data_folder
 from validation.contact.contact_shapes import Shape, exact_normal
-from validation.rows import Row, System, Table, at_most, finding, not_run, within
-from validation.scenes import data_folder
 
 TITLE = "Rolling contact of profiles: S1002 on UIC 60"
 SYSTEM: System = "contact"
@@ -263,7 +263,7 @@ def _table_rows(cases: list[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Place of contact and its load over the shift."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(7.0, 3.6))
     for name, cases in data.items():

@@ -15,7 +15,8 @@ from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
 from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
-from models.seconds import cost
+from models.machine.seconds import cost
+from validation.common.rows import Row, System, Table, at_most, finding
 from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
@@ -30,7 +31,6 @@ from validation.contact.contact_shapes import (
     placed,
     profiles,
 )
-from validation.rows import Row, System, Table, at_most, finding
 
 TITLE = "Rolling contact of any shape: the theory of 1983"
 SYSTEM: System = "contact"
@@ -417,7 +417,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Errors of the two pressure profiles by shape."""
     if "shapes" not in data:
         return []
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     shapes = data["shapes"]
     figure, axes = plt.subplots(1, 4, figsize=(10.0, 4.2), sharey=True)

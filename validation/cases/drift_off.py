@@ -12,17 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
-from models.drift.trust import ANGLE, interpolation, model, noise
-from models.engines.protocol import build, settings_of
-from models.ensemble.paths import noise_paths
+from models.core.result import Result
+from models.engines.assembly import Assembly
+from models.engines.protocol import build
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.result import Result
-from models.simulate import simulate
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.noise_paths import noise_paths
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.trust import ANGLE, interpolation, model, noise
 from models.vehicles.pitch_plane import Parameters
-from validation.rows import Row, System, Table, within
-from validation.scenes import force_scene, road_scene, write_forces
+from validation.common.rows import Row, System, Table, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
@@ -198,7 +200,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Measured over predicted."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(5.2, 4.2))
     ends = [one["predicted"] for one in data["combinations"]]

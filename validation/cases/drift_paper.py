@@ -5,11 +5,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.scene import Scene
-from models.simulate import simulate
-from models.systems import load
+from models.core.systems import load
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
 from studies.six_runs import followed, row
-from validation.rows import Row, System, Table, finding, within
+from validation.common.rows import Row, System, Table, finding, within
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"

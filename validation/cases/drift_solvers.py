@@ -11,16 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
-from models.damage import damage_ratio
+from models.core.result import Result
+from models.core.signals import Sampled
 from models.drift.growth import growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
+from models.drift.section_forces import section_forces
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
-from models.result import Result
-from models.section_forces import section_forces
-from models.signals import Sampled
-from models.simulate import simulate
-from validation.rows import Row, System, Table, finding, within
-from validation.scenes import force_scene, road_scene, write_forces
+from models.fatigue.damage import damage_ratio
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.rows import Row, System, Table, finding, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
@@ -165,7 +166,7 @@ def _treated(
 
 
 def _white(path: int, count: int) -> np.ndarray:
-    from models.noise import normal
+    from models.core.noise import normal
 
     return normal(SEED, path, count, 2)
 

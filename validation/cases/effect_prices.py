@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
-from models.engines.protocol import build, guard, settings_of
-from models.scene import Scene
-from models.simulate import outputs
+from models.engines.protocol import build, guard
+from models.machine.timing import describe, interleave, paired_ratio
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.scene import Scene, settings_of
 from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.bare_stops import ratio_of_stops
@@ -18,8 +19,7 @@ from validation.absence.hand_built import exudyn_run, mujoco_run
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
-from validation.rows import Row, System, Table, aim, at_most
-from validation.timing import describe, interleave, paired_ratio
+from validation.common.rows import Row, System, Table, aim, at_most
 
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"

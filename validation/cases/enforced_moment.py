@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
+from models.core.time_series import write_time_series
 from models.engines.protocol import Settings, build
-from models.scene import Scene
-from models.scene import build as build_scene
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.pitch_plane import equilibrium
-from validation.rows import Row, System, Table, at_most, finding
-from validation.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.rows import Row, System, Table, at_most, finding
+from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
@@ -219,7 +219,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Start-up ringing of the multiplier."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(8, 3))
     paths = data["ringing"]

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.engines import gap, mujoco_threads
-from models.ensemble.paths import NoisePaths, noise_paths
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import processes
-from models.scene import Scene
-from models.simulate import simulate
-from validation.rows import Row, System, Table, aim, at_most, behaves, finding, within
-from validation.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
+from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
@@ -387,8 +387,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []
+    from models.drawing.figures import plt
     from studies.ensemble import draw_fan
-    from studies.figures import plt
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))

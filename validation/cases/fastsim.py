@@ -13,11 +13,11 @@ from models.contact.fastsim_grid import POWERS
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
+from validation.common.rows import Row, System, Table, aim, at_most
 from validation.contact.contact_bands import held
 from validation.contact.contact_set import JUDGED, read, read_drawn
 from validation.contact.fastsim_speed import speed
 from validation.contact.fuzzed_creepage import OPTIONS, ROUNDING, contacts, worst
-from validation.rows import Row, System, Table, aim, at_most
 
 TITLE = "FASTSIM"
 SYSTEM: System = "contact"
@@ -382,7 +382,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Largest error over the cells."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(8.5, 4.0))
     for i, (name, values) in enumerate(data["cells"].items()):

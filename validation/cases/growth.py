@@ -10,19 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.result import Result
+from models.core.signals import Sampled
 from models.drift import growth as law
-from models.drift.covariance import covariance
-from models.drift.tangent import Path as ErrorPath
-from models.drift.tangent import measured_growth, swing
-from models.ensemble.paths import noise_paths
+from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
-from models.result import Result
-from models.scene import Scene, build
-from models.signals import Sampled
-from models.simulate import simulate
-from validation.rows import Row, System, Table, at_most, finding, within
-from validation.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.covariance import covariance
+from models.systems.pitch_plane.noise_paths import noise_paths
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.tangent import Path as ErrorPath
+from models.systems.pitch_plane.tangent import measured_growth, swing
+from validation.common.rows import Row, System, Table, at_most, finding, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
@@ -423,7 +424,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     spread = data["spread"]
     figure, axis = plt.subplots(figsize=(7.0, 3.6))

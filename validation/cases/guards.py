@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.core.errors import InputError, RunFailed
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, MISSING
-from models.errors import InputError, RunFailed
-from validation import full_disk, wrong_engines
+from validation.common import full_disk, wrong_engines
+from validation.common.rows import Row, System, Table, at_most, behaves
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
-from validation.rows import Row, System, Table, at_most, behaves
 
 TITLE = "Guards against silent wrong answers"
 SYSTEM: System = "pitch-plane"

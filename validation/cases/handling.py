@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.engines.mujoco_callback import installed
-from models.handling import forces as at
-from models.handling.in_engines import Drive, driven, driven_by, energy, friction_distance, unaccounted
-from models.handling.numbers import Controls, Handling, Tyres
-from models.handling.road import plane_waves
-from models.handling.single_track import steady_turn
-from models.handling.tyre import FIRST, brush, net, tyre_forces
+from models.machine.compiled import njit
+from models.machine.timing import interleave, median
+from models.multibody import forces as at
+from models.multibody.numbers import Controls, Handling, Tyres
+from models.road.plane_waves import plane_waves
+from models.systems.handling.in_engines import Drive, driven, driven_by, energy, friction_distance, unaccounted
+from models.systems.handling.single_track import steady_turn
+from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
-from validation.rows import Row, System, Table, aim, at_most, behaves, finding
-from validation.timing import interleave, median
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding
 
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"

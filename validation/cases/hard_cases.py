@@ -9,10 +9,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from validation.common.rows import Row, System, Table, at_most, behaves, within
 from validation.hard_cases import cases_by_family
 from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, Outcome, judge
 from validation.hard_cases.catalogue import COVERED, beyond
-from validation.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "Hard cases"
 SYSTEM: System = "hard-cases"

@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
 from models.drift.growth import holding_stiffness, rigid_pitch
-from models.drift.trust import growth
-from models.effects import pitch_spring
-from models.engines.protocol import build, settings_of
-from models.simulate import simulate
-from validation.rows import Row, System, Table, behaves, finding, within
-from validation.scenes import force_scene, road_scene, write_forces
+from models.engines.assembly import Assembly
+from models.engines.protocol import build
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.effects import pitch_spring
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.trust import growth
+from validation.common.rows import Row, System, Table, behaves, finding, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"

@@ -9,25 +9,25 @@ import mujoco
 import numpy as np
 from scipy.stats import chi2
 
+from models.core.errors import InputError
+from models.core.signals import Interpolation
+from models.engines.cut_vehicle import ENGINES, EngineHubs, HubModel, HubRun, build
 from models.engines.free_vehicle_mujoco import FreeMujoco
-from models.engines.hub_forces import ENGINES, EngineHubs, HubModel, HubRun, build
 from models.engines.spatial_reference import SpatialReference
-from models.errors import InputError
-from models.hub_forces.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
-from models.hub_forces.enforced import held
-from models.hub_forces.kernel import WRENCH, forces
-from models.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
-from models.hub_forces.rigid import rigid
-from models.hub_forces.scene import HubScene
-from models.hub_forces.scene import build as scene_of
-from models.hub_forces.table import Drive
-from models.hub_forces.tilt_filter import estimate
+from models.multibody.cut_kernel import WRENCH, forces
+from models.multibody.cut_rigid import rigid
+from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
-from models.signals import Interpolation
+from models.systems.hub_forces.enforced import held
+from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
+from models.systems.hub_forces.scene import HubScene
+from models.systems.hub_forces.scene import build as scene_of
+from models.systems.hub_forces.tilt_filter import estimate
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 from studies.hub_forces import FILTER, Found, answer, compute, damages, drift_off, engines_apart, errors
-from validation.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"

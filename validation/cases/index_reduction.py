@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.noise import normal
+from models.core.time_series import write_time_series
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
-from models.noise import normal
-from models.scene import Scene
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from validation.common.rows import Row, System, at_most, behaves, finding, not_run
+from validation.common.scenes import force_scene, road_scene, write_forces
 from validation.drift.index_reduction import IndexOne, gap_law
 from validation.hard_cases.prescribed_pitch import AsItComes
-from validation.rows import Row, System, at_most, behaves, finding, not_run
-from validation.scenes import force_scene, road_scene, write_forces
 
 TITLE = "Drift by index reduction, and drift by noise"
 SYSTEM: System = "drift"
@@ -282,7 +283,7 @@ def _id(name: str) -> str:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
     for name, gap in data["gaps"].items():

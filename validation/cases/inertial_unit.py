@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from models.noise import GYRO, normal
-from models.section_forces import section_forces
+from models.core.noise import GYRO, normal
+from models.core.time_series import write_time_series
+from models.drift.section_forces import section_forces
 from models.sensors import inertial_unit as unit
 from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
 from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.run import run as simulate
 from studies.virtual_measurement import follower, write_measurement
 from studies.virtual_measurement import measure as measure_road
-from validation.bands import mean_square
+from validation.common.bands import mean_square
+from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.scenes import road_scene
 from validation.measured import recording
-from validation.rows import Row, System, Table, at_most, finding, not_run, within
-from validation.scenes import road_scene
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
@@ -447,7 +447,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     found = []
     if data["ten minutes"]:

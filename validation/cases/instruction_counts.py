@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from validation.common.rows import Row, System, Table
 from validation.price import instructions
-from validation.rows import Row, System, Table
 
 TITLE = "Instructions per step"
 SYSTEM: System = "cost"

@@ -6,28 +6,28 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
-from models.engines.protocol import Settings, settings_of
+from models.core.result import Result
+from models.core.scene_effects import without
+from models.engines.protocol import Settings
 from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
-from models.hub_forces.cut_vehicle import cut
-from models.hub_forces.measurement import truth, two_tracks
-from models.result import Result
-from models.ride.in_engines import ridden
-from models.ride.of_scene import excitation_of, vehicle_of
 from models.ride.road_path import road_path
-from models.ride.scene import build as build_ride
 from models.road.iso8608 import iso8608_road
-from models.scene import Scene
-from models.scene import build as build_scene
-from models.scene_effects import without
-from models.simulate import simulate
+from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.ride.in_engines import ridden
+from models.systems.ride.of_scene import excitation_of, vehicle_of
+from models.systems.ride.scene import build as build_ride
+from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation import checks
-from validation.bounces import Bounces, energy
-from validation.rows import Row, System, at_most, finding, within
-from validation.scenes import STUDY_ROAD, VEHICLES, gap
+from validation.common import checks
+from validation.common.bounces import Bounces, energy
+from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 
 TITLE = "Tyres that only push"
 SYSTEM: System = "pitch-plane"

@@ -10,9 +10,9 @@ from models.contact.profile_files import read_profile
 from models.contact.wheel_on_rail import Side, Track, Wheelset, laid
 from models.rail.contact_table import BENCHMARK_FRICTION, BENCHMARK_LOAD, BENCHMARK_YAW, Contact, Placed, benchmark_side
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
+from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.scenes import data_folder
 from validation.contact.manchester_references import CONTACT, apart, on_one_plane, searched, sums
-from validation.rows import Row, System, Table, at_most, finding, not_run, within
-from validation.scenes import data_folder
 
 TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
@@ -353,7 +353,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Mean place and force of the right wheel beside CONTACT's."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     published = np.array(data["published"])
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.4))

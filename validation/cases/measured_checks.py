@@ -9,19 +9,19 @@ from typing import Any, Literal
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle, cut
-from models.hub_forces.scene import Road
+from models.core.finding import Finding
 from models.measured.checks import check
 from models.measured.checks.place import Place
 from models.measured.faults_of_measurement import Faults
-from models.measured.finding import Finding
-from models.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.systems.hub_forces.scene import Road
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.cases.hub_forces import r19, twin
+from validation.common.rows import Row, System, Table, behaves, finding, not_run, within
 from validation.measured import measured_car
 from validation.measured import recording as car
-from validation.rows import Row, System, Table, behaves, finding, not_run, within
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"

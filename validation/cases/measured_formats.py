@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from models.damage import pseudo_damage
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.noise import normal
+from models.fatigue.damage import pseudo_damage
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import Group
-from models.noise import normal
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, not_run, within
 from validation.measured.measured_files import csv_forms, kinds
 from validation.measured.measured_files.odd import Odd, read
 from validation.measured.measured_files.own_libraries import LIBRARIES
-from validation.rows import Row, System, Table, aim, at_most, behaves, finding, not_run, within
 
 TITLE = "Measurement files"
 SYSTEM: System = "measured"

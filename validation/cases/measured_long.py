@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.hub_forces import build
-from models.hub_forces.cut_vehicle import cut
-from models.measured.comparison import checks, compare
-from models.measured.counting import count, level_crossings, range_pairs
+from models.engines.cut_vehicle import build
+from models.fatigue.counting import count, level_crossings, range_pairs
+from models.fatigue.rainflow_cycles import cycles
 from models.measured.formats import open_source
-from models.measured.hand_on import hand_on
-from models.measured.section_run import Hold, run
-from models.measured.sections import Sections, guided
-from models.rainflow_cycles import cycles
+from models.systems.measured.comparison import checks, compare
+from models.systems.measured.hand_on import hand_on
+from models.systems.measured.section_run import Hold, run
+from models.systems.measured.sections import Sections, guided
+from models.vehicles.cut_vehicle import cut
 from validation.cases.hub_forces import _anywhere, _shaken, twin
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
-from validation.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"

@@ -9,32 +9,32 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.engines.hub_forces import ENGINES
-from models.errors import RunFailed
-from models.hub_forces.cut_vehicle import PITCH, ROLL, CutVehicle, cut
-from models.hub_forces.measurement import HubForces, model
-from models.hub_forces.rigid import rigid
-from models.measured import plan
+from models.core.errors import RunFailed
+from models.core.strict import read
+from models.core.systems import load
+from models.engines.cut_vehicle import ENGINES
 from models.measured.channel import BLOCK
 from models.measured.checks import check as check_recording
 from models.measured.checks.place import Place
-from models.measured.clock import record
 from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.measured.recording import Recording
-from models.measured.section_run import Hold, Outcome, SectionRun
-from models.measured.section_run import run as march
-from models.measured.sections import Sections
 from models.measured.signal import Signal
-from models.measured.trust import Level, drift
-from models.measured.verdict import errors, judge, judge_beside_truth
-from models.measured.virtual import VirtualMeasurement, VirtualTable, map_lines, virtual_measurement
-from models.strict import read
-from models.systems import load
+from models.multibody.cut_rigid import rigid
+from models.systems.hub_forces.measurement import HubForces, model
+from models.systems.measured import plan
+from models.systems.measured.clock import record
+from models.systems.measured.section_run import Hold, Outcome, SectionRun
+from models.systems.measured.section_run import run as march
+from models.systems.measured.sections import Sections
+from models.systems.measured.trust import Level, drift
+from models.systems.measured.verdict import errors, judge, judge_beside_truth
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, map_lines, virtual_measurement
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
+from validation.common.rows import Row, System, Table, at_most, behaves, finding, not_run, within
 from validation.measured import recording as moving_car
-from validation.rows import Row, System, Table, at_most, behaves, finding, not_run, within
 
 TITLE = "Measurement files against the truth"
 SYSTEM: System = "drift"

@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
-from models.effects.accelerometers import names
-from models.engines.protocol import build, settings_of
-from models.noise import ACCELEROMETERS, normal
-from models.scene import build as build_scene
+from models.core.noise import ACCELEROMETERS, normal
+from models.engines.protocol import build
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
     Start,
@@ -23,10 +20,14 @@ from models.sensors.rigid_body_motion import (
 )
 from models.sensors.rotations import from_cardan, skew
 from models.sensors.sensor_array import SensorArray, sensor_array
-from models.simulate import outputs
-from validation.bands import mean_square
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.effects.accelerometers import names
+from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.scene import settings_of
+from validation.common.bands import mean_square
+from validation.common.rows import Row, System, Table, at_most, behaves, within
 from validation.hard_cases.case import IMPLEMENTATIONS
-from validation.rows import Row, System, Table, at_most, behaves, within
 from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted
 
 TITLE = "Motion from accelerometers"
@@ -415,7 +416,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Noise gain by height, and the error of the rate over time."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
     heights = np.geomspace(0.02, 1.2, 40)

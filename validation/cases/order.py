@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from models.engines.protocol import Settings
-from models.simulate import simulate
-from validation.rows import Row, System, Table, within
-from validation.scenes import road_scene
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.rows import Row, System, Table, within
+from validation.common.scenes import road_scene
 
 TITLE = "Observed order of the largest state error on the study road"
 SYSTEM: System = "pitch-plane"

@@ -7,10 +7,10 @@ other systems, beside all runs without a fault that these need.
 from pathlib import Path
 from typing import Any
 
+from validation.common.rows import Row, Table, at_most
 from validation.faults import advice, braking, choosing, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
-from validation.rows import Row, Table, at_most
 
 TITLE = "Planted faults: what each check sees"
 CAMPAIGNS = (

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from models.drift.point_mass import continuous, discrete, paths
-from validation.bands import mean_square
-from validation.rows import Row, System, Table, at_most, within
+from validation.common.bands import mean_square
+from validation.common.rows import Row, System, Table, at_most, within
 
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
@@ -187,7 +187,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
     times = np.geomspace(0.01, 100.0, 81)

@@ -10,15 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from models.assembly import Assembly, assemble
+from models.advice.price import runner as cost
+from models.advice.price.problem import Problem, Setting
+from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
+from models.systems.pitch_plane.assembly import assemble
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, not_run, within
 from validation.price import ride, speed, split
-from validation.price import runner as cost
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
 from validation.price.problems import (
-    Problem,
-    Setting,
     braking_stop,
     contact_alone,
     force_excited,
@@ -31,7 +32,6 @@ from validation.price.problems import (
 )
 from validation.price.rows import rows_of
 from validation.price.tables import tables as cost_tables
-from validation.rows import Row, System, Table, aim, at_most, behaves, not_run, within
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError, RunFailed
-from validation.price.own_scene import unseen_systems
-from validation.price.own_scene.unseen import ENGINES, Verdict, drawn, judge
-from validation.rows import Row, System, Table, aim, at_most, finding, within
+from models.core.errors import InputError, RunFailed
+from validation.common.rows import Row, System, Table, aim, at_most, finding, within
+from validation.price import unseen_systems
+from validation.price.unseen import ENGINES, Verdict, drawn, judge
 
 Judged = tuple[list[Verdict], list[str]]
 
@@ -171,7 +171,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted over true error by tolerance."""
-    from studies.figures import COLOURS, plt
+    from models.drawing.figures import COLOURS, plt
 
     figure, ax = plt.subplots(figsize=(7.5, 5.2))
     every = [one for own in data["verdicts"] for one in own]

@@ -12,21 +12,22 @@ import numpy as np
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import FINITE, Covariance, stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.marginal import Unstable, parts
-from models.ride.of_scene import linear_vehicle
 from models.ride.sweep import sweep
 from models.ride.weighting import WEIGHTINGS, weighted
+from models.road.excitation import Excitation
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import CASES, TwoTrackRoad, excitation, half_track, input_covariance, road_of_level
+from models.systems.ride.of_scene import linear_vehicle
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.ride.ride_corners import corners
 from validation.ride.ride_twins import twin
-from validation.rows import Row, System, Table, aim, at_most, behaves, within
 
 TITLE = "Ride: stationary covariance with exact delays"
 SYSTEM: System = "ride"
@@ -504,7 +505,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     shown = data["figure"]
     figure, axes = plt.subplots(1, 3, figsize=(11, 4.4), sharey=True, layout="constrained")

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from models.core.noise import normal
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
-from models.noise import normal
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.operating_point import poles, shift
 from models.vehicles.curve import Curve
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Row, System, Table, at_most, behaves, finding
 from validation.spatial import spatial_twin
 
 TITLE = "Vehicles in space: both engines, the analytic matrices and equations written by hand"

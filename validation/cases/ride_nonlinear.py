@@ -10,20 +10,21 @@ import numpy as np
 from scipy.integrate import quad
 
 from models.ride.covariance import stationary
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.frequency import spectra
 from models.ride.gaussian_laws import of_curve, of_friction
-from models.ride.in_engines import Ride, ridden
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import promised, statistically_linear
 from models.ride.time_averages import standard_errors
+from models.road.excitation import Excitation
 from models.road.two_track import LEVEL, excitation, half_track, on_track, road_of_level
+from models.systems.ride.in_engines import Ride, ridden
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation.rows import Row, System, Table, at_most
+from validation.common.rows import Row, System, Table, at_most
 
 TITLE = "Nonlinear ride: statistical linearisation, Monte Carlo beside it, both engines in time"
 SYSTEM: System = "ride"
@@ -401,7 +402,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra of both engines' runs over the covariance's own."""
     if not data["spectra"]:
         return []
-    from studies.figures import COLOURS, LABELS, plt
+    from models.drawing.figures import COLOURS, LABELS, plt
 
     shown = data["spectra"]
     units = ("(m/s$^2$)$^2$/Hz", "(m/s$^2$)$^2$/Hz", "m$^2$/Hz", "N$^2$/Hz")

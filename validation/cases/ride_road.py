@@ -10,17 +10,18 @@ from scipy.linalg import block_diag
 
 from models.ride.covariance import stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.height_densities import both_sides, output_densities, variances
-from models.ride.linear_vehicle import LinearVehicle, Wheel
 from models.ride.weighting import WEIGHTINGS, weighted
+from models.road.excitation import Excitation
 from models.road.isotropic import IsotropicRoad, Part, cross_spectrum_of, isotropic_like, spectral_matrix
 from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, input_covariance, road_of_level
+from models.vehicles.linear_vehicle import LinearVehicle, Wheel
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from validation.common.rows import Row, System, Table, at_most, finding
 from validation.ride.fitted_roads import HALF_TRACK, fits_table, made, measured
 from validation.ride.road_figure import coherency_figure
-from validation.rows import Row, System, Table, at_most, finding
 
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"

@@ -12,16 +12,16 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from models.ride.covariance import stationary
-from models.ride.excitation import Excitation
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.monte_carlo import along, at_constant_speed
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import REACH, quasi_stationary, varying_speed
+from models.road.excitation import Excitation
 from models.road.two_track import excitation, half_track, on_track, road_of_level
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Row, System, Table, at_most, behaves, finding
 
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
@@ -342,7 +342,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviations over time, quasi-stationary beside."""
     if not data:
         return []
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), sharey=True)
     for axis, (name, found) in zip(axes, data.items(), strict=True):

@@ -11,9 +11,9 @@ from models.road.iso8608 import CLASSES, iso8608_road
 from models.road.opencrg import read_opencrg, write_opencrg
 from models.road.profile import Profile
 from models.road.study import study_road
-from models.simulate import simulate
-from validation.rows import Row, System, at_most, not_run, within
-from validation.scenes import COURSE, data_folder, gap, road_scene
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.rows import Row, System, at_most, not_run, within
+from validation.common.scenes import COURSE, data_folder, gap, road_scene
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"

@@ -6,19 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from models.damage import SLOPE, pseudo_damage
+from models.core.noise import normal
+from models.core.result import Result
+from models.core.strict import read
+from models.core.systems import load
 from models.drift.score import errors
-from models.noise import normal
-from models.result import Result
-from models.scene import build
-from models.section_forces import CHANNELS
-from models.simulate import simulate
-from models.strict import read
-from models.systems import load
+from models.drift.section_forces import CHANNELS
+from models.fatigue.damage import SLOPE, pseudo_damage
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 from studies.stabilisers import Bench, Options, run
+from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.scenes import force_scene, road_scene, write_forces
 from validation.hard_cases.case import IMPLEMENTATIONS
-from validation.rows import Row, System, Table, at_most, behaves, finding, within
-from validation.scenes import force_scene, road_scene, write_forces
 
 TITLE = "The score of a stabilised run"
 SYSTEM: System = "drift"

@@ -6,21 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.noise import normal
+from models.core.result import Result
+from models.core.signals import Sampled
+from models.core.time_series import write_time_series
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings
 from models.engines.stability import first_order, linearised
-from models.noise import normal
-from models.result import Result
-from models.scene import Scene
-from models.signals import Sampled
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
 from models.vehicles.pitch_plane import Parameters
 from studies.virtual_measurement import Follow, follower, write_measurement
 from studies.virtual_measurement import measure as measure_road
-from validation import checks
-from validation.rows import Row, System, at_most, finding, within
-from validation.scenes import VEHICLES, road_scene
+from validation.common import checks
+from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.scenes import VEHICLES, road_scene
 
 TITLE = "Stabilisers"
 SYSTEM: System = "drift"

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from models.engines.protocol import Settings
-from models.simulate import simulate
-from validation.rows import Independence, Row, System, at_most
-from validation.scenes import gap, road_scene
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.rows import Independence, Row, System, at_most
+from validation.common.scenes import gap, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
 SYSTEM: System = "pitch-plane"

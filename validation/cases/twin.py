@@ -4,11 +4,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from models.result import Result
-from models.scene import Scene
-from models.simulate import simulate
-from validation.rows import Row, System, at_most, not_run
-from validation.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene, write_forces
+from models.core.result import Result
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from validation.common.rows import Row, System, at_most, not_run
+from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene, write_forces
 
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"

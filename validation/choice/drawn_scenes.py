@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.systems import SYSTEMS
+from models.core.systems import SYSTEMS
 
 TOLERANCES = (0.02, 0.005, 0.05)
 """Drawn scenes take these in turn."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.ride.choice.choose import Chooser, Set
-from models.ride.choice.march import longest_step
-from models.ride.choice.neighbourhood import OFF, changed, parameters
-from models.ride.choice.reduced import Whole
-from models.ride.choice.screen import confirmed
+from models.advice.ride_choice.choose import Chooser, Set
+from models.advice.ride_choice.march import longest_step
+from models.advice.ride_choice.neighbourhood import OFF, changed, parameters
+from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.screen import confirmed
 from validation.choice.sampled import Sampled
 
 

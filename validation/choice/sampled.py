@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from models.ride.choice.march import March
+from models.advice.ride_choice.march import March
 
 SHARES = (0.0, 0.5, 1.0)
 """Of a step, where it reads the road."""

@@ -15,9 +15,9 @@ import numpy as np
 from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
-from models.contact.of_scene import interpenetrating
 from models.contact.theories import Simplified
-from models.contact.work_precision import Case
+from models.systems.contact.of_scene import interpenetrating
+from models.systems.contact.work_precision import Case
 from validation.contact.contact_set import FITTED, FRICTION, LOAD, read, read_drawn, read_wide
 
 CELLS = 101

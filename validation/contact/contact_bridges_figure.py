@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from studies.figures import plt
+from models.drawing.figures import plt
 
 LAWS = (
     "no contact",

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.contact import work_precision
 from models.contact.material import Material, Pair
-from models.contact.work_precision import Case, ellipse_cases, exact
+from models.systems.contact import work_precision
+from models.systems.contact.work_precision import Case, ellipse_cases, exact
 
 RATIOS = (0.2, 0.5, 1.0, 2.0, 5.0)
 LEVELS = (0.05, 0.2, 0.5, 0.8, 1.2, 2.0, 4.0, 10.0)

@@ -13,7 +13,7 @@ from models.contact.simplified_theory import NormalContact
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance, from_function
 from models.contact.wheel_on_rail import Touch, wheel_on_rail
-from models.errors import InputError, RunFailed
+from models.core.errors import InputError, RunFailed
 
 PAIR = Pair()
 FRICTION = 0.3

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from models.compiled import njit
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
 from models.contact.material import Pair
-from validation.rows import Row, System, aim
-from validation.timing import median, paired_ratio, spelled
+from models.machine.compiled import njit
+from models.machine.timing import median, paired_ratio, spelled
+from validation.common.rows import Row, System, aim
 
 SYSTEM: System = "contact"
 CELLS = 21

@@ -8,10 +8,10 @@ from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
 from models.contact.simplified_theory import CELLS, PAPER, NormalContact, press, roll
 from models.contact.undeformed_distance import quadratic
-from models.contact.work_precision import Case
-from models.seconds import cost
-from validation.rows import Table
-from validation.timing import interleave
+from models.machine.seconds import cost
+from models.machine.timing import interleave
+from models.systems.contact.work_precision import Case
+from validation.common.rows import Table
 
 ROUNDS = 5
 """Of timing."""

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from models.contact.inputs import Array
+from models.core.errors import Refused, RunFailed
 from models.engines.contact_bridge import Wheels, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.stability import LONG_RUN, limit
-from models.errors import Refused, RunFailed
-from validation.rows import Row, System, Table, at_most, behaves
+from validation.common.rows import Row, System, Table, at_most, behaves
 
 SYSTEM: System = "rolling-vehicle"
 DURATION = 0.2

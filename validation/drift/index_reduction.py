@@ -14,7 +14,7 @@ after each step, along M^-1 G', which the same system gives with wanted = -g.
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from models.engines.reference import derivative_of
 from models.vehicles.linear import matrices
 from models.vehicles.pitch_plane_equations import numbers

@@ -9,22 +9,23 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import butter, sosfiltfilt
 
-from models.assembly import Assembly, assemble
-from models.damage import damage_ratio
-from models.drift.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
-from models.drift.pitch_step import KEPT, RELATIVE
-from models.effects.kalman_filter import guide_of, pull
+from models.core.noise import PITCH_SENSOR, normal
+from models.core.result import Result
+from models.core.strict import read
+from models.core.time_series import write_time_series
+from models.drift.section_forces import CHANNELS, section_forces
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
 from models.engines.stability import first_order, linearised
-from models.noise import PITCH_SENSOR, normal
-from models.result import Result
-from models.scene import Scene
-from models.scene import build as build_scene
-from models.section_forces import CHANNELS, section_forces
-from models.simulate import simulate
-from models.strict import read
-from models.time_series import write_time_series
-from validation.scenes import road_scene, write_forces
+from models.fatigue.damage import damage_ratio
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.effects.kalman_filter import guide_of, pull
+from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
+from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import build as build_scene
+from validation.common.scenes import road_scene, write_forces
 
 ANGLE = float(np.deg2rad(0.1))
 """Deviation (rad) of the inertial unit, white at 1 kHz."""
@@ -155,7 +156,7 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
 
 def effect(scene: Scene) -> Any:
     """The filter's settings as a scene without any of its own would have them."""
-    from models.effects.kalman_filter import Parameters
+    from models.systems.pitch_plane.effects.kalman_filter import Parameters
 
     return read(Parameters, {"file": "", "force_deviation": 1.0, "pitch_deviation": 1.0}, "")
 

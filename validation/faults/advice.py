@@ -13,12 +13,12 @@ from unittest.mock import patch
 
 import numpy as np
 
+from models.advice.price import Answer, Ladder, recommendation, search, truth
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import Choice, Recommendation
+from models.advice.price.truth import Truth, at
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.price.own_scene import Answer, Ladder, recommendation, search, truth
-from validation.price.own_scene.recommendation import Choice, Recommendation
-from validation.price.own_scene.truth import Truth, at
-from validation.price.problems import Setting
 
 STEPS = tuple(0.2 / n for n in (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 64, 100, 160, 250))
 STAGES: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
@@ -51,7 +51,7 @@ CLOCK = _Clock()
 
 @dataclass(frozen=True)
 class Swing:
-    """See ``validation.price.own_scene.OwnScene``. The error has grown by the end, beyond what is searched."""
+    """See ``models.advice.price.OwnScene``. The error has grown by the end, beyond what is searched."""
 
     title, quantity, unit, cell, note, counted = "y' = y cos t", "y", "", 0.0, "", "force calls"
     whole, first = 8.0, 2.0
@@ -172,7 +172,7 @@ CHECKS = {
 
 
 def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation") -> Patch:
-    return attribute(f"validation.price.own_scene.{module}:{name}", change)
+    return attribute(f"models.advice.price.{module}:{name}", change)
 
 
 def _tenth(real: Any) -> Any:

@@ -11,15 +11,16 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.errors import InputError, RunFailed
+from models.core.signals import Sampled, Smooth, Stacked
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, Trajectory
-from models.errors import InputError, RunFailed
-from models.scene import Scene
-from models.scene import build as build_scene
-from models.signals import Sampled, Smooth, Stacked
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
-from validation import checks
-from validation.checks import Make
+from validation.common import checks
+from validation.common.checks import Make
 
 STEP = 1e-3
 PERIOD = 2e-3

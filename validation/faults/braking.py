@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from models.braking import brake, plane_vehicle, tyre_table
-from models.braking.advance import advance
-from models.braking.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
-from models.braking.plane_vehicle import GRAVITY, PAPER, Plane
-from models.braking.port import sensors
-from models.braking.surfaces import Stretch, road
+from models.brake import brake, plane_vehicle
+from models.brake.advance import advance
+from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
+from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
+from models.brake.port import sensors
+from models.brake.surfaces import Stretch, road
+from models.tyre import tyre_table
 from validation.braking.braking_schemes import LITERAL, stopped
 from validation.cases import braking_stop as stops
 from validation.faults.campaign import Campaign, Check, Fault
@@ -154,7 +155,7 @@ CHECKS = {
 
 def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Numbers of every truck changed."""
-    return attribute("models.braking.plane_vehicle:truck", lambda real: lambda *own: _changed(real(*own), change))
+    return attribute("models.brake.plane_vehicle:truck", lambda real: lambda *own: _changed(real(*own), change))
 
 
 def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
@@ -163,7 +164,7 @@ def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]
 
 
 def _brakes(change: Callable[[Any], Any]) -> Patch:
-    return attribute("models.braking.brake:of_wheels", lambda real: lambda *own: change(real(*own)))
+    return attribute("models.brake.brake:of_wheels", lambda real: lambda *own: change(real(*own)))
 
 
 def _literal(real: Any) -> Any:
@@ -180,7 +181,7 @@ def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     from dataclasses import replace
 
     return attribute(
-        "models.braking.tyre_table:stacked",
+        "models.tyre.tyre_table:stacked",
         lambda real: (
             lambda tables: (lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables))
         ),
@@ -198,7 +199,7 @@ def _spin(factor: float) -> Patch:
     def change(real: Any) -> Any:
         return property(lambda own: _changed(real.fget(own), {"spin": lambda spin: factor * spin}))
 
-    return attribute("models.braking.quarter:Quarter.plane", change)
+    return attribute("models.brake.quarter:Quarter.plane", change)
 
 
 def _one_bit_less(real: Any) -> Any:
@@ -220,7 +221,7 @@ FAULTS = (
     ),
     Fault("spin inertia 1 % too large", "wheel", _spin(1.01)),
     Fault("slip angle with the other sign", "tyre", attribute("validation.faults.braking:advance", _mirrored)),
-    Fault("conversion with a bit less", "port", attribute("models.braking.port.sensors:Channels", _one_bit_less)),
+    Fault("conversion with a bit less", "port", attribute("models.brake.port.sensors:Channels", _one_bit_less)),
     Fault("front and rear swapped", "vehicle", _truck(place=lambda p: p * np.array([-1.0, 1.0]))),
     Fault("hysteresis without a width", "brake", _brakes(lambda own: own._replace(release=own.push_out))),
     Fault(

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import RunFailed
+from models.core.errors import RunFailed
+from validation.common.rows import Row, System, Table, finding, within
 from validation.faults.patches import Patch
-from validation.rows import Row, System, Table, finding, within
 
 Record = dict[str, Any]
 SYSTEM: System = "hard-cases"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from models.road.iso8608 import iso8608_road
 from models.vehicles.description import Body, PitchSpring, Point, Strut, Vehicle
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from models.choice.choose import Chooser
-from models.choice.screen import Screen
-from models.ride.choice.choose import Choice
-from models.ride.choice.choose import Chooser as LinearChooser
-from models.ride.choice.screen import Screen as LinearScreen
+from models.advice.choice.choose import Chooser
+from models.advice.choice.screen import Screen
+from models.advice.ride_choice.choose import Choice
+from models.advice.ride_choice.choose import Chooser as LinearChooser
+from models.advice.ride_choice.screen import Screen as LinearScreen
 from validation.cases import choice_linear as linear
 from validation.cases import choice_nonlinear as nonlinear
 from validation.choice.drawn_scenes import Asked
@@ -145,7 +145,7 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
     return lambda real: confirm
 
 
-LINEAR, RUNS = "models.ride.choice", "models.choice"
+LINEAR, RUNS = "models.advice.ride_choice", "models.advice.choice"
 FAULTS = (
     Fault(
         "sign of the predicted change",

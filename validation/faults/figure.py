@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from studies.figures import plt
+from models.drawing.figures import plt
 
 DECADES = 12
 """End of the colour scale; a refused run counts as this."""

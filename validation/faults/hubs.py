@@ -8,11 +8,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from models.engines.cut_vehicle import EngineHubs
 from models.engines.free_vehicle_mujoco import FreeMujoco
-from models.engines.hub_forces import EngineHubs
-from models.hub_forces.cut_vehicle import CutVehicle, cut
-from models.hub_forces.kernel import WRENCH, forces
-from models.hub_forces.table import Drive
+from models.multibody.cut_kernel import WRENCH, forces
+from models.multibody.cut_table import Drive
+from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.vehicle_file import load_vehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
@@ -87,7 +87,7 @@ def read(change: Callable[[np.ndarray], np.ndarray] | None = None, frame: str = 
 
         return made
 
-    return attribute("models.engines.hub_forces:table", table)
+    return attribute("models.engines.cut_vehicle:table", table)
 
 
 FAULTS = (

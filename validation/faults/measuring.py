@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from models import damage, noise, section_forces
-from models.measured import counting, resampling, units
+from models.core import noise
+from models.drift import section_forces
+from models.fatigue import counting, damage
+from models.measured import resampling, units
 from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
@@ -166,7 +168,7 @@ CHECKS = {
 def _normal(change: Callable[..., tuple[int, ...]]) -> Patch:
     """Blocks of noise drawn for another (seed, path, block, channels, source)."""
     return attribute(
-        "models.noise:normal_block",
+        "models.core.noise:normal_block",
         lambda real: (
             lambda seed, path, block, channels, source=0, **rows: real(
                 *change(seed, path, block, channels, source), **rows
@@ -191,7 +193,7 @@ def _factor(name: str, factor: float) -> Patch:
 
 def _counted(change: Callable[[Any], Any]) -> Patch:
     """Spans, means and counts of the cycles changed."""
-    return attribute("models.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
+    return attribute("models.fatigue.rainflow_cycles:cycles", lambda real: lambda turns: change(real(turns)))
 
 
 def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
@@ -216,13 +218,14 @@ FAULTS = (
     Fault(
         "deviation for variance",
         "noise",
-        attribute("models.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5),
+        attribute("models.core.noise:normal_block", lambda real: lambda *own, **rows: real(*own, **rows) * 2.0**0.5),
     ),
     Fault(
         "stream begins anew at every call",
         "noise",
         attribute(
-            "models.noise:normal", lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source)
+            "models.core.noise:normal",
+            lambda real: lambda s, p, n, c, first=0, source=0: real(s, p, n, c, source=source),
         ),
     ),
     Fault("residue counted as whole cycles", "counting", _counted(lambda own: (own[0], own[1], np.ceil(own[2])))),
@@ -232,11 +235,11 @@ FAULTS = (
         "pairs beyond a range, not from it on",
         "counting",
         attribute(
-            "models.measured.counting:range_pairs",
+            "models.fatigue.counting:range_pairs",
             lambda real: lambda spans, counts, ranges: real(spans, counts, ranges * (1.0 + 1e-9)),
         ),
     ),
-    Fault("levels crossed either way", "counting", attribute("models.measured.counting:level_crossings", _every_way)),
+    Fault("levels crossed either way", "counting", attribute("models.fatigue.counting:level_crossings", _every_way)),
     Fault("kN taken for N", "units", _factor("kN", 1e-3)),
     Fault("degrees taken for rad", "units", _factor("deg/s", 180.0 / np.pi)),
     Fault("g of 9.81 m/s^2", "units", _factor("g", 9.81 / 9.80665)),
@@ -254,17 +257,21 @@ FAULTS = (
     Fault(
         "section forces in the inertial frame",
         "sections",
-        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)),
+        attribute(
+            "models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)
+        ),
     ),
     Fault(
         "body turned the other way",
         "sections",
-        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
+        attribute(
+            "models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)
+        ),
     ),
     Fault(
         "front and rear sections exchanged",
         "sections",
-        attribute("models.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
+        attribute("models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
     ),
     Fault(
         "gravity turned round",

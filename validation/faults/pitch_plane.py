@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from validation.common.rows import Row, Table, finding, within
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
-from validation.rows import Row, Table, finding, within
 
 TWIN, SYMMETRIC = "asymmetric_twin", "itwm_drift"
 DURATION = 0.1

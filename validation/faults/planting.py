@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from models.engines.protocol import Model, Settings, Trajectory, build
-from validation.checks import Make
+from validation.common.checks import Make
 from validation.faults import changes as change
 from validation.faults import patches
 from validation.faults.changes import Change

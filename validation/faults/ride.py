@@ -11,13 +11,13 @@ from models.engines.spatial_reference import SpatialReference
 from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import stationary
 from models.ride.delayed_system import DelayedSystem
-from models.ride.excitation import Excitation
 from models.ride.frequency import quadrature
-from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
 from models.ride.operating_point import poles
 from models.ride.weighting import WEIGHTINGS, weighting
 from models.road import two_track
+from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
@@ -28,11 +28,11 @@ INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
 
 
 def _system(name: str, road: Callable[[LinearVehicle], Excitation]) -> tuple[LinearVehicle, Excitation, DelayedSystem]:
-    from models.ride import excitation  # the name may be patched
+    from models.ride import excited
 
     vehicle = spatial_linear.linearise(vehicle_file.load_vehicle(name))
     met = road(vehicle)
-    return vehicle, met, excitation.excited(vehicle, met, SPEED)
+    return vehicle, met, excited.excited(vehicle, met, SPEED)
 
 
 def _one_track(vehicle: LinearVehicle) -> Excitation:
@@ -76,9 +76,9 @@ def _heights() -> float:
     rows = [*unit, left]
     outputs = tuple(Output(str(i), "m", "road", no, no, no, row, 0.0 * row) for i, row in enumerate(rows))
     road = two_track.excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
-    from models.ride import excitation
+    from models.ride import excited
 
-    found = stationary(excitation.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
+    found = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
     return _off(found, _covariance_of_heights())
 
 
@@ -173,9 +173,7 @@ def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
 
 def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
     """Every system changed, with its speed at hand."""
-    return attribute(
-        "models.ride.excitation:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed)
-    )
+    return attribute("models.ride.excited:excited", lambda real: lambda v, e, speed: change(real(v, e, speed), speed))
 
 
 def _reversed(real: Any) -> Any:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from models.handling import forces as at
-from models.handling.in_engines import _bodies, build
-from models.handling.kernel import reports
-from models.handling.numbers import Controls, Handling, Tyres
+from models.multibody import forces as at
+from models.multibody.kernel import reports
+from models.multibody.numbers import Controls, Handling, Tyres
+from models.systems.handling.in_engines import _bodies, build
 from models.vehicles.vehicle_file import load_vehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
@@ -106,7 +106,7 @@ def tyre(change: Callable[[np.ndarray], None], which: tuple[int, ...] = (0,)) ->
 
         return made
 
-    return attribute("models.handling.numbers:_table", table)
+    return attribute("models.multibody.numbers:_table", table)
 
 
 def times(column: int, factor: float) -> Callable[[np.ndarray], None]:

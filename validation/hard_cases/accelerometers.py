@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from models.core.signals import Sampled
 from models.engines.protocol import build
 from models.sensors.rigid_body_motion import Start, angular_acceleration, motion, quality, spin
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
-from models.signals import Sampled
-from models.simulate import outputs
+from models.systems.pitch_plane.run import outputs
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 

@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.controllers import CONTROLLERS
-from models.errors import InputError
-from models.handling.in_engines import driven
-from models.handling.scene import HandlingScene, build
-from models.hub_forces.cut_vehicle import cut
-from models.hub_forces.measurement import two_tracks
-from models.measured.counting import level_crossings
-from models.noise import normal
-from models.prescribed import smoothed
+from models.brake.controllers import CONTROLLERS
+from models.core.errors import InputError
+from models.core.noise import normal
+from models.core.signals import sampled
+from models.core.smoothing import smoothed
+from models.fatigue.counting import level_crossings
 from models.rail.wheelset import CHOSEN
 from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import integrate
-from models.signals import sampled
+from models.systems.handling.in_engines import driven
+from models.systems.handling.scene import HandlingScene, build
+from models.systems.hub_forces.measurement import two_tracks
+from models.vehicles.cut_vehicle import cut
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.braking import braking_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word

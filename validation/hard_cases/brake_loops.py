@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.braking.brake import Brake, of_wheels, torque
+from models.brake.brake import Brake, of_wheels, torque
 from validation.hard_cases.case import Case
 
 OWN = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))

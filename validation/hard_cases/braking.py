@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from models.braking.advance import AT_REST, FINE, advance
-from models.braking.brake import PAPER_FRONT, Brake, of_wheels, torque
-from models.braking.controller import AllApplied, Command, Sample
-from models.braking.endings import ENDS, ending
-from models.braking.magic_formula import surface
-from models.braking.plane_chain import inertia
-from models.braking.plane_step import BORNE, KNOWN, REPORTED, SIDE, share_out
-from models.braking.plane_vehicle import GRAVITY, PAPER, Plane, truck
-from models.braking.port.ask import checked
-from models.braking.procedures import check_engine, drive, ready
-from models.braking.quarter import Quarter, braked
-from models.braking.run import Start
-from models.braking.scene import BrakingScene, build
-from models.braking.surfaces import Road, Stretch, check_way, road
-from models.braking.trailer import CHOSEN, train
-from models.braking.tyre_table import Tables, TyreTable, stacked
+from models.brake.advance import AT_REST, FINE, advance
+from models.brake.brake import PAPER_FRONT, Brake, of_wheels, torque
+from models.brake.controller import AllApplied, Command, Sample
+from models.brake.plane_chain import inertia
+from models.brake.plane_step import BORNE, KNOWN, REPORTED, SIDE, share_out
+from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
+from models.brake.port.ask import checked
+from models.brake.quarter import Quarter, braked
+from models.brake.surfaces import Road, Stretch, check_way, road
+from models.brake.trailer import CHOSEN, train
+from models.core.errors import InputError, RunFailed
 from models.engines.braking import Carried
-from models.errors import InputError, RunFailed
+from models.systems.braking.endings import ENDS, ending
+from models.systems.braking.procedures import check_engine, drive, ready
+from models.systems.braking.run import Start
+from models.systems.braking.scene import BrakingScene, build
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braking_schemes import exact
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 
-from models.errors import InputError, RunFailed
-from validation.rows import Independence
+from models.core.errors import InputError, RunFailed
+from validation.common.rows import Independence
 
 Word = Literal["right", "refused", "raised", "SILENT"]
 WORDS: tuple[Word, ...] = get_args(Word)

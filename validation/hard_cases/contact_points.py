@@ -5,10 +5,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.assembly import Assembly
-from models.effects.contact_points import contact_points
+from models.core.signals import Sampled
+from models.engines.assembly import Assembly
 from models.engines.protocol import Trajectory
-from models.signals import Sampled
+from models.systems.pitch_plane.effects.contact_points import contact_points
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.assembly import Assembly
-from models.drift.covariance import carried
-from models.drift.tangent import Path as ErrorPath
-from models.signals import Sampled
+from models.core.signals import Sampled
+from models.engines.assembly import Assembly
+from models.systems.pitch_plane.covariance import carried
+from models.systems.pitch_plane.tangent import Path as ErrorPath
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from models.damage import damage_ratio, pseudo_damage
+from models.core.result import Result
 from models.drift.growth import drift_off_time
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
 from models.engines.protocol import Settings
-from models.result import Result
-from models.scene import Scene
-from models.simulate import simulate
+from models.fatigue.damage import damage_ratio, pseudo_damage
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene
+from validation.common.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
-from validation.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
 
 DURATION = 8.0
 TILT = 0.1

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case, Word
 

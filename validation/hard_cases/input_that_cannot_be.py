@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.axle_forces import IN_FILE, AxleForces, check
 from models.measured.signal import Signal
-from models.parameters.asymmetric_twin import PARAMETERS as TWIN
-from models.simulate import simulate
+from models.systems.pitch_plane.run import run as simulate
+from models.vehicles.parameters.asymmetric_twin import PARAMETERS as TWIN
 from models.vehicles.plausible_plane import plausible_plane
+from validation.common.scenes import road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
-from validation.scenes import road_scene
 
 PERIOD, DURATION = 1e-3, 20.0
 WHEELS = np.array([TWIN.m1, TWIN.m2]) * TWIN.g

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from models.assembly import Assembly, Mode
+from models.core.result import Result
+from models.core.signals import Sampled
+from models.engines.assembly import Assembly, Mode
 from models.engines.protocol import build
-from models.result import Result
-from models.scene import build as build_scene
-from models.signals import Sampled
-from models.simulate import outputs, simulate
+from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

@@ -9,14 +9,14 @@ from filterpy.common import van_loan_discretization
 from filterpy.kalman import ExtendedKalmanFilter
 from scipy.linalg import expm
 
-from models.drift.pitch_filter import PITCH, Measurement, estimate
-from models.drift.pitch_step import KEPT, RELATIVE, PitchStep
+from models.core.noise import PITCH_SENSOR, normal
+from models.core.signals import Sampled
+from models.core.time_series import write_time_series
 from models.engines.stability import first_order, linearised
-from models.noise import PITCH_SENSOR, normal
-from models.scene import build
-from models.signals import Sampled
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.pitch_filter import PITCH, Measurement, estimate
+from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

@@ -1,7 +1,7 @@
 """Wheels that leave the road and land: both at once, from a height, on hard tyres, at the switch, on steps and on roads
 of few samples, in the first step, in space and above a cut.
 
-The half car on a flat road has an exact path, piece by piece between the switches (``validation.bounces``). Its error
+The half car on a flat road has an exact path, piece by piece between the switches (``bounces``). Its error
 is a velocity, the coarsest of its states: a landing within a step costs the square of the step.
 """
 
@@ -13,22 +13,23 @@ from unittest import mock
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.signals import Signal
+from models.core.tables import write_table
 from models.engines import protocol
+from models.engines.assembly import Assembly
 from models.engines.spatial_protocol import INTEGRATORS
 from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
-from models.hub_forces.cut_vehicle import cut
-from models.hub_forces.measurement import truth, two_tracks
 from models.road.iso8608 import iso8608_road
 from models.road.polyline import PolylineProfile
 from models.road.signal import RoadUnderWheels
-from models.scene import build as build_scene
-from models.signals import Signal
-from models.tables import write_table
+from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
+from models.vehicles.cut_vehicle import cut
 from models.vehicles.kinematics import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
-from validation.bounces import Bounces, energy
+from validation.common.bounces import Bounces, energy
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 

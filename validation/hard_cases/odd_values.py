@@ -17,20 +17,20 @@ from models.contact.material import Pair
 from models.contact.profiles import profile
 from models.contact.standard_profiles import built_in
 from models.contact.theories import ExactOnEllipse, Fastsim
-from models.damage import pseudo_damage
+from models.core.result import Result, load
 from models.drift.growth import drift_off_time
 from models.drift.point_mass import discrete
 from models.ensemble.statistics import deviation, quantile
-from models.hub_forces.cut_vehicle import cut
-from models.hub_forces.measurement import Angles, HubForces
-from models.hub_forces.tilt_filter import estimate
-from models.result import Result, load
+from models.fatigue.damage import pseudo_damage
 from models.ride.covariance import lyapunov
-from models.ride.excitation import Excitation
 from models.ride.measures import dynamic_load_factor, share_beyond
 from models.ride.nonlinear_copies import copies_in_time
-from models.ride.of_scene import excitation_of, vehicle_of
-from models.ride.scene import build
+from models.road.excitation import Excitation
+from models.systems.hub_forces.measurement import Angles, HubForces
+from models.systems.hub_forces.tilt_filter import estimate
+from models.systems.ride.of_scene import excitation_of, vehicle_of
+from models.systems.ride.scene import build
+from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle

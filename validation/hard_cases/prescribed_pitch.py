@@ -7,11 +7,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from models.assembly import Assembly
+from models.core.signals import Sampled, Signal
 from models.engines import exudyn as exudyn_engine
+from models.engines.assembly import Assembly
 from models.engines.mujoco import _spec
 from models.engines.protocol import Trajectory
-from models.signals import Sampled, Signal
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

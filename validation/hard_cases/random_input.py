@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from models.core.noise import BLOCK, FORCES, GYRO, ROAD, normal
 from models.drift.growth import SERIES, pitch_variance
 from models.engines.protocol import build
-from models.noise import BLOCK, FORCES, GYRO, ROAD, normal
 from models.ride.covariance import stationary
-from models.ride.excitation import Excitation, excited
-from models.ride.of_scene import linear_vehicle
+from models.ride.excited import excited
 from models.ride.road_path import RoadPath, road_path
+from models.road.excitation import Excitation
 from models.road.two_track import excitation, on_track, road_of_level
 from models.sensors.inertial_unit import (
     error_rotation,
@@ -27,6 +27,7 @@ from models.sensors.inertial_unit import (
     random_walk,
 )
 from models.sensors.rotations import matrix
+from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case

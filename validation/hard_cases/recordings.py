@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.faults_of_measurement import Faults
-from models.measured.finding import Finding
 from validation.cases import measured_checks as bench
 from validation.hard_cases.case import Case
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from models.core.errors import InputError, RunFailed
 from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset
-from models.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.equations import Equations

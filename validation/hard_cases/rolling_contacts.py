@@ -19,15 +19,15 @@ from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.spatial_protocol import SpatialRun
-from models.handling import forces as at
-from models.handling.in_engines import Drive, build, driven, energy, read
-from models.handling.numbers import Handling, Tyres
+from models.multibody import forces as at
+from models.multibody.numbers import Handling, Tyres
 from models.rail import wheel_forces as wf
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULAR
 from models.rail.wheelset import CHOSEN
+from models.systems.handling.in_engines import Drive, build, driven, energy, read
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built, off

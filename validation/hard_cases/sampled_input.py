@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from models.core.errors import InputError
+from models.core.signals import SNAP, Sampled
+from models.core.time_series import write_time_series
 from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
-from models.errors import InputError
 from models.road.continuation import run_in
 from models.road.polyline import PolylineProfile
 from models.road.profile import SplineProfile
 from models.road.signal import RoadUnderWheels
-from models.scene import build as build_scene
-from models.signals import SNAP, Sampled
-from models.simulate import simulate
-from models.time_series import write_time_series
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case, Word
 

@@ -10,12 +10,13 @@ from unittest import mock
 import exudyn.itemInterface as items
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.core.signals import Sampled, Smooth, Stacked
+from models.core.time_series import write_time_series
 from models.engines import exudyn as exudyn_engine
+from models.engines.assembly import Assembly
 from models.engines.protocol import Trajectory
-from models.scene import build as build_scene
-from models.signals import Sampled, Smooth, Stacked
-from models.time_series import write_time_series
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case

@@ -7,11 +7,11 @@ import exudyn as exu
 import mujoco
 import numpy as np
 
+from models.core.signals import Sampled
 from models.engines import exudyn as exudyn_engine
 from models.engines import mujoco as mujoco_engine
 from models.engines.protocol import build
-from models.scene import build as build_scene
-from models.signals import Sampled
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from models.core.noise import normal
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.recording import Recording
-from models.measured.section_run import Hold, SectionRun, run
-from models.measured.sections import Point, Sections
 from models.measured.signal import Signal
-from models.measured.virtual import VirtualTable, virtual_measurement
-from models.noise import normal
+from models.systems.measured.section_run import Hold, SectionRun, run
+from models.systems.measured.sections import Point, Sections
+from models.systems.measured.virtual import VirtualTable, virtual_measurement
 from validation.cases.hub_forces import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from models.sensors.rotations import conjugate, integrate, logarithm, product
-from validation.scenes import data_folder
+from validation.common.scenes import data_folder
 
 FILE = "comma2k19_example_60s.npz"
 """Not part of the repository. Both frames are x forward, y right, z down; the pose turns them to the earth's."""

@@ -12,8 +12,8 @@ import numpy as np
 from mujoco import rollout
 from numba import carray, cfunc, types
 
-from models.assembly import Assembly
 from models.engines import mujoco as adapter
+from models.engines.assembly import Assembly
 from models.engines.mujoco_callback import _array_at, _double_at, _offsets, installed
 from models.engines.protocol import Settings
 

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.figures import COLOURS, plt
-from validation.price import curves
-from validation.price import runner as cost
-from validation.price.runner import Point, by_curve
+from models.advice.price import curves
+from models.advice.price import runner as cost
+from models.advice.price.runner import Point, by_curve
+from models.drawing.figures import COLOURS, plt
 from validation.price.tables import groups_of, named, quantity_of
 
 SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from models.assembly import Assembly
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
 
 AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import assemble
+from models.drawing.figures import LABELS
 from models.engines.stability import linearised
-from studies.figures import LABELS
+from models.systems.pitch_plane.assembly import assemble
+from validation.common.rows import Row, System, Table, at_most, not_run
+from validation.common.scenes import road_scene
 from validation.price import instructions_run
 from validation.price.tables import named
-from validation.rows import Row, System, Table, at_most, not_run
-from validation.scenes import road_scene
 
 SYSTEM: System = "cost"
 METHODS = {

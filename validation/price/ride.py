@@ -15,17 +15,18 @@ from unittest import mock
 import numpy as np
 from matplotlib.figure import Figure
 
+from models.machine.timing import interleave
 from models.ride.covariance import stationary
-from models.ride.excitation import Excitation, excited
+from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.linear_vehicle import LinearVehicle
 from models.ride.monte_carlo import at_constant_speed
 from models.ride.sweep import sweep
+from models.road.excitation import Excitation
 from models.road.two_track import CASES, excitation, half_track, road_of_level
+from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.rows import Row, System, Table, at_most, finding, within
-from validation.timing import interleave
+from validation.common.rows import Row, System, Table, at_most, finding, within
 
 SYSTEM: System = "cost"
 SPEED, LOWEST = 20.0, 1e-2
@@ -254,7 +255,7 @@ def table(data: dict[str, Any]) -> Table:
 
 def draw(data: dict[str, Any]) -> tuple[str, Figure]:
     """Error over milliseconds, a panel per kind of output."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     figure, axes = plt.subplots(1, len(KINDS), figsize=(11, 4.8), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}

@@ -1,11 +1,11 @@
 """Rows that every work-precision problem answers for."""
 
-from validation.price import runner as cost
-from validation.price.curves import Reach
-from validation.price.problems import Problem, Setting
-from validation.price.runner import Point
+from models.advice.price import runner as cost
+from models.advice.price.curves import Reach
+from models.advice.price.problem import Problem, Setting
+from models.advice.price.runner import Point
+from validation.common.rows import Row, System, at_most, finding, within
 from validation.price.tables import named
-from validation.rows import Row, System, at_most, finding, within
 
 SYSTEM: System = "cost"
 BANDS = {1: 0.1, 2: 0.1, 3: 0.2, 4: 0.2, 6: 0.5}

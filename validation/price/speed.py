@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.engines.assembly import Assembly
 from models.engines.protocol import Settings, build
-from models.scene import build as build_scene
+from models.machine.timing import describe, interleave, median, paired_ratio
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.compiled_forces import CompiledForces
-from validation.timing import describe, interleave, median, paired_ratio
 
 STEP = 1e-3
 

@@ -12,22 +12,22 @@ from typing import Any
 import numpy as np
 from numba import carray
 
-from models.assembly import assemble
-from models.compiled import njit
+from models.drawing.figures import LABELS
 from models.engines.contact_bridge import Wheels, forces
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.protocol import Settings
 from models.engines.reference import derivative_of
-from models.stack import at, beyond
-from studies.figures import LABELS
+from models.machine.compiled import njit
+from models.machine.stack import at, beyond
+from models.machine.timing import interleave, median
+from models.systems.pitch_plane.assembly import assemble
+from validation.common.rows import Row, System, Table, finding
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
 from validation.price.problems.road_excited import STAGES
-from validation.rows import Row, System, Table, finding
-from validation.timing import interleave, median
 
 SYSTEM: System = "cost"
 RUNS = ("empty", "cheap", "real")

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from studies.figures import LABELS
-from validation.price import runner as cost
-from validation.price.curves import HOLLOW, Reach
-from validation.price.problems import Setting
-from validation.price.runner import Loss, Point, by_curve
-from validation.rows import Table
-from validation.timing import describe
+from models.advice.price import runner as cost
+from models.advice.price.curves import HOLLOW, Reach
+from models.advice.price.problem import Setting
+from models.advice.price.runner import Loss, Point, by_curve
+from models.drawing.figures import LABELS
+from models.machine.timing import describe
+from validation.common.rows import Table
 
 
 def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from models.errors import InputError
+from models.core.errors import InputError
 from validation.report.page import write
 
 if len(sys.argv) != 2:

@@ -11,9 +11,9 @@ from itertools import groupby
 from types import ModuleType
 from typing import Any, get_args
 
+from validation.cases import CASES
+from validation.common.rows import STATUSES, Independence, System
 from validation.report.numbers import margin
-from validation.rows import STATUSES, Independence, System
-from validation.run import CASES
 
 Results = dict[str, Any]
 
@@ -122,7 +122,7 @@ def parameter_tables() -> list[dict[str, Any]]:
 
 def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
     """Parameter sets that follow the form: SOURCE and a pydantic PARAMETERS."""
-    import models.parameters as package
+    import models.vehicles.parameters as package
 
     for found in sorted(pkgutil.iter_modules(package.__path__), key=lambda item: item.name):
         module = import_module(f"{package.__name__}.{found.name}")

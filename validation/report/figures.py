@@ -13,7 +13,7 @@ LARGEST_SVG = 150_000
 
 def inline(figure: Any, caption: str, key: str) -> Markup:
     """A figure as markup that needs nothing else; ``key`` keeps its identifiers apart from other figures'."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     vector = _svg(figure, caption, key)
     picture = vector if len(vector) <= LARGEST_SVG else _png(figure, caption)

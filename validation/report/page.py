@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from models.errors import InputError
-from models.whole_files import write_whole
+from models.core.errors import InputError
+from models.core.whole_files import write_whole
+from validation.common.rows import of_saved
 from validation.report import content
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 from validation.report.shares import shares
 from validation.report.shown import shown
-from validation.rows import of_saved
 
 TEMPLATE = "page.html.jinja"
 BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}

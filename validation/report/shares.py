@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, get_args
 
-from models.errors import InputError
-from models.whole_files import write_whole
-from validation.rows import System
+from models.core.errors import InputError
+from models.core.whole_files import write_whole
+from validation.common.rows import System
 
 KEPT = Path(__file__).with_name("full_report.json")
 QUICK_SHARES = {

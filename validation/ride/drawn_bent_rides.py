@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.choice.held import Held
-from models.ride.choice.in_time import InTime, in_time
-from models.ride.scene import build
+from models.advice.ride_choice.in_time import InTime, in_time
+from models.systems.ride.reduced_scene import Held
+from models.systems.ride.scene import build
 from models.vehicles.curve import Curve
 from models.vehicles.spatial import SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from models.ride.choice.held import Held
-from models.ride.choice.reduced import Whole
+from models.advice.ride_choice.reduced import Whole
 from models.ride.covariance import FINITE, stationary
-from models.ride.scene import RideScene, build
+from models.systems.ride.reduced_scene import Held
+from models.systems.ride.scene import RideScene, build
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.ride_twins import twin

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from models.noise import normal
+from models.core.noise import normal
 from models.road.fitted import FittedRoad, fit
 from models.road.measured_tracks import MeasuredTracks, read_tracks
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import road_of_level
-from validation.rows import Row, System, Table, finding, not_run, within
-from validation.scenes import COURSE, data_folder
+from validation.common.rows import Row, System, Table, finding, not_run, within
+from validation.common.scenes import COURSE, data_folder
 
 SYSTEM: System = "ride"
 SEED = 41

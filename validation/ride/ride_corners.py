@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.ride.closed_forms import QuarterCar
-from models.ride.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 
 
 def corners(

@@ -11,7 +11,7 @@ from models.road.two_track import road_of_level
 
 def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple[str, Any]:
     """Left the spectra over the wavenumber, right the coherency of left and right; measured roads thin."""
-    from studies.figures import plt
+    from models.drawing.figures import plt
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
     isotropic = isotropic_like(road, half_track)

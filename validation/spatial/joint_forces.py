@@ -12,8 +12,8 @@ import numpy as np
 
 from models.engines.mujoco_quiet import quiet
 from models.engines.spatial_mujoco import Numbers, _spec, _weigh
-from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
-from models.measured.sections import guided
+from models.systems.measured.sections import guided
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
 
 STEP, STEPS = 3e-5, 4

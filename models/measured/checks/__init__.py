@@ -7,7 +7,7 @@ would be needed to look at it.
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 
-from models.hub_forces.cut_vehicle import CutVehicle
+from models.core.finding import Finding, Weight
 from models.measured.checks import (
     clipped,
     drift,
@@ -25,8 +25,8 @@ from models.measured.checks import (
 )
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.place import Place
-from models.measured.finding import Finding, Weight
 from models.measured.recording import Recording
+from models.vehicles.cut_vehicle import CutVehicle
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
     gaps.check,

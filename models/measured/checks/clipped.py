@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.runs import runs
-from models.measured.finding import Finding
-from models.measured.inputs import BRIDGED
+from models.measured.gaps import BRIDGED
 from models.measured.signal import UNITS, Signal
 
 NAME = "clipped"

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.checks.agreement import Agreement, Group
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT, spectra
-from models.measured.finding import Finding
 
 NAME = "drift"
 WINDOW, MOST = SEGMENT, 30

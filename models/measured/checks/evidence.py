@@ -6,7 +6,6 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
 from models.measured.checks.agreement import Agreement, Fault
 from models.measured.checks.means import mean
 from models.measured.checks.noise_floor import noise
@@ -16,6 +15,7 @@ from models.measured.checks.spectra import Spectra, spectra
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
 from models.measured.signal import Signal
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
 BAND = 1.0, 25.0

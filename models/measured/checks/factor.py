@@ -1,9 +1,9 @@
 """Sign, unit and calibration of every channel, by what it accounts for in the motion of the vehicle."""
 
+from models.core.finding import Finding, Weight
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spikes import spikes
-from models.measured.finding import Finding, Weight
 from models.measured.ratios import sentence
 
 TOLD = 0.02, 0.1

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from models.core.finding import FEW, Finding, Weight
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.runs import runs
-from models.measured.finding import FEW, Finding, Weight
-from models.measured.inputs import BRIDGED
+from models.measured.gaps import BRIDGED
 from models.measured.signal import Signal
 
 NAME = "gaps"

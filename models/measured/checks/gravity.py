@@ -1,10 +1,10 @@
 """Accelerometers at rest feel +9.81 m/s^2 upwards: whether they include gravity, their sign, unit and axes."""
 
-from models.hub_forces.cut_vehicle import GRAVITY
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.finding import Finding
 from models.measured.ratios import sentence
 from models.measured.signal import Signal
+from models.vehicles.cut_vehicle import GRAVITY
 
 NAME = "gravity"
 BIAS = 0.5

@@ -1,8 +1,8 @@
 """Moments about another point than the hub: about the contact patch, or a plane of the transducer."""
 
+from models.core.finding import Finding
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
-from models.measured.finding import Finding
 
 NAME = "lever"
 PATCH = 0.2, 0.6

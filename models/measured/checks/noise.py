@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.noise_floor import noise
-from models.measured.finding import Finding
 from models.measured.signal import UNITS, Quantity, Signal
 
 NAME = "noise"

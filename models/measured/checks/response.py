@@ -6,12 +6,12 @@ is looked at lies well above the drift of the free vehicle, so that neither its 
 
 import numpy as np
 
-from models.engines.hub_forces import HubModel, build
-from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
-from models.hub_forces.kernel import WRENCH
-from models.hub_forces.table import Drive
+from models.engines.cut_vehicle import HubModel, build
 from models.measured.checks.place import Place
 from models.measured.signal import Signal
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_table import Drive
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.kinematics import Kinematics
 
 STEP = 1e-3

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.noise_floor import noise
 from models.measured.checks.place import Place
-from models.measured.finding import Finding
 from models.measured.signal import Signal
 from models.sensors.rigid_body_motion import quality
 from models.sensors.sensor_array import SensorArray, sensor_array

@@ -1,8 +1,8 @@
 """Channels that are shifted in time against the others."""
 
+from models.core.finding import Finding
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
-from models.measured.finding import Finding
 
 NAME = "shift"
 TOLD = 3e-3

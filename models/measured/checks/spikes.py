@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.finding import Finding
 from models.measured.signal import UNITS, Signal
 
 NAME = "spikes"

@@ -1,9 +1,9 @@
 """Hubs whose channels are exchanged: left and right, front and rear, across; and two channels that are."""
 
+from models.core.finding import Finding
 from models.measured.checks.agreement import Fault
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import SEGMENT
-from models.measured.finding import Finding
 
 NAME, PAIR = "swapped", "exchanged"
 FITS = 0.3

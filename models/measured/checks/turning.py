@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import Spectra, spectra
-from models.measured.finding import Finding
 from models.measured.ratios import sentence
 from models.measured.signal import Signal
 

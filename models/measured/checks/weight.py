@@ -7,17 +7,17 @@ from functools import partial
 import numpy as np
 from scipy.linalg import null_space
 
-from models.hub_forces.cut_vehicle import GRAVITY, CutVehicle
-from models.hub_forces.kernel import WRENCH
-from models.hub_forces.rigid import rigid
+from models.core.finding import Finding
 from models.measured import axle_forces
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.means import mean
 from models.measured.checks.response import AXES
-from models.measured.finding import Finding
 from models.measured.ratios import EMPTY, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_rigid import rigid
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
 NAME = "weight"
 KNOWN = 1e-3

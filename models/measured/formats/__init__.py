@@ -6,7 +6,7 @@ from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 
-from models.errors import InputError, similar_file
+from models.core.errors import InputError, similar_file
 from models.measured.channel import Source
 from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
 from models.measured.formats.opened import Opened, notice

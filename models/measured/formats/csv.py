@@ -18,10 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from models.csv_header import Head, heading
-from models.errors import InputError
+from models.core.csv_header import Head, heading
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.tables import SECONDS
 from models.measured.channel import Channel
-from models.measured.finding import Finding
 from models.measured.formats.csv_layout import (
     TIME_UNITS,
     Remarks,
@@ -33,7 +34,6 @@ from models.measured.formats.csv_layout import (
 )
 from models.measured.formats.csv_rows import STRIDE, Layout, find_rows, narrow, numbers
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
-from models.tables import SECONDS
 
 
 @dataclass(frozen=True)

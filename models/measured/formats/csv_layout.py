@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.csv_header import (
+from models.core.csv_header import (
     MARKS,
     SEPARATORS,
     TIMED,
@@ -22,8 +22,8 @@ from models.csv_header import (
     separator_line,
     split,
 )
-from models.errors import InputError
-from models.measured.finding import Finding
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.formats.csv_rows import Layout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import notice

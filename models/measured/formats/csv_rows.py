@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.csv_header import MARKS
-from models.errors import InputError
+from models.core.csv_header import MARKS
+from models.core.errors import InputError
 from models.measured.formats.csv_times import Stamps
 
 STRIDE = 1000

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from models.measured.finding import Finding
+from models.core.finding import Finding
 from models.measured.formats.opened import notice
 
 SHOWN = 5

@@ -22,9 +22,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.finding import Finding
 from models.measured.formats.left_out import LeftOut
 from models.measured.formats.mdf4_blocks import VLSD, check_blocks
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart

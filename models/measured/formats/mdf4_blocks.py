@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.errors import InputError
-from models.measured.finding import Finding
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.formats.opened import notice
 
 HEAD, FIRST = 24, 64

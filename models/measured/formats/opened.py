@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding, Weight
 from models.measured.channel import BLOCK, Block, Channel
-from models.measured.finding import Finding, Weight
 
 Span = tuple[int, int]
 """First sample and number of samples."""

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.finding import Finding
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart, zoned
 
 BLOCK, KEY, RECORD = 512, 32, 128

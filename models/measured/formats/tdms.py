@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
+from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.finding import Finding
 from models.measured.formats.left_out import LeftOut
 from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
 

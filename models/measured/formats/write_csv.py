@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.csv_header import heading
-from models.errors import InputError
+from models.core.csv_header import heading
+from models.core.errors import InputError
 from models.measured.formats.csv_layout import is_clock
 from models.measured.formats.writing import Group, one_group
 

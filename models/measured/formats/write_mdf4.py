@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.formats.mdf4 import unheard
 from models.measured.formats.writing import Group
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.formats.rpc3 import BLOCK, KEY, RECORD
 from models.measured.formats.writing import Group, one_group
 

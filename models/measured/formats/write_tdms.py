@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.formats.writing import Group
 
 

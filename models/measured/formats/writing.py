@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.errors import InputError
-from models.whole_files import FULL
+from models.core.errors import InputError
+from models.core.whole_files import FULL
 
 
 @dataclass(frozen=True)

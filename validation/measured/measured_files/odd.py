@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from models.errors import InputError
+from models.core.errors import InputError
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import Group

@@ -14,21 +14,21 @@ from functools import cache, partial
 
 import numpy as np
 
-from models.braking.brake import PAPER_FRONT, of_wheels
-from models.braking.controller import SAMPLE, Command, Controller, Sample
-from models.braking.controllers import CONTROLLERS
-from models.braking.magic_formula import surface
-from models.braking.plane_vehicle import GRAVITY
-from models.braking.pressure import Chambers, by_valves, still
-from models.braking.quarter import Quarter, braked
-from models.braking.run import Braked
-from models.braking.surfaces import Stretch, road
-from models.braking.tyre_table import stacked
-from models.compiled import njit
-from models.errors import RunFailed
+from models.advice.price.problem import Setting
+from models.brake.brake import PAPER_FRONT, of_wheels
+from models.brake.controller import SAMPLE, Command, Controller, Sample
+from models.brake.controllers import CONTROLLERS
+from models.brake.plane_vehicle import GRAVITY
+from models.brake.pressure import Chambers, by_valves, still
+from models.brake.quarter import Quarter, braked
+from models.brake.surfaces import Stretch, road
+from models.core.errors import RunFailed
+from models.machine.compiled import njit
+from models.systems.braking.run import Braked
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import stacked
 from validation.braking.braking_schemes import advanced
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
-from validation.price.problems import Setting
 
 VEHICLE = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""

@@ -11,10 +11,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from models.contact.work_precision import WAYS, Case, Way
+from models.advice.price.problem import Setting
+from models.systems.contact.work_precision import WAYS, Case, Way
 from studies.contact import doubted
 from validation.contact.contact_set import read
-from validation.price.problems import Setting
 
 EVERY = 23
 """Every so many contacts of the set stand for all: they go through its ratios of axes, kinds and sizes of creepage."""

@@ -11,11 +11,12 @@ from functools import cache
 
 import numpy as np
 
-from models.assembly import Assembly, assemble
+from models.advice.price.problem import Setting
+from models.core.signals import Sampled
+from models.engines.assembly import Assembly
 from models.engines.protocol import Model, Settings, Trajectory, build
-from models.signals import Sampled
-from models.simulate import simulate
-from validation.price.problems import Setting
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
 from validation.price.problems.road_excited import SPEED, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0

@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
+from models.advice.price.problem import Setting
 from models.sensors.rotations import Rule, conjugate, from_cardan, integrate, logarithm, product
-from validation.price.problems import Setting
 from validation.price.problems.road_excited import STAGES
 from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
 

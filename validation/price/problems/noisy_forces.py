@@ -9,11 +9,11 @@ from functools import cache
 
 import numpy as np
 
-from models.assembly import Assembly
+from models.core.noise import normal
+from models.core.signals import Sampled
+from models.engines.assembly import Assembly
 from models.engines.protocol import Trajectory
-from models.noise import normal
-from models.signals import Sampled
-from models.simulate import outputs
+from models.systems.pitch_plane.run import outputs
 from validation.price.problems import force_excited
 from validation.price.problems.force_excited import PERIOD, ForceExcited
 

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
-from models.assembly import Assembly, assemble
+from models.advice.price.pitch_plane import engine_settings
+from models.advice.price.problem import Setting
+from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Model, Settings, Trajectory, build
 from models.engines.reference import derivative_of
-from models.scene import build as build_scene
-from validation.price.problems import Setting
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import build as build_scene
 
 DURATION, SPEED = 2.0, 20.0
 GRID = 1.25e-4
 """Spacing (s) of the stored reference; every fixed step is a multiple of it."""
-ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
-"""Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
 STAGES = {
     "RK44": 4,
     "RK67": 7,
@@ -38,7 +38,6 @@ STAGES = {
     "discrete": 1,
 }
 """Force evaluations per step, from the methods' tableaux. Newton iterations are not fixed."""
-RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
 """What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
 
@@ -103,11 +102,7 @@ def scene(duration: float = DURATION):
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
     """A setting as the engines take it."""
-    integrator = setting.method.split()[0]
-    radius = RADII.get(setting.method, 0.6)
-    if setting.adaptive:
-        return Settings(integrator, ADAPTIVE_STEP[setting.engine], duration, setting.value, radius)
-    return Settings(integrator, setting.value, duration, spectral_radius=radius)
+    return engine_settings(setting, duration)
 
 
 def setting(engine: str, method: str, value: float) -> Setting:

@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn import counted
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import quiet
-from models.errors import Refused, RunFailed
 from models.sensors.rotations import from_matrix, logarithm, product
 
 items: Any = typed_items

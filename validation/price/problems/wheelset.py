@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from models.compiled import njit
+from models.advice.price.problem import Setting
 from models.contact.inputs import Array
+from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import MISSING
 from models.engines.contact_bridge import FREEDOMS, Wheels, Y, add_forces, check_step, forces, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
@@ -25,10 +26,9 @@ from models.engines.contact_bridge_mujoco import Marcher, model, native_law
 from models.engines.exudyn import counted
 from models.engines.mujoco_callback import installed
 from models.engines.stability import LONG_RUN, limit
-from models.errors import Refused, RunFailed
-from models.stack import start
+from models.machine.compiled import njit
+from models.machine.stack import start
 from validation.price.force_calls import AT_START
-from validation.price.problems import Setting
 from validation.price.problems.road_excited import STAGES, setting
 
 DURATION = 0.1

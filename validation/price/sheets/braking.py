@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from models.braking.brake import PAPER_FRONT
-from models.braking.controller import SAMPLE
-from models.braking.plane_vehicle import GRAVITY
+from models.brake.brake import PAPER_FRONT
+from models.brake.controller import SAMPLE
+from models.brake.plane_vehicle import GRAVITY
 from validation.braking.sampled_quarter import EMPTY, FILL, SLOWEST, SUPPLY
 from validation.price.problems import braking_stop
 from validation.price.problems.braking_stop import CHANGE, SPEED, SURFACES, VEHICLE

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.braking.controller import Command
+from models.brake.controller import Command
 
 
 class Releases:

@@ -1,0 +1,141 @@
+"""What a run of any scene answered, as numbers that two runs can be compared by, and what it cost."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.special import stdtrit
+
+from models.core.errors import InputError
+
+Cases = tuple[np.ndarray, ...]
+"""One quantity in every case of a scene (procedure, manoeuvre, speed, creepage): its path (n,), or one number (1,)."""
+HARDLY = 1e-3
+"""Of the largest case: changes of a smaller one are relative to this share."""
+ROUNDING, NOTHING = 1e-10, 1e-15
+"""Of the largest value in a unit, and in SI units: what moves less does not move at all, but for rounding."""
+SCALARS = {"rms": lambda path: np.sqrt(np.mean(path**2)), "max": lambda path: np.abs(path).max()}
+"""Words that make a number of a path, as in "rms f1"."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Its unit and its values in every case.
+
+    sampled : cases are mean squares (m,) of samples that know nothing of each other; it is the root of their mean.
+    """
+
+    unit: str
+    cases: Cases
+    sampled: bool = False
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """What its changes are relative to, case by case."""
+        return np.sqrt([case.mean() for case in self.cases]) if self.sampled else sizes(self.cases)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Quantities by name; CPU seconds of the march alone; counts, which repeat: "steps", "calls" of the right-hand
+    side, "states", and "terms", where a call goes through any beside them (cells of contact nets, waves of roads)."""
+
+    quantities: dict[str, Quantity]
+    counts: dict[str, int]
+    seconds: float = field(compare=False)
+
+    def of(self, name: str, file: str = "") -> Quantity:
+        """A quantity, or "rms" or "max" of one; InputError for what there is not."""
+        word, _, rest = name.partition(" ")
+        path = self.quantities.get(rest)
+        if name not in self.quantities and word in SCALARS and path is not None and not path.sampled:
+            return Quantity(path.unit, tuple(np.array([SCALARS[word](one)]) for one in path.cases))
+        if name not in self.quantities:
+            raise InputError(
+                file,
+                "quantities",
+                name,
+                "no such quantity in this scene, whose own are, each also with "
+                "'rms' or 'max' before it if it is a path",
+                tuple(self.quantities),
+            )
+        return self.quantities[name]
+
+
+def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
+    """What changes are relative to, case by case: the standard deviation of a path, the magnitude of a number.
+
+    A case that hardly moves beside the others is held to what it is of them.
+    """
+    own = np.array([np.std(one) if len(one) > 1 else abs(float(one[0])) for one in full])
+    return np.maximum(own, HARDLY * own.max(initial=0.0))
+
+
+def rounding(answer: Answer, unit: str) -> float:
+    """Size up to which a quantity of a unit does not move, but for rounding."""
+    alike = [
+        np.sqrt(case.max()) if one.sampled else abs(case).max(initial=0.0)
+        for one in answer.quantities.values()
+        if one.unit == unit
+        for case in one.cases
+    ]
+    return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
+
+
+SURE = 0.9985
+"""Probability that chance adds no more to either side than is said of it."""
+
+
+def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
+    """Largest relative change of a sampled quantity, and what chance may add to it, where that is largest.
+
+    The ratio of two means over m samples that met the same roads, and its standard error by what each sample differs
+    from it, times Student's t for m - 1.
+    """
+    worst = 0.0, 0.0
+    for moved, own in zip(change, full, strict=True):
+        ratio = 1.0 + moved.mean() / own.mean()
+        if not ratio > 0.0:  # nothing is left, or no mean square at all
+            return (1.0, 0.0) if not (moved + own).any() else (np.inf, np.inf)
+        rest, m = moved - (ratio - 1.0) * own, len(own)
+        error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * own.mean()) / (2.0 * np.sqrt(ratio))
+        worst = max(worst, (float(abs(np.sqrt(ratio) - 1.0)), float(error)), key=sum)
+    return worst
+
+
+def less(one: Cases, full: Cases) -> Cases:
+    """Differences of two runs at the times that both have: the longer step's, every so many of the shorter one's.
+
+    Raises InputError where the runs have no common times, as those that end by themselves.
+    """
+    found = []
+    for a, b in zip(one, full, strict=True):
+        few, many = sorted((len(a), len(b)))
+        if few != many and (few < 2 or (many - 1) % (few - 1)):
+            raise InputError(
+                "",
+                "quantities",
+                None,
+                "paths of runs that end by themselves cannot be compared: ask for "
+                "'rms' or 'max' of them, or for another number",
+            )
+        every = [(len(path) - 1) // max(few - 1, 1) or 1 for path in (a, b)]
+        found.append(a[:: every[0]] - b[:: every[1]])
+    return tuple(found)
+
+
+def added(*changes: Cases) -> Cases:
+    """Sum of differences, at the times that all have."""
+    found = []
+    for parts in zip(*changes, strict=True):
+        few = min(map(len, parts))
+        found.append(np.sum([part[:: (len(part) - 1) // max(few - 1, 1) or 1] for part in parts], axis=0))
+    return tuple(found)
+
+
+def relative(change: Cases, size: np.ndarray) -> float:
+    """Largest relative change of all cases: rms of a path's difference, or a number's, by its size."""
+    moved = np.array([float(np.sqrt(np.mean(one**2))) for one in change])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(size > 0.0, moved / size, np.where(moved > 0.0, np.inf, 0.0))
+    return float(share.max()) if np.isfinite(moved).all() else np.inf

@@ -1,0 +1,314 @@
+"""Which effects a scene's quantities can do without, and how long its steps may be: screened, chosen, confirmed.
+
+Screened are cheap runs: with steps as much longer as costs a small share of the tolerance over the first part of the
+scene; without single effects, and without pairs. Of all that the screen keeps within the tolerance, the next to go is
+the effect, or the pair where no single one will do, that saves most (logarithm of work at the longest step that is then
+allowed) for what it adds to the error. Work is counted and not timed, so that the choice repeats on any machine. What
+is left is run over the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become
+shorter; if that does not help, the step of the path that breaks it is found by halving and taken back for good, and the
+choice goes on without it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
+
+Where quantities are means of samples that are alike, few samples find the set, and all of them tell what it changes.
+The search ends where it has taken as many calls as so many runs of the scene: what it has found by then is confirmed,
+and larger sets were not tried.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from models.advice.choice.answer import added
+from models.advice.choice.screen import Screen
+from models.advice.choice.variants import Set, Variants
+from models.core.errors import InputError
+
+BUDGET = 0.8
+"""Share of the tolerance that predictions may use."""
+FINE = 0.05
+"""Share of the tolerance that the steps of screened runs may cost."""
+ROUGH = 0.15
+"""The same where samples are compared that met the same roads: what a step costs is in both of them."""
+SHARPER = 8
+"""Steps so many times as short tell what the longest ones cost."""
+WINDOW = 0.25
+"""Share of a run by which these steps are chosen."""
+LEAST = 1e-3
+"""Share of the tolerance below which an error counts as none."""
+SHORTER = 2
+"""Times that steps become shorter where a confirmation fails, before effects are taken back."""
+ROUNDS = 30
+"""Sets that are confirmed at most."""
+RUNS = 100
+"""Runs of the scene, by their calls, that the search may take."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Effects ``left_out`` of all ``candidates``, and steps so many ``times`` as long; relative changes (quantities,).
+
+    predicted : by the screen; remainder : what that leaves out, estimated; confirmed : over the whole run; chance : may
+    add so much to that, where quantities are means of samples; kept : each sum of both is within the tolerance. calls
+    and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
+    scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
+    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried.
+    """
+
+    candidates: tuple[str, ...]
+    left_out: tuple[str, ...]
+    times: int
+    predicted: np.ndarray
+    remainder: np.ndarray
+    confirmed: np.ndarray
+    chance: np.ndarray
+    kept: bool
+    calls: tuple[int, ...]
+    seconds: tuple[float, ...]
+    rounds: int
+    spent: int
+    more: float
+    ended: bool = False
+
+
+class Chooser:
+    """A scene's effects in one implementation, for quantities (see ``models.advice.choice.answer``) and a tolerance.
+
+    progress(share) is told the share that is spent of the runs that the search may take."""
+
+    def __init__(
+        self,
+        scene: Any,
+        engine: str,
+        quantities: list[str],
+        tolerance: float,
+        window: float = WINDOW,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        self.tolerance, self.progress = tolerance, progress
+        self.whole = Screen(Variants(scene, engine), quantities)
+        self.alike = self.whole.sampled == set(quantities)
+        part = self._part(window)
+        self.own, self.error = self._steps(part)
+        self.teller = self._coarse(self.whole)
+        self.screen = self._coarse(part) if self.alike else self.teller
+        self.lengths = [self.own * k for k in self.screen.variants.lengths()]
+        self.effects = self.whole.variants.effects
+        self._reach: dict[Set, int] = {}
+        self._confirmed: dict[Set, tuple[int, np.ndarray, np.ndarray]] = {}
+        self._pairs: list[Set] | None = None
+        self.rounds, self._doubtful, self.ended = 0, list[float](), False
+
+    def _part(self, window: float) -> Screen:
+        """The first part of the scene, or few of its samples."""
+        whole = self.whole.variants
+        steps = math.ceil(window * whole.system.steps(whole.scene))
+        part = whole.window(steps) if whole.system.WINDOWED else whole
+        return self.whole if part is whole else Screen(part, self.whole.quantities)
+
+    def _coarse(self, screen: Screen) -> Screen:
+        """In the steps of the screen."""
+        runs = screen.variants
+        coarse = Variants(runs.changed(frozenset(), self.own), runs.engine)
+        return screen if self.own == 1 else Screen(coarse, screen.quantities)
+
+    def _steps(self, part: Screen) -> tuple[int, np.ndarray]:
+        """Longest steps for the screen, by the scene's own, and the relative changes (quantities,) by them."""
+        whole = self.whole.variants
+        lengths = [k for k in whole.lengths() if k in part.variants.lengths()]
+        allowed = (ROUGH if self.alike else FINE) * self.tolerance
+        longest, error = self._longest(part, frozenset(), lengths, allowed)
+        while whole.of(times=longest) is None:  # its run fails after that part
+            longest = max(k for k in lengths if k < longest)
+        return longest, error
+
+    def _longest(self, screen: Screen, chosen: Set, lengths: list[int], allowed: float) -> tuple[int, np.ndarray]:
+        """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""
+        low, high, found = 0, len(lengths), np.zeros(len(screen.quantities))
+        while high - low > 1:
+            middle = (low + high) // 2
+            tried = screen.of_step(chosen, lengths[middle] // lengths[0])
+            low, high, found = (middle, high, tried) if (tried <= allowed).all() else (low, middle, found)
+        return lengths[low], found
+
+    def share(self, chosen: Set) -> float:
+        """Largest predicted change, with what may be left out of it, by the tolerance."""
+        error = self.error + self.screen.predicted(chosen) + self.screen.remainder(chosen)
+        return float(np.max(error)) / self.tolerance
+
+    def reach(self, chosen: Set) -> int:
+        """Longest step, by the scene's own, that the predictions allow without these effects."""
+        if chosen not in self._reach:
+            left = max(0.0, BUDGET - self.share(chosen)) * self.tolerance
+            self._reach[chosen], _ = self._longest(self.screen, chosen, self.lengths, left)
+        return self._reach[chosen]
+
+    def work(self, chosen: Set) -> float:
+        """Of a run without these effects, at the longest step; infinite if it fails."""
+        return self.screen.variants.work(chosen, self.reach(chosen) // self.own)
+
+    def confirm(self, chosen: Set) -> np.ndarray:
+        """Relative changes (quantities,) over the whole run, at the longest step that holds or nearly so; what chance
+        may add is added."""
+        if chosen not in self._confirmed:
+            longest = self.reach(chosen)
+            for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
+                self.rounds += 1
+                change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
+                found, chance = self.whole.shares(change), self.whole.chance(change)
+                self._confirmed[chosen] = times, found, chance
+                if self.holds(found + chance):
+                    break
+                if (found < self.tolerance).all():
+                    self._doubtful.append(float(np.max(chance / (self.tolerance - found)) ** 2))
+        return self._sum(chosen)
+
+    def _sum(self, chosen: Set) -> np.ndarray:
+        _, found, chance = self._confirmed[chosen]
+        return found + chance
+
+    def holds(self, changes: np.ndarray) -> bool:
+        """Whether all changes are within the tolerance."""
+        return bool((changes <= self.tolerance).all())
+
+    def better(self, further: Set, kept: Set) -> bool:
+        """Whether it holds to leave these out, and takes less work than what is kept does at the steps that hold."""
+        if not self.holds(self.confirm(further)):
+            return False
+        work = [self.whole.variants.work(one, self._confirmed[one][0]) for one in (further, kept)]
+        return work[0] < work[1]
+
+    def choose(self) -> Choice:
+        """The greedy choice, confirmed."""
+        none: Set = frozenset()
+        if not self.holds(self.confirm(none)):
+            self._confirmed[none] = 1, *np.zeros((2, len(self.whole.quantities)))
+        kept, banned = [none], set[Set]()
+        while self.rounds < ROUNDS and not self.ended:
+            path = self.path(kept, banned)
+            if path == kept:
+                break
+            if self.better(path[-1], kept[-1]):
+                kept = path
+                continue
+            low, high = len(kept) - 1, len(path) - 1  # path[low] is kept, path[high] is not
+            while high - low > 1:
+                middle = (low + high) // 2
+                low, high = (middle, high) if self.better(path[middle], kept[-1]) else (low, middle)
+            banned.add(path[high] - path[low])
+            kept = path[: low + 1]
+        return self._sure(self._choice(kept[-1]))
+
+    def _sure(self, choice: Choice) -> Choice:
+        """The choice; InputError where nothing was found by which it could be better, for chance alone."""
+        if not choice.more or choice.left_out or choice.times > 1:
+            return choice
+        raise InputError(
+            self.whole.variants.scene.file,
+            "tolerance",
+            self.tolerance,
+            "is too fine for so few samples: "
+            "what could go changes the quantities by less, but by chance it may be more; about "
+            f"{choice.more:.2g} times as many samples would tell",
+        )
+
+    def _choice(self, chosen: Set) -> Choice:
+        times, found, chance = self._confirmed[chosen]
+        whole = self.whole.variants
+        shown = [(frozenset[str](), 1), (frozenset[str](), self._confirmed[frozenset()][0]), (chosen, times)]
+        runs = [run for key in shown if (run := whole.of(*key)) is not None]
+        seconds = [
+            run.counts["calls"] * self.screen.variants.per_call(left_out)
+            for run, (left_out, _) in zip(runs, shown, strict=True)
+        ]
+        calls = [run.counts["calls"] for run in runs]
+        told, rest = self.told(chosen, times), self.teller.remainder(chosen)
+        return Choice(
+            self.effects,
+            tuple(sorted(chosen)),
+            times,
+            told,
+            rest,
+            found,
+            chance,
+            self.holds(found + chance),
+            tuple(calls),
+            tuple(seconds),
+            self.rounds,
+            self._spent(),
+            min(self._doubtful, default=0.0),
+            self.ended,
+        )
+
+    def _spent(self) -> int:
+        """Calls of all runs so far."""
+        return sum({id(one): one.variants.calls for one in (self.whole, self.teller, self.screen)}.values())
+
+    def _exhausted(self) -> bool:
+        """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
+        own = self.whole.variants.of()
+        share = self._spent() / (RUNS * own.counts["calls"]) if own else 1.0
+        self.ended = self.ended or share >= 1.0
+        self.progress(min(share, 1.0))
+        return self.ended
+
+    def told(self, chosen: Set, times: int) -> np.ndarray:
+        """Predicted changes (quantities,) of a set and a step together: that of the step by a shorter one."""
+        screen, runs = self.teller, self.whole.variants
+        change = screen.change(chosen) if chosen else None
+        if times == 1:
+            return screen.predicted(chosen)
+        shorter = [k for k in reversed(runs.lengths()) if times % k == 0 and (SHARPER * k <= times or k == 1)]
+        step = screen.between(runs.of(chosen, times), next(filter(None, (runs.of(chosen, k) for k in shorter)), None))
+        if change is None or step is None or times % self.own:
+            return screen.predicted(chosen) + screen.shares(step)
+        return screen.shares({name: added(change[name], step[name]) for name in screen.quantities})
+
+    def further(self, chosen: Set) -> dict[str, float]:
+        """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
+
+        Only those that may go, and whose going would save anything at the same step."""
+        found, times = {}, self.reach(chosen) // self.own
+        for effect in self.effects:
+            further = chosen | {effect}
+            if effect not in chosen and self.screen.variants.work(further, times) < self.work(chosen):
+                found[effect] = self.share(further) * self.tolerance
+        return {effect: change for effect, change in found.items() if math.isfinite(change)}
+
+    def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
+        """The path that goes on from a kept one, step by step, as far as predictions allow."""
+        path = list(kept)
+        while True:
+            step = self._next(path[-1], banned, [frozenset([one]) for one in self.effects])
+            step = step or self._next(path[-1], banned, self._promising())
+            if not step:
+                return path
+            path.append(path[-1] | step)
+
+    def _promising(self) -> list[Set]:
+        """Pairs of which at least one breaks the budget alone, while both together hold it."""
+        if self._pairs is None:
+            alone = {one: self.share(frozenset([one])) for one in self.effects}
+            pairs = [pair for pair in combinations(self.effects, 2) if max(alone[one] for one in pair) > BUDGET]
+            pairs.sort(key=lambda pair: sum(alone[one] for one in pair))
+            self._pairs = [
+                frozenset(pair) for pair in pairs if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET
+            ]
+        return self._pairs
+
+    def _next(self, chosen: Set, banned: set[Set], steps: list[Set]) -> Set:
+        """The step that saves most for what it adds to the predicted error; empty where none is within the budget."""
+        best, most = frozenset[str](), 0.0
+        now, work = self.share(chosen), self.work(chosen)
+        for step in steps:
+            further = chosen | step
+            if further == chosen or step - chosen in banned or step in banned or self._exhausted():
+                continue
+            share = self.share(further)
+            saved = math.log(work / self.work(further)) if share <= BUDGET else 0.0
+            score = saved / max(share - now, LEAST) if saved > 0.0 else 0.0
+            if score > most:
+                best, most = step - chosen, score
+        return best

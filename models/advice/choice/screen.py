@@ -1,0 +1,140 @@
+"""What leaving effects out changes, predicted from runs without one and without two of them.
+
+With y(S) the quantities' paths without the effects S, to the second order
+
+    y(S) - y() = sum of d_i + sum of e_ij,    d_i = y(i) - y(),    e_ij = y(ij) - y(i) - y(j) + y(),
+
+over the effects of S and their pairs. What is left out of that is estimated by taking the next order to lie to the
+second as the second does to the first.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from models.advice.choice.answer import Answer, Cases, added, by_chance, less, relative, rounding
+from models.advice.choice.variants import Set, Variants
+from models.core.errors import InputError
+
+FEW = 1 / 3
+"""Share of a sampled quantity's mean square that one sample may have."""
+
+
+class Screen:
+    """Predictions for quantities, by runs of ``variants``; InputError for a quantity that does not move at all."""
+
+    def __init__(self, variants: Variants, quantities: list[str]) -> None:
+        self.variants, self.quantities = variants, quantities
+        full = variants.of()
+        if full is None:  # tells why
+            full = variants.system.answer(variants.scene, variants.engine)
+        found = {name: full.of(name, variants.scene.file) for name in quantities}
+        self.full = {name: one.cases for name, one in found.items()}
+        self.sizes = {name: one.sizes for name, one in found.items()}
+        self.sampled = {name for name, one in found.items() if one.sampled}
+        for name, size in self.sizes.items():
+            if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
+                raise InputError(
+                    variants.scene.file,
+                    f"quantities.{name}",
+                    None,
+                    "does not move in this scene, so that there is nothing to hold it to",
+                )
+        for name in self.sampled:
+            self._check_samples(name)
+
+    def _check_samples(self, name: str) -> None:
+        """Refuse a quantity that few of its samples make up: no error could be told of it."""
+        share = max(float(case.max() / case.sum()) for case in self.full[name])
+        if share > FEW:
+            m = len(self.full[name][0])
+            raise InputError(
+                self.variants.scene.file,
+                f"quantities.{name}",
+                None,
+                f"is made up to {100 * share:.0f} % "
+                f"by one sample of {m}, so that chance decides: ask for more or longer ones",
+            )
+
+    def between(self, one: Answer | None, other: Answer | None) -> dict[str, Cases] | None:
+        """Differences of two runs, quantity by quantity; None where one of them is missing."""
+        if one is None or other is None:
+            return None
+        try:
+            return {name: less(one.of(name).cases, other.of(name).cases) for name in self.quantities}
+        except InputError as error:
+            if "rms" in error.allowed and "ends" not in error.allowed:
+                return None  # what is left has no such quantity
+            raise
+
+    def shares(self, change: dict[str, Cases] | None) -> np.ndarray:
+        """Relative changes (quantities,); infinite where there is none."""
+        if change is None:
+            return np.full(len(self.quantities), np.inf)
+        return np.array(
+            [
+                by_chance(change[name], self.full[name])[0]
+                if name in self.sampled
+                else relative(change[name], self.sizes[name])
+                for name in self.quantities
+            ]
+        )
+
+    def chance(self, change: dict[str, Cases] | None) -> np.ndarray:
+        """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
+        if change is None:
+            return np.zeros(len(self.quantities))
+        return np.array(
+            [by_chance(change[name], self.full[name])[1] if name in self.sampled else 0.0 for name in self.quantities]
+        )
+
+    def alone(self, effect: str) -> dict[str, Cases] | None:
+        """d of an effect."""
+        return self.between(self.variants.of([effect]), self.variants.of())
+
+    def pair(self, one: str, two: str) -> dict[str, Cases] | None:
+        """d of two effects that are left out together."""
+        return self.between(self.variants.of([one, two]), self.variants.of())
+
+    def second(self, one: str, two: str) -> dict[str, Cases] | None:
+        """e of a pair."""
+        parts = self.pair(one, two), self.alone(one), self.alone(two)
+        if any(part is None for part in parts):
+            return None
+        both, first, other = parts
+        assert both is not None and first is not None and other is not None
+        return {name: added(both[name], _minus(first[name]), _minus(other[name])) for name in self.quantities}
+
+    def change(self, chosen: Set) -> dict[str, Cases] | None:
+        """Predicted differences of a set; None where they cannot be told."""
+        if len(chosen) <= 2:
+            return self.between(self.variants.of(chosen), self.variants.of())
+        parts = [*map(self.alone, chosen), *(self.second(*pair) for pair in combinations(sorted(chosen), 2))]
+        if any(part is None for part in parts):
+            return self.between(self.variants.of(chosen), self.variants.of())
+        return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
+
+    def predicted(self, chosen: Set) -> np.ndarray:
+        """Relative changes (quantities,) of a set, without the remainder."""
+        return self.shares(self.change(chosen)) if chosen else np.zeros(len(self.quantities))
+
+    def remainder(self, chosen: Set) -> np.ndarray:
+        """What third and higher orders may add (quantities,): the second, by as much as it lies below the first."""
+        none = np.zeros(len(self.quantities))
+        if len(chosen) <= 2:
+            return none
+        first = np.sum([self.shares(self.alone(one)) for one in chosen], axis=0)
+        second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(chosen), 2)], axis=0)
+        if not (np.isfinite(first).all() and np.isfinite(second).all()):
+            return none  # the set was run itself
+        return second * np.minimum(1.0, second / np.maximum(first, 1e-300))
+
+    def of_step(self, chosen: Set, times: int) -> np.ndarray:
+        """Relative changes (quantities,) by longer steps alone, without these effects."""
+        if times == 1:
+            return np.zeros(len(self.quantities))
+        return self.shares(self.between(self.variants.of(chosen, times), self.variants.of(chosen)))
+
+
+def _minus(cases: Cases) -> Cases:
+    return tuple(-one for one in cases)

@@ -1,0 +1,61 @@
+"""Braking: quantities are the numbers of a stop and of its wheels, a case per procedure."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.advice.choice.answer import Answer, Quantity
+from models.core.errors import RunFailed
+from models.systems.braking.procedures import drive, engines_of
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import Stop
+
+ENGINE, WINDOWED = "reference", False
+
+
+def answer(scene: BrakingScene, engine: str) -> Answer:
+    """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
+    found, samples, states, seconds = dict[str, list[np.ndarray]](), 0, 0, 0.0
+    (engine,) = engines_of(scene, (engine,)) or (engine,)
+    for name in scene.procedures:
+        begun = time.process_time()
+        path = drive(scene, name, engine)
+        seconds += time.process_time() - begun
+        if len(path.times) < 3:
+            raise RunFailed("braking", f"{name} ends before it has begun", float(path.times[-1]))
+        stop = Stop(path)
+        for key, value in {**stop.of_vehicle(), **stop.of_wheels()}.items():
+            found.setdefault(key, []).extend(np.atleast_1d(np.asarray(value, float))[:, None])
+        samples += len(path.times) - 1
+        states = path.states[0].size + path.turning.shape[1] + (scene.pressure is not None) * path.pressures.shape[1]
+    steps = samples * scene.run.substeps
+    return Answer(
+        {name: _quantity(name, cases) for name, cases in found.items() if np.isfinite(cases).all()},
+        {"steps": steps, "calls": steps, "states": states},
+        seconds,
+    )
+
+
+def _quantity(name: str, cases: list[np.ndarray]) -> Quantity:
+    return Quantity(name.partition("[")[2].rstrip("]"), tuple(cases))
+
+
+def steps(scene: BrakingScene) -> int:
+    """Of a procedure, if it lasts as long as it may."""
+    return round(scene.run.duration / scene.run.sample) * scene.run.substeps
+
+
+def parts(scene: BrakingScene) -> int:
+    """Steps within a sample, which alone may be longer: the controller's samples stay."""
+    return scene.run.substeps
+
+
+def shorten(table: dict[str, Any], scene: BrakingScene, steps: int) -> None:
+    """Every procedure's first samples."""
+    table.setdefault("run", {})["duration"] = max(2, steps // scene.run.substeps) * scene.run.sample
+
+
+def coarsen(table: dict[str, Any], scene: BrakingScene, times: int) -> None:
+    """Fewer steps within a sample."""
+    table.setdefault("run", {})["substeps"] = scene.run.substeps // times

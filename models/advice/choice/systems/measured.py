@@ -1,0 +1,84 @@
+"""A recording of a vehicle in space: quantities are its answers at all sections, held as the scene says."""
+
+import math
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from models.advice.choice.answer import Answer, Quantity
+from models.core.errors import InputError
+from models.systems.measured.clock import LEAST
+from models.systems.measured.hold_of import hold_of
+from models.systems.measured.of_scene import recorded
+from models.systems.measured.scene import MeasuredScene
+from models.systems.measured.section_run import SectionRun
+from models.systems.measured.section_run import run as march
+from models.systems.measured.sections import Sections
+
+ENGINE, WINDOWED = "mujoco", True
+FINE = 60
+"""Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
+
+
+def answer(scene: MeasuredScene, engine: str) -> Answer:
+    """Record, and march; the seconds are those of the march."""
+    vehicle = scene.rig().vehicle
+    if vehicle is None:
+        raise InputError(
+            scene.file,
+            "vehicle.parameters",
+            scene.vehicle.parameters,
+            "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file",
+        )
+    with tempfile.TemporaryDirectory() as name:
+        recording = recorded(scene, engine, Path(name))
+        job = SectionRun(
+            vehicle, recording, Sections(vehicle), engine, hold_of(scene, recording), scene.run.step, scene.file
+        )
+        begun = time.process_time()
+        run = march(job, Path(name) / "run")
+        seconds = time.process_time() - begun
+        found = {own.name: Quantity(own.unit, (run.samples(own).copy(),)) for own in run.answers}
+    count = (job.count - 1) * job.grid.every
+    return Answer(found, {"steps": count, "calls": 4 * count, "states": 2 * vehicle.size}, seconds)
+
+
+def steps(scene: MeasuredScene) -> int:
+    """Steps of a run."""
+    return round(_clock(scene)[1] / _step(scene))
+
+
+parts = steps
+
+
+def _step(scene: MeasuredScene) -> float:
+    """s."""
+    return scene.run.step or _clock(scene)[0]
+
+
+def _clock(scene: MeasuredScene) -> tuple[float, float]:
+    """Period and duration (s) of the recording; that of a virtual measurement is known without a run."""
+    if scene.virtual is not None:
+        whole = scene.virtual.duration - scene.clock.start
+        return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(whole, scene.clock.duration or whole)
+    with tempfile.TemporaryDirectory() as name:
+        recording = recorded(scene, ENGINE, Path(name))
+        return recording.period, recording.duration
+
+
+def shorten(table: dict[str, Any], scene: MeasuredScene, few: int) -> None:
+    """So many steps of the recording, or as many as a recording must have; a virtual measurement ends there, too."""
+    period, whole = _clock(scene)
+    least = FINE * math.ceil(LEAST * period / (_step(scene) * FINE))
+    duration = min(max(few, least) * _step(scene), whole)
+    if scene.virtual is None:
+        table.setdefault("clock", {})["duration"] = duration
+    else:
+        table["virtual"]["duration"] = scene.clock.start + duration
+        table.get("clock", {}).pop("duration", None)
+
+
+def coarsen(table: dict[str, Any], scene: MeasuredScene, times: int) -> None:
+    """Steps so many times as long."""
+    table.setdefault("run", {})["step"] = times * _step(scene)

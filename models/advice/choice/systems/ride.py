@@ -1,0 +1,56 @@
+"""Ride with bent springs: quantities are the deviations of outputs, a case per speed, told by copies in time."""
+
+import time
+from math import gcd
+
+import numpy as np
+
+from models.advice.choice.answer import Answer, Quantity
+from models.advice.ride_choice.in_time import UNIT, InTime, in_time
+from models.core.errors import InputError
+from models.engines.spatial_protocol import curves
+from models.systems.ride.of_scene import told_by, vehicle_of
+from models.systems.ride.reduced_scene import Held
+from models.systems.ride.scene import RideScene
+
+ENGINE, WINDOWED = "reference", True
+
+
+def opened(scene: RideScene | InTime) -> InTime:
+    """The scene as it is run in time, which knows its effects and how it is shortened and taken in longer steps."""
+    if isinstance(scene, InTime):
+        return scene
+    with told_by(scene):
+        return in_time(Held(scene, vehicle_of(scene)))
+
+
+def answer(scene: InTime, engine: str) -> Answer:
+    """March the copies at every speed, by their own equations; InputError for another engine."""
+    if engine != ENGINE:
+        raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
+    found, seconds = dict[str, list[np.ndarray]](), 0.0
+    for pace in scene.paces:
+        roads, begun = scene.roads(pace), time.process_time()
+        outputs, squares = scene.squares(pace, roads)
+        seconds += time.process_time() - begun
+        for output, own in zip(outputs, squares.T, strict=True):
+            found.setdefault(output.name, []).append(own)
+    units = {output.name: output.unit for output in outputs}
+    vehicle = scene.vehicle(scene.paces[0])
+    counts = {
+        "steps": scene.steps,
+        "calls": 4 * scene.steps,
+        "states": 2 * len(vehicle.coordinates()),
+        "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
+    }
+    return Answer({name: Quantity(units[name], tuple(cases), True) for name, cases in found.items()}, counts, seconds)
+
+
+def steps(scene: InTime) -> int:
+    """Of all copies at all speeds."""
+    return scene.steps
+
+
+def parts(scene: InTime) -> int:
+    """Steps of which whole numbers make up what is run, before and while outputs count."""
+    return UNIT // gcd(UNIT, scene.times)

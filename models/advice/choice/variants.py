@@ -1,0 +1,147 @@
+"""A scene less some of its effects and with longer steps, each variant run once and kept."""
+
+import math
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from models.advice.choice.answer import Answer
+from models.core.errors import InputError, RunFailed
+from models.core.scene_effects import absent, beside, module_of, named, own_table, rebuilt, without
+
+Set = frozenset[str]
+LONGEST = 128
+"""No step is tried that is more times as long as the scene's."""
+FINE = 60
+"""Steps of which whole numbers make up a part of a run, so that it can be taken in longer steps, too."""
+REPEATS, ENOUGH = 3, 0.02
+"""Runs of which the shortest tells the seconds; two where they took so many (s), as the first may have to load."""
+
+
+def system_of(scene: Any) -> ModuleType:
+    """The file that runs scenes of this one's system; InputError where there is none."""
+    folder = Path(__file__).parent / "systems"
+    names = {path.stem.replace("_", "-"): path.stem for path in sorted(folder.glob("*.py")) if path.stem != "__init__"}
+    if scene.system not in names:
+        raise InputError(
+            scene.file,
+            "system",
+            scene.system,
+            "has no runs in time that effects could be priced or "
+            "chosen by: linear scenes of ride have closed forms, and scenes of these systems have runs",
+            tuple(names),
+        )
+    return import_module(f"models.advice.choice.systems.{names[scene.system]}")
+
+
+@dataclass
+class Variants:
+    """Runs of a ``scene`` by one implementation; a variant is the effects that are left out, and the step by its own.
+
+    None stands for one that cannot be, or whose run fails. ``calls`` : of all runs made so far, without those that were
+    repeated for their seconds.
+    """
+
+    scene: Any
+    engine: str
+    system: ModuleType = field(init=False)
+    calls: int = 0
+    _kept: dict[tuple[Set, int], Answer | None] = field(default_factory=dict)
+    _costs: dict[Set, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.system = system_of(self.scene)
+        self.scene = self.system.opened(self.scene) if self._opened else self.scene
+
+    @property
+    def _opened(self) -> bool:
+        """Whether scenes are run as something else, which knows its effects and makes its own variants."""
+        return hasattr(self.system, "opened")
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that the scene names."""
+        return tuple(self.scene.named) if self._opened else named(self.scene)
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Effects that it does not name."""
+        return tuple(self.scene.absent) if self._opened else absent(self.scene)
+
+    def beside(self, name: str) -> Any:
+        """The scene with one of these at its usual values; InputError where it cannot be."""
+        return self.scene.beside(name) if self._opened else beside(self.scene, name)
+
+    def says(self, name: str) -> str:
+        """What an effect is, or what leaving it out means."""
+        told = self.scene.said if self._opened else {}
+        return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
+
+    def of(self, left_out: Iterable[str] = (), times: int = 1) -> Answer | None:
+        """The run without these effects, with steps so many times as long."""
+        key = (frozenset(left_out), times)
+        if key not in self._kept:
+            found = self._kept[key] = self._run(*key)
+            self.calls += found.counts["calls"] if found else 0
+        return self._kept[key]
+
+    def _run(self, left_out: Set, times: int) -> Answer | None:
+        try:
+            found: Answer = self.system.answer(self.changed(left_out, times), self.engine)
+        except (InputError, RunFailed):
+            return None
+        return found
+
+    def changed(self, left_out: Set, times: int = 1) -> Any:
+        """The scene of a variant; InputError where it cannot be."""
+        if self._opened:
+            return self.scene.without(left_out).longer(times)
+        scene = without(self.scene, *sorted(left_out)) if left_out else self.scene
+        if times == 1:
+            return scene
+        table = own_table(scene)
+        self.system.coarsen(table, scene, times)
+        return rebuilt(table, scene)
+
+    def work(self, left_out: Set, times: int = 1) -> float:
+        """Of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through, and
+        one for each effect that is left; infinite where there is no run."""
+        run = self.of(left_out, times)
+        if run is None:
+            return math.inf
+        each = run.counts["states"] + run.counts.get("terms", 0) + len(set(self.effects) - left_out)
+        return float(run.counts["calls"] * max(each, 1))
+
+    def per_call(self, left_out: Set) -> float:
+        """CPU seconds of one call, the least of a few runs; infinite where there is none."""
+        if left_out not in self._costs:
+            took, run = list[float](), self.of(left_out)
+            while run is not None and (len(took) < 2 or (len(took) < REPEATS and sum(took) < ENOUGH)):
+                took.append(run.seconds)
+                self._costs[left_out] = min(took) / run.counts["calls"]
+                run = self._run(left_out, 1)
+            self._costs.setdefault(left_out, math.inf)
+        return self._costs[left_out]
+
+    def lengths(self) -> list[int]:
+        """How many times as long a step may be, as far as whole numbers of them make up the run."""
+        count = self.system.parts(self.scene)
+        return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
+
+    def window(self, steps: int) -> "Variants":
+        """The first part of the run, of at least so many steps, or all of it if it has not many more.
+
+        Of a length that the scene may have: whole samples of what it measures, for one."""
+        if self._opened:
+            return Variants(self.scene.fewer(steps), self.engine)
+        count = self.system.steps(self.scene)
+        for few in (n for n in range(steps, count) if n % FINE == 0 or count % n == 0):
+            table = own_table(self.scene)
+            self.system.shorten(table, self.scene, few)
+            with suppress(InputError):
+                return Variants(rebuilt(table, self.scene), self.engine)
+        return self

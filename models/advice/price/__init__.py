@@ -1,0 +1,127 @@
+"""The price of accuracy of a user's own scene: ``twinrig price SCENE --tolerance T``.
+
+    scene -> OwnScene (a file per system) -> truth -> search -> recommendation -> text
+
+A system joins by a module with ``own(scene, quantity, engines) -> OwnScene`` and its name in
+``recommendation.SYSTEMS``.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from models.advice.price.problem import Setting
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Settings of one engine's method, from coarse to fine.
+
+    values : steps in s, relative tolerances where ``adaptive``, or shares of a contact where ``cells``; order :
+    declared, 0 if it varies; default : what the engine itself, or the scene, would take, 0 where the method is not its
+    default; sure : a reference is known where a finer rung changes it by less than this part of the tolerance
+    """
+
+    engine: str
+    method: str
+    values: tuple[float, ...]
+    order: int
+    adaptive: bool = False
+    default: float = 0.0
+    cells: bool = False
+    sure: float = 20.0
+
+    def setting(self, i: int) -> Setting:
+        """The setting on a rung."""
+        owner, kind = self.engine if self.default else "", InCells if self.cells else Setting
+        return kind(self.engine, self.method, self.values[i], self.order, self.adaptive, default=owner)
+
+    def work(self, before: float, now: float) -> float:
+        """How many times the work of one value another one takes: cells lie along and across."""
+        return 1.0 if self.adaptive else (before / now) ** (2 if self.cells else 1)
+
+
+class InCells(Setting):
+    """One whose value is the share of a contact's length that a cell has."""
+
+    def label(self) -> str:
+        """How many cells lie along the contact."""
+        return f"{round(1.0 / self.value)} cells"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """times (n,) in s from 0; values (n, k) of the quantity's channels, in its unit; counts of what it took."""
+
+    times: np.ndarray
+    values: np.ndarray
+    counts: dict[str, int]
+
+
+class OwnScene(Protocol):
+    """What the search asks of a scene."""
+
+    @property
+    def title(self) -> str:
+        """Of the scene."""
+        ...
+
+    @property
+    def quantity(self) -> str:
+        """What the tolerance is set on."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Of the quantity."""
+        ...
+
+    @property
+    def whole(self) -> float:
+        """Length of the scene's run, s."""
+        ...
+
+    @property
+    def first(self) -> float:
+        """Length of the part that is searched, s."""
+        ...
+
+    @property
+    def cell(self) -> float:
+        """Time between kinks of the quantity, s; 0 where there are none."""
+        ...
+
+    @property
+    def note(self) -> str:
+        """What is left out, "" if nothing is."""
+        ...
+
+    @property
+    def counted(self) -> str:
+        """Name among the counts of what work is counted in."""
+        ...
+
+    def ladders(self) -> list[Ladder]:
+        """Every method of every engine that was asked for."""
+        ...
+
+    def reference(self) -> Ladder:
+        """Settings that are refined until the truth is known; each step is half the one before."""
+        ...
+
+    def second(self, last: Setting) -> Setting | None:
+        """A setting of another family that must agree with the reference's last one; None where there is none."""
+        ...
+
+    def solve(self, setting: Setting, duration: float) -> Any:
+        """Build and run; InputError or RunFailed where that cannot be done."""
+        ...
+
+    def answer(self, solution: Any) -> Answer:
+        """The quantity in what ``solve`` gave."""
+        ...
+
+    def lines(self, setting: Setting) -> list[str]:
+        """The setting as a scene file holds it."""
+        ...

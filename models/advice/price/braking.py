@@ -1,0 +1,117 @@
+"""A user's scene of braking as the search of the price of accuracy sees it: one of its procedures, to its end."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder
+from models.advice.price.meshed import chosen, part_of
+from models.advice.price.problem import Setting
+from models.core.errors import InputError, RunFailed
+from models.systems.braking.procedures import drive, engines_of
+from models.systems.braking.run import Path
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import Stop
+
+METHOD = "exact wheel"
+SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+"""Steps within a sample that are tried, and those of the scene."""
+ROUGH, DOUBLED = 8, 8
+"""Substeps of the reference's first rung, and how many rungs there are."""
+USUAL = "stopping_distance"
+QUANTITIES: dict[str, tuple[Any, str]] = {
+    "stopping_distance": (lambda path: Stop(path).way[-1], "m"),
+    "stopping_time": (lambda path: path.times[-1], "s"),
+    "aside": (lambda path: path.states[-1, 0, 1], "m"),
+    "yaw": (lambda path: path.states[-1, 0, 2], "rad"),
+}
+"""What can be asked about, at the end, and its unit."""
+
+
+@dataclass(frozen=True)
+class OwnBraking:
+    """See ``models.advice.price.OwnScene``. name : of the procedure."""
+
+    scene: BrakingScene
+    name: str
+    quantity: str
+    engines: tuple[str, ...]
+    note: str
+    cell = 0.0
+
+    @property
+    def title(self) -> str:
+        """Of the scene."""
+        return self.scene.title
+
+    @property
+    def unit(self) -> str:
+        """Of the quantity."""
+        return str(QUANTITIES[self.quantity][1])
+
+    @property
+    def whole(self) -> float:
+        """The longest that a run may take, s."""
+        return self.scene.run.duration
+
+    first = whole
+
+    @property
+    def counted(self) -> str:
+        """Forces of tyres, once a step, whatever the engine."""
+        return "force calls"
+
+    def ladders(self) -> list[Ladder]:
+        """The one method of braking, its chassis carried by each engine."""
+        run = self.scene.run
+        values = tuple(run.sample / n for n in sorted({*SUBSTEPS, run.substeps}))
+        return [Ladder(engine, METHOD, values, 1, default=run.sample / run.substeps) for engine in self.engines]
+
+    def reference(self) -> Ladder:
+        """Twice the steps on every rung."""
+        engine = "reference" if "reference" in engines_of(self.scene, ("reference", "exudyn", "mujoco")) else "mujoco"
+        return Ladder(engine, METHOD, tuple(self.scene.run.sample / (ROUGH * 2**k) for k in range(DOUBLED)), 1)
+
+    def second(self, last: Setting) -> Setting | None:
+        """None: a stop with valves in the loop has one method."""
+        return None
+
+    def solve(self, setting: Setting, duration: float) -> tuple[int, Path]:
+        """Substeps and the procedure, driven; RunFailed where it does not end at rest."""
+        substeps = round(self.scene.run.sample / setting.value)
+        run = self.scene.run.model_copy(update={"substeps": substeps})
+        path = drive(self.scene.model_copy(update={"run": run}), self.name, setting.engine)
+        if not path.stands:
+            raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
+        return substeps, path
+
+    def answer(self, solution: tuple[int, Path]) -> Answer:
+        """One number, as a history that does not change; every step asks for the forces of each wheel once."""
+        substeps, path = solution
+        value, calls = QUANTITIES[self.quantity][0](path), substeps * path.turning.shape[1] * (len(path.times) - 1)
+        return Answer(np.array([0.0, 1.0]), np.full((2, 1), value), {"force calls": calls})
+
+    def lines(self, setting: Setting) -> list[str]:
+        """Steps within a sample."""
+        return [
+            "[run]",
+            f"substeps = {round(self.scene.run.sample / setting.value)}",
+            f"# twinrig run SCENE --engine {setting.engine}",
+        ]
+
+
+def own(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnBraking:
+    """The scene with a quantity, PROCEDURE.QUANTITY; the first procedure where none is named."""
+    if scene.port is not None:
+        raise InputError(
+            scene.file,
+            "port",
+            None,
+            "cannot be priced: what stands behind it answers one run; leave it out, with a controller in its place",
+        )
+    name, asked = part_of(quantity, USUAL, scene.procedures, "procedure")
+    chosen(asked, QUANTITIES)
+    others = [one for one in scene.procedures if one != name]
+    note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
+    return OwnBraking(scene, name, asked, engines_of(scene, engines), note)

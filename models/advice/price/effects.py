@@ -1,0 +1,178 @@
+"""The price list of a scene's effects: what each costs and what it changes, measured by short paired runs.
+
+An effect that the scene names is compared with the scene without it, one that it could have with the scene that has
+it, at its usual values. Runs take turns in a random order, and seconds are compared within a turn only.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from models.advice.choice.answer import Answer, by_chance, less, relative, rounding
+from models.advice.choice.variants import Variants, system_of
+from models.advice.ride_choice.in_time import goes_in_time
+from models.core.errors import InputError, RunFailed
+from models.machine.timing import describe, paired_ratio
+
+STEPS = 960
+"""Of every run, so many are priced."""
+ROUNDS, LEAST_ROUNDS, PATIENCE = 7, 3, 10.0
+"""Turns in which every variant runs once; fewer where all of them would take longer than so many CPU seconds."""
+SEED = 11
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A quantity's largest change of all cases: rms of a path's difference, or a number's, and by its own size; what
+    chance may add to the latter."""
+
+    name: str
+    unit: str
+    absolute: float
+    relative: float
+    chance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Price:
+    """An effect that a scene names (``there``) or could have; ``why`` it has no price, "" where it has.
+
+    counts : steps, calls, states without and with it; micros : CPU microseconds of a step that it adds, median and
+    median absolute deviation of the turns; ratio : of seconds with it by those without, and its 95 % interval;
+    changes : of every quantity, the largest relative one first; gone : quantities that are there with it alone.
+    """
+
+    name: str
+    there: bool
+    says: str
+    why: str = ""
+    counts: tuple[dict[str, int], dict[str, int]] = ({}, {})
+    micros: tuple[float, float] = (np.nan, np.nan)
+    ratio: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+    changes: tuple[Changed, ...] = ()
+    gone: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PriceList:
+    """Of a scene in one implementation. each : steps of one run, at most, of the ``whole`` ones that it may have.
+
+    micros : CPU microseconds of a step of the scene as it is, median and median absolute deviation.
+    """
+
+    title: str
+    engine: str
+    each: int
+    whole: int
+    counts: dict[str, int]
+    micros: tuple[float, float]
+    prices: tuple[Price, ...]
+
+
+def price_list(scene: Any, engine: str | None = None) -> PriceList:
+    """Run the scene, and every scene that has one effect more or less. Raises InputError or RunFailed where the scene
+    itself cannot be run."""
+    if scene.system == "ride" and not goes_in_time(scene):
+        from models.advice.price.effects_of_ride import price_list_of_ride
+
+        return price_list_of_ride(scene)
+    system = system_of(scene)
+    engine = engine or system.ENGINE
+    all_of_it = Variants(scene, engine)
+    variants = all_of_it.window(STEPS)
+    short, names = variants.scene, (*variants.effects, *variants.absent)
+    base: Answer = system.answer(short, engine)
+    runs: dict[str, Callable[[], Answer]] = {"": partial(system.answer, short, engine)}
+    first, whys = {"": base}, dict[str, str]()
+    for name in names:
+        try:
+            other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
+            first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
+        except (InputError, RunFailed) as error:
+            whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
+    micros = _turns(runs)
+    prices = [
+        _price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
+        for name in names
+    ]
+    return PriceList(
+        scene.title,
+        engine,
+        system.steps(short),
+        system.steps(all_of_it.scene),
+        base.counts,
+        spread(micros[""]),
+        tuple(prices),
+    )
+
+
+def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
+    """CPU microseconds of a step (turns,) of every run."""
+    found = dict[str, list[float]]({name: [] for name in runs})
+    order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
+    for i in range(ROUNDS):
+        if i >= LEAST_ROUNDS and (time.process_time() - begun) * (i + 1) > i * PATIENCE:
+            break
+        for j in order.permutation(len(names)):
+            one = runs[names[j]]()
+            found[names[j]].append(1e6 * one.seconds / one.counts["steps"])
+    return {name: np.array(values) for name, values in found.items()}
+
+
+def spread(values: np.ndarray) -> tuple[float, float]:
+    """Median and median absolute deviation."""
+    told = describe(values.tolist())
+    return told["median"], told["mad"]
+
+
+def _price(
+    variants: Variants,
+    name: str,
+    base: Answer,
+    other: Answer | None,
+    took: np.ndarray | None,
+    own: np.ndarray,
+    why: str,
+) -> Price:
+    there, says = name in variants.effects, variants.says(name)
+    if other is None or took is None:
+        return Price(name, there, says, why)
+    before, after = (other, base) if there else (base, other)
+    slow, fast = (own, took) if there else (took, own)
+    seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
+    gone = tuple(key for key in after.quantities if key not in before.quantities)
+    return Price(
+        name,
+        there,
+        says,
+        "",
+        (before.counts, after.counts),
+        spread(slow - fast),
+        paired_ratio(*seconds),
+        _changes(base, other),
+        gone,
+    )
+
+
+def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
+    """Of what both have, by the scene's own size."""
+    found = []
+    for name, quantity in base.quantities.items():
+        if name in other.quantities:
+            try:
+                change = less(other.quantities[name].cases, quantity.cases)
+            except (InputError, ValueError):  # of other lengths, or of another number of cases
+                continue
+            size = quantity.sizes
+            if quantity.sampled:
+                share, chance = by_chance(change, quantity.cases)
+                found.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
+                continue
+            most = max(float(np.sqrt(np.mean(one**2))) for one in change)
+            moved = most > rounding(base, quantity.unit)
+            found.append(Changed(name, quantity.unit, most, relative(change, size) if moved else 0.0))
+    return tuple(sorted(found, key=lambda one: -one.relative))

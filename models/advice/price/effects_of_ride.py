@@ -1,0 +1,138 @@
+"""The price list of a linear stationary scene of ride, in closed form: states, calls at the step limit, deviations.
+
+Only microseconds are measured, those of a step of the classical Runge-Kutta method on the vehicle's own matrix.
+"""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.advice.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
+from models.advice.ride_choice.cost import cost
+from models.advice.ride_choice.reduced import Reduced, Whole
+from models.advice.ride_choice.screen import confirmed
+from models.core.errors import InputError
+from models.core.scene_effects import absent, beside, listing
+from models.machine.timing import paired_ratio
+from models.systems.ride.of_scene import told_by, vehicle_of
+from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal, without
+
+STEPS = 500
+"""Steps that are timed in every turn."""
+
+
+def price_list_of_ride(scene: Any) -> PriceList:
+    """Prices at the scene's middle speed; InputError for one that varies."""
+    if scene.speeds is None:
+        raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
+    held = Held(scene, vehicle_of(scene))
+    speeds = scene.speeds.all()
+    with told_by(scene):
+        whole = Whole(held, float(speeds[len(speeds) // 2]))
+        effects = effects_of(held)
+        rests = {effect.name: _rest(whole, effect) for effect in effects}
+    more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
+    systems = {name: one for name, one in ({"": whole.full} | rests | more).items() if isinstance(one, Reduced)}
+    micros = _turns(systems)
+    says = listing(scene.system)
+    prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]
+    prices += [_price(whole, name, says[name], more[name], micros, there=False) for name in more]
+    return PriceList(
+        f"{scene.title} (at {whole.speed:g} m/s)",
+        "closed form",
+        STEPS,
+        STEPS,
+        _counts(whole.full),
+        spread(micros[""]),
+        tuple(prices),
+    )
+
+
+def _rest(whole: Whole, effect: Effect) -> Reduced | str:
+    """The scene without an effect, or why there is none."""
+    why = illegal([effect])
+    if why:
+        return why
+    try:
+        return whole.reduced(without(whole.held, [effect]))
+    except InputError as error:
+        return error.allowed
+
+
+def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
+    """The scene with one more effect at its usual values, or why there is none."""
+    try:
+        other = beside(scene, name)
+        return Whole(Held(other, vehicle_of(other)), speed).full
+    except InputError as error:
+        return error.allowed
+
+
+def _counts(system: Reduced) -> dict[str, int]:
+    """States, and calls per second of motion at the step limit."""
+    own = cost(system)
+    return {"states": own.states, "calls per second": round(own.calls) if np.isfinite(own.calls) else 0}
+
+
+def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
+    """CPU microseconds of a step (ROUNDS,) of every system, in a random order."""
+    found, names = {name: np.empty(ROUNDS) for name in systems}, list(systems)
+    order = np.random.default_rng(SEED)
+    for i in range(ROUNDS):
+        for j in order.permutation(len(names)):
+            system = systems[names[j]]
+            found[names[j]][i] = _timed(system.system.A[: system.states, : system.states])
+    return found
+
+
+def _timed(A: np.ndarray) -> float:
+    """Microseconds of a step."""
+    x, step = np.ones(len(A)), 1e-6
+    begun = time.process_time()
+    for _ in range(STEPS):
+        k1 = A @ x
+        k2 = A @ (x + step / 2 * k1)
+        k3 = A @ (x + step / 2 * k2)
+        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + A @ (x + step * k3))
+    return 1e6 * (time.process_time() - begun) / STEPS
+
+
+def _price(
+    whole: Whole, name: str, says: str, other: Reduced | str, micros: dict[str, np.ndarray], there: bool = True
+) -> Price:
+    """Of an effect that is ``there``, by the scene without it, or of one more, by the scene with it."""
+    if isinstance(other, str):
+        return Price(name, there, says, other)
+    without_it, with_it = ((other, micros[name]), (whole.full, micros[""]))[:: 1 if there else -1]
+    gone = tuple(key for key in with_it[0].system.names if key not in without_it[0].system.names)
+    return Price(
+        name,
+        there,
+        says,
+        "",
+        (_counts(without_it[0]), _counts(with_it[0])),
+        spread(with_it[1] - without_it[1]),
+        paired_ratio(with_it[1].tolist(), without_it[1].tolist()),
+        _changes(whole, other),
+        gone,
+    )
+
+
+def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
+    """Standard deviations, exact; infinite where white noise reaches a quantity."""
+    names = whole.full.system.names
+    own = [output.unit for output in whole.linear.outputs]
+    units = [*own, *["m/s^2"] * (len(names) - len(own))]  # weighted accelerations come last
+    try:
+        with np.errstate(invalid="ignore"):
+            full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (whole.full, rest))
+    except InputError:
+        return ()
+    rows = zip(names, units, full, left, strict=True)
+    found = [
+        Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
+        for name, unit, a, b in rows
+        if np.isfinite(a) and a > 0.0
+    ]
+    return tuple(sorted(found, key=lambda one: -one.relative))

@@ -1,0 +1,101 @@
+"""The price list of effects as a person reads it, and as JSON."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from models.advice.price.effects import Changed, Price, PriceList
+
+SHOWN = 3
+"""Quantities of an effect that are printed; JSON has all."""
+WIDTH = 26
+"""Of the column of names."""
+NOTHING = 1e-12
+"""Relative change that is rounding."""
+
+
+def lines(found: PriceList, quantities: list[str]) -> list[str]:
+    """What the scene costs, then every effect with what it costs and changes."""
+    counts = ", ".join(f"{value:,} {name}" for name, value in found.counts.items())
+    part = "" if found.each >= found.whole else f", {found.each:,} of {found.whole:,} steps priced"
+    return [
+        found.title,
+        f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
+        "",
+        "  effects of the scene: what each adds to it, and what leaving it out changes",
+        *(line for one in found.prices if one.there for line in _price(one, quantities)),
+        *_absent(found, quantities),
+        "",
+        "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
+        + ("; +- what chance may add, of so few samples" if _by_chance(found) else ""),
+    ]
+
+
+def _by_chance(found: PriceList) -> bool:
+    return any(change.chance for one in found.prices for change in one.changes)
+
+
+def _absent(found: PriceList, quantities: list[str]) -> list[str]:
+    rows = [line for one in found.prices if not one.there for line in _price(one, quantities)]
+    return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
+
+
+def _micros(spread: tuple[float, float]) -> str:
+    return f"{_number(spread[0], 3)} +- {_number(spread[1], 1)} us"
+
+
+def _number(value: float, digits: int) -> str:
+    """So many digits, without an exponent where a number is large."""
+    large = np.isfinite(value) and abs(float(f"{value:.{digits}g}")) >= 10.0**digits
+    return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
+
+
+def _price(one: Price, quantities: list[str]) -> list[str]:
+    """One effect: its cost in one line, what it changes in another."""
+    name = f"    {one.name:<{WIDTH}} "
+    if one.why:
+        return [f"{name}no price: {one.why}"]
+    ratio = f"{one.ratio[0]:.3g} times ({one.ratio[1]:.3g} to {one.ratio[2]:.3g})"
+    plus = "+" if one.micros[0] >= 0.0 else ""
+    cost = f"{name}{plus}{_micros(one.micros)} a step, {ratio}{_counts(one)}"
+    new = f"; there with it alone: {', '.join(one.gone[:SHOWN])}{', ...' if len(one.gone) > SHOWN else ''}"
+    return [cost, f"    {'':<{WIDTH}} {_changes(one, quantities)}{new if one.gone else ''}"]
+
+
+def _counts(one: Price) -> str:
+    """Counts that it changes."""
+    before, after = one.counts
+    told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
+    return "; " + ", ".join(told) if told else ""
+
+
+def _changes(one: Price, quantities: list[str]) -> str:
+    """The quantities that were asked for, or those that change most."""
+    asked = [change for change in one.changes if change.name in quantities]
+    shown = asked or [change for change in one.changes if change.relative > NOTHING][:SHOWN]
+    return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
+
+
+def _changed(change: Changed) -> str:
+    unit = f" {change.unit}" if change.unit and change.unit != "1" else ""
+    name = change.name.partition(" [")[0]
+    beside = f" +- {_number(100 * change.chance, 2)} %" if change.chance else ""
+    share = f"{_number(100 * change.relative, 2)} %{beside}" if np.isfinite(change.relative) else "from nothing"
+    return f"{name} by {_number(change.absolute, 3)}{unit} ({share})"
+
+
+def as_dict(found: PriceList) -> dict[str, Any]:
+    """All of it as JSON keeps it; None for what is not finite."""
+    plain: dict[str, Any] = _plain(asdict(found))
+    return plain
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value

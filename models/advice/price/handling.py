@@ -1,0 +1,113 @@
+"""A user's scene of handling as the search of the price of accuracy sees it: one of its manoeuvres."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part, part_of
+from models.advice.price.problem import Setting
+from models.core.errors import RunFailed
+from models.engines.spatial_protocol import SpatialRun
+from models.multibody import forces as at
+from models.multibody.numbers import Handling
+from models.systems.handling.in_engines import Drive, build, driven, read
+from models.systems.handling.scene import HandlingScene
+
+FIRST = 1.0
+"""s: of a longer manoeuvre only so much is searched."""
+USUAL = "yaw_rate"
+QUANTITIES: dict[str, tuple[Any, str]] = {
+    "yaw_rate": (lambda drive: drive.velocity()[:, 2], "rad/s"),
+    "lateral_acceleration": (lambda drive: drive.lateral_acceleration(), "m/s^2"),
+    "lateral_speed": (lambda drive: drive.velocity()[:, 1], "m/s"),
+    "speed": (lambda drive: drive.velocity()[:, 0], "m/s"),
+    "load": (lambda drive: drive.tyres[:, :, at.PRESS], "N"),
+}
+"""What can be asked about, and its unit."""
+
+
+@dataclass(frozen=True)
+class OwnHandling(Meshed):
+    """A manoeuvre."""
+
+    name: str
+    speed: float
+    handling: Handling
+
+    @cached_property
+    def _cut(self) -> dict[int, Handling]:
+        return {}
+
+    def _with(self, cells: int) -> Handling:
+        """The vehicle with other cells."""
+        if cells not in self._cut:
+            self._cut[cells] = replace(self.handling, tyres=replace(self.handling.tyres, cells=cells))
+        return self._cut[cells]
+
+    def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
+        """The manoeuvre in an engine."""
+        return driven(engine, self._with(cells), self.speed, duration, step)
+
+    def exact(self, cells: int, step: float, duration: float) -> Drive:
+        """The same by DOP853 about the engine's accelerations."""
+        handling = self._with(cells)
+        model, start = build(self.own, handling), np.concatenate(handling.straight(self.speed))
+        n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
+        done = solve_ivp(
+            lambda t, y: np.concatenate((y[n:], model.acceleration(t, y[:n], y[n:]))),
+            (0.0, duration),
+            start,
+            "DOP853",
+            np.minimum(times, duration),
+            rtol=TIGHT,
+            atol=TIGHT,
+        )
+        if not done.success:
+            raise RunFailed(self.own, done.message)
+        return read(
+            handling,
+            SpatialRun(times, np.ascontiguousarray(done.y[:n].T), np.ascontiguousarray(done.y[n:].T), {}),
+            self.own,
+        )
+
+    def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
+        """The quantity over time."""
+        values, times = QUANTITIES[self.quantity][0](run), run.run.times
+        return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
+
+    def lines(self, setting: Setting) -> list[str]:
+        """Cells and step."""
+        return [
+            "[tyres]",
+            f"cells = {round(1 / setting.value)}",
+            "[run]",
+            f"step = {self.steps[setting.method]!r}",
+            f"# twinrig run SCENE --engine {setting.engine}",
+        ]
+
+
+def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) -> OwnHandling:
+    """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
+    name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
+    chosen(asked, QUANTITIES)
+    manoeuvre, step, others = scene.manoeuvres[name], scene.run.step, [one for one in scene.manoeuvres if one != name]
+    note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
+    return OwnHandling(
+        scene.title,
+        asked,
+        QUANTITIES[asked][1],
+        note,
+        manoeuvre.duration,
+        first_part(manoeuvre.duration, FIRST),
+        engines,
+        "mujoco",
+        step,
+        2.0 * step,
+        scene.tyres.cells,
+        name,
+        manoeuvre.speed,
+        scene.handling(name),
+    )

@@ -1,0 +1,223 @@
+"""A user's pitch-plane scene as the search of the price of accuracy sees it."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder
+from models.advice.price.problem import Setting
+from models.core.errors import InputError
+from models.core.steps import divides
+from models.engines.assembly import Assembly
+from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
+from models.engines.protocol import Settings, build
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.scene import Scene
+
+ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
+"""Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
+RADII = {"GeneralizedAlpha 0.9": 0.9, "GeneralizedAlpha 0.6": 0.6}
+"""Spectral radii of the generalised-alpha method that are tried."""
+
+FIRST = 2.0
+"""s: of a longer run only so much is searched; what is recommended is then confirmed over all of it."""
+STEPS = tuple(
+    mantissa * 10.0**power
+    for power in (-2, -3, -4, -5, -6)
+    for mantissa in (10.0, 8.0, 6.25, 5.0, 4.0, 3.2, 2.5, 2.0, 1.6, 1.25)
+)[5:]
+"""Steps that are tried (s), each as the nearest one below that divides the run."""
+TOLERANCES = tuple(10.0**-k for k in range(2, 13))
+DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9"): 1e-2, ("mujoco", "Euler"): 2e-3}
+"""What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
+USUAL = {
+    "free": "f1,f2",
+    "road": "f1,f2",
+    "force": "pitch",
+    "force-body": "pitch",
+    "pitch": "enforced_moment",
+    "heave-pitch": "enforced_force",
+}
+"""The quantity that is asked about where the user names none, by what drives the vehicle."""
+SPACING = 1e-3
+"""s: of the rows of an adaptive method from outside the tree."""
+TIGHT = 1e-10
+"""Relative tolerance of the second solver, a multistep method beside the reference's Runge-Kutta."""
+
+
+@dataclass(frozen=True)
+class OwnPitchPlane:
+    """See ``models.advice.price.OwnScene``. channels : of the quantity; base : step (s) whose parts all divide
+    the run and its samples."""
+
+    assembly: Assembly
+    engines: tuple[str, ...]
+    channels: tuple[str, ...]
+    unit: str
+    base: float
+    first: float
+
+    @property
+    def title(self) -> str:
+        """Of the scene."""
+        return self.assembly.scene.title
+
+    @property
+    def quantity(self) -> str:
+        """Channels that the tolerance is set on."""
+        return " and ".join(self.channels)
+
+    @property
+    def whole(self) -> float:
+        """Length of the scene's run, s."""
+        return self.assembly.scene.run.duration
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the input has a kink at every sample."""
+        signal = self.assembly.input
+        return signal is not None and signal.period is not None and len(signal.knots(self.whole)) > 0
+
+    @property
+    def cell(self) -> float:
+        """The sampling period of an input with a kink at every sample."""
+        return self.base if self.sampled else 0.0
+
+    @property
+    def note(self) -> str:
+        """What is left out."""
+        return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
+
+    @property
+    def counted(self) -> str:
+        """Every method's work is its force calls."""
+        return "force calls"
+
+    def ladders(self) -> list[Ladder]:
+        """Every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and the recommended."""
+        found = []
+        for engine in self.engines:
+            for name, known in CATALOGUE[engine].items():
+                adaptive = known.adaptive or getattr(OUTSIDE.get(engine), "adaptive", False)
+                if known.adaptive and self.sampled and (engine, name) not in MISSING:
+                    continue
+                for method in [m for m in RADII if m.startswith(name)] or [name]:
+                    values = TOLERANCES if adaptive else self._steps()
+                    values = values[:1] if (engine, name) in MISSING else values
+                    order = 0 if adaptive else known.order
+                    default = DEFAULTS.get((engine, method), 0.0)
+                    found.append(Ladder(engine, method, values, order, adaptive, default))
+        return found
+
+    def reference(self) -> Ladder:
+        """The written equations by RK4; each step is half the one before."""
+        most = max(1, math.ceil(self.base / 4e-3 * (1 - 1e-9)))
+        return Ladder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
+
+    def second(self, last: Setting) -> Setting | None:
+        """LSODA, unless it would restart at every sample."""
+        return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
+
+    def solve(self, setting: Setting, duration: float) -> Any:
+        """Model and trajectory."""
+        model = build(setting.engine, self.assembly, self._settings(setting, duration))
+        return model, model.run()
+
+    def answer(self, solution: Any) -> Answer:
+        """The quantity's channels."""
+        model, run = solution
+        found = outputs(self.assembly, run, model)
+        return Answer(run.times, np.column_stack([found[name][2] for name in self.channels]), run.counts)
+
+    def lines(self, setting: Setting) -> list[str]:
+        """The setting as the scene file holds it."""
+        if setting.engine in OUTSIDE:
+            return _outside(setting)
+        name, (_, _, radius) = setting.method.split()[0], setting.method.partition(" ")
+        last = f"tolerance = {setting.value:.4g}" if setting.adaptive else f"step = {setting.value!r}"
+        return [
+            f"[engines.{setting.engine}]",
+            f'integrator = "{name}"',
+            last,
+            *([f"spectral_radius = {radius}"] if radius else []),
+        ]
+
+    def _settings(self, setting: Setting, duration: float) -> Settings:
+        if not setting.adaptive:
+            return engine_settings(setting, duration)
+        signal = self.assembly.input
+        longest = min(ADAPTIVE_STEP.get(setting.engine, SPACING), signal.resolution if signal is not None else 1.0)
+        return Settings(setting.method, duration / math.ceil(duration / longest * (1 - 1e-9)), duration, setting.value)
+
+    def _steps(self) -> tuple[float, ...]:
+        """Parts of ``base``, from coarse to fine."""
+        parts = np.unique(np.ceil(self.base / np.array(STEPS) * (1 - 1e-9)).astype(int))
+        return tuple(self.base / int(k) for k in parts)
+
+
+def _outside(setting: Setting) -> list[str]:
+    """A class from outside the tree, which no scene names."""
+    asked = f"# twinrig run SCENE --engine {setting.engine}"
+    return (
+        [asked, f"# with the {setting.label()} in the class itself"]
+        if setting.adaptive
+        else ["[run]", f"step = {setting.value!r}", asked]
+    )
+
+
+def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
+    """The scene with a quantity: channels of its result, with commas between them, of one unit."""
+    assembly = assemble(scene)
+    channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))
+    base, first = _lengths(assembly)
+    found = OwnPitchPlane(assembly, engines, channels, "", base, first)
+    return OwnPitchPlane(assembly, engines, channels, _unit(found), base, first)
+
+
+def _lengths(assembly: Assembly) -> tuple[float, float]:
+    """Step (s) whose parts divide the run and its samples; how much of the run is searched (s)."""
+    run, period = assembly.scene.run, _period(assembly)
+    if period is None:
+        first = run.duration / math.ceil(run.duration / FIRST * (1 - 1e-9))
+        return first, first
+    if divides(period, run.duration):
+        base = period
+    else:
+        base = run.step * math.gcd(round(run.duration / run.step), round(period / run.step))
+    return base, min(run.duration, base * math.ceil(FIRST / base * (1 - 1e-9)))
+
+
+def _period(assembly: Assembly) -> float | None:
+    """The sampling period (s) that fixed steps must divide."""
+    return next((s.period for s in (assembly.input, assembly.moment) if s is not None and s.period is not None), None)
+
+
+def _unit(scene: OwnPitchPlane) -> str:
+    """The one unit of the quantity's channels; InputError for what is no channel, or several units."""
+    step = float(scene.assembly.scene.settings("reference").step or 0.0)
+    model = build("reference", scene.assembly, Settings("RK4", min(step, scene.base), scene.base))
+    found = outputs(scene.assembly, model.run(), model)
+    for name in scene.channels:
+        if name not in found:
+            raise InputError("--quantity", "", name, "is no channel of this scene", tuple(found))
+    units = list(dict.fromkeys(found[name][0] for name in scene.channels))
+    if len(units) > 1:
+        raise InputError(
+            "--quantity",
+            "",
+            ",".join(scene.channels),
+            f"has several units, {' and '.join(units)}: one tolerance cannot hold for all",
+        )
+    return units[0]
+
+
+def engine_settings(setting: Setting, duration: float) -> Settings:
+    """A setting as the engines take it."""
+    integrator = setting.method.split()[0]
+    radius = RADII.get(setting.method, 0.6)
+    if setting.adaptive:
+        return Settings(integrator, ADAPTIVE_STEP[setting.engine], duration, setting.value, radius)
+    return Settings(integrator, setting.value, duration, spectral_radius=radius)

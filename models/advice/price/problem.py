@@ -1,0 +1,83 @@
+"""What the work-precision runner asks of a problem, and one way to solve it."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to solve a problem.
+
+    engine, method : together the name of a work-precision curve
+    value : step in s, relative tolerance where ``adaptive``, or 1 by the number of cells where ``cells``
+    order : declared order of the method, 0 if it varies or is not kept on this problem; then
+    nominal : what it is on smooth ones
+    stages : force evaluations per step, 0 where they are not fixed
+    default : whose default setting this is, "" for no one's
+    """
+
+    engine: str
+    method: str
+    value: float
+    order: int
+    adaptive: bool = False
+    stages: int = 0
+    default: str = ""
+    cells: bool = False
+    nominal: int = 0
+
+    @property
+    def curve(self) -> str:
+        """Name of the curve that the setting lies on."""
+        return f"{self.engine} {self.method}"
+
+    def label(self) -> str:
+        """The setting as a reader names it: a step with its unit, a tolerance, or cells along a contact."""
+        if self.cells:
+            return f"{round(1.0 / self.value)} cells"
+        return f"tolerance {self.value:.3g}" if self.adaptive else f"{1e3 * self.value:.3g} ms"
+
+
+class Solver(Protocol):
+    """A model that is built and can be run."""
+
+    def run(self) -> Any:
+        """Solve; raises RunFailed rather than give a wrong answer."""
+        ...
+
+
+class Problem(Protocol):
+    """What the runner asks of a problem.
+
+    key : part of the rows' names; title : what is computed; note : what a reader of its figure must know;
+    duration : of the run, s; units : unit of each error, the quantity that
+    tolerances are set on first; reference : how the reference was made, in words; uncertainty : largest
+    difference between its solvers, per quantity; bound : an error above it is not an answer any more;
+    tolerances : for the table of cheapest settings.
+    """
+
+    key: str
+    title: str
+    note: str
+    duration: float
+    units: dict[str, str]
+    reference: str
+    uncertainty: dict[str, float]
+    bound: float
+    tolerances: tuple[float, ...]
+
+    def settings(self, quick: bool) -> tuple[Setting, ...]:
+        """All settings to try, or the named small share of them."""
+        ...
+
+    def setting(self, engine: str, method: str, value: float) -> Setting:
+        """A setting of this problem by its curve and its step (s) or tolerance."""
+        ...
+
+    def build(self, setting: Setting) -> Solver:
+        """A model ready to run; raises Refused where the engine would answer wrongly."""
+        ...
+
+    def errors(self, solution: Any) -> dict[str, float]:
+        """Largest error per quantity over the run, in the units of ``units``."""
+        ...

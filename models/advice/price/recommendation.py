@@ -1,0 +1,295 @@
+"""Which setting to take: the cheapest that meets a tolerance, timed beside the engines' defaults, and confirmed.
+
+Counts are the same in every run, so the least count wins. Seconds wander: they are those of the processor, in rounds in
+which the rivals take turns, and an engine's default method that meets the tolerance is recommended unless the 95 %
+interval of its ratio to the fastest lies above SLOWER. So what is recommended in its place is faster beyond doubt, and
+what is recommended beside it is never slower than it by more than that.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price.problem import Setting
+from models.advice.price.search import Search, Tried
+from models.advice.price.truth import Truth, truth
+from models.core.errors import InputError, RunFailed
+from models.machine.timing import interleave, paired_ratio
+
+SYSTEMS = {
+    system: f"models.advice.price.{module}"
+    for system, module in (
+        ("pitch-plane", "pitch_plane"),
+        ("wheelset", "wheelset"),
+        ("handling", "handling"),
+        ("braking", "braking"),
+    )
+}
+"""Systems whose scenes have a price, and the modules that know them."""
+WITHOUT = {
+    "ride": "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`",
+    "hub-forces": 'takes whole parts of its samples for steps, the longest of which a choice, study = "choice", finds',
+    "contact": "has cells in place of steps, which the study contact_price prices",
+    "measured": "takes the samples of its files for steps",
+}
+"""Why others have none, and what there is instead."""
+NEAR = 2.0
+"""Settings that took up to so many times the least seconds in one run are timed beside one another."""
+FAR = 8.0
+"""The same for a default: it must never be given up because one run of it was disturbed."""
+ROUNDS, LEAST = 9, 0.002
+"""Interleaved rounds of timing; a short run is repeated until its turn lasts this long (s)."""
+FEWEST, PATIENCE = 3, 5.0
+"""Of slow runs there are fewer rounds, for they take no longer together than this (s), yet at least so many."""
+BEHIND, USUAL_BEHIND = 1.5, 3.0
+"""What took so many times the seconds of its engine's best in the first rounds is out of the race; a default later."""
+SLOWER = 1.05
+"""A ratio of seconds whose 95 % interval lies above this is slower beyond doubt."""
+ATTEMPTS = 6
+"""Settings that are confirmed over the whole run, at most, for one recommendation."""
+RESOLVED = 3.0
+"""An error is told against a truth which is known that many times better, where one can be had within PATIENCE."""
+DEARER = 8.0
+"""A finer reference takes at most about so many times the seconds: twice the cells, half the step."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A setting with the error that it has (in the quantity's unit; the truth's own uncertainty where that is more),
+    its force calls, its seconds (median), and those of the rounds in which it was timed beside others; ``confirmed`` :
+    over the whole run."""
+
+    tried: Tried
+    error: float
+    calls: float
+    seconds: float
+    confirmed: bool
+    rounds: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Default:
+    """An engine's default method: its error as it comes (None if it gave no answer, then ``reason``), and refined to
+    meet the tolerance; ``extrapolated`` by its declared order where no step tried was fine enough."""
+
+    as_it_is: Tried
+    refined: Choice | None
+    extrapolated: bool
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """Winners by engine and cost ("" for all engines), defaults by engine, all that was tried; the truth over the part
+    that was searched, and over the whole run."""
+
+    scene: OwnScene
+    tolerance: float
+    searched: Truth
+    truth: Truth
+    winners: dict[tuple[str, str], Choice]
+    defaults: dict[str, Default]
+    tried: tuple[Tried, ...]
+
+
+def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
+    """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known."""
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
+    if scene.system not in SYSTEMS:
+        why = WITHOUT.get(scene.system, "has no steps to choose")
+        raise InputError(
+            scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(SYSTEMS)
+        )
+    return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
+
+
+def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
+    """Search the first part of the run, time what is near the best, confirm it over the whole run."""
+    searched = known = truth(scene, tolerance, scene.first)
+    search = Search(scene, searched, tolerance, scene.first).everything()
+    timed = _timed(search)
+    winners = {
+        (engine, kind): best
+        for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
+        for kind in ("seconds", "calls")
+        if (best := _cheapest(timed, engine, kind)) is not None
+    }
+    if scene.whole > scene.first * (1 + 1e-9) and winners:
+        known, timed, winners = _confirmed(search, timed, winners)
+    known, timed, winners = _resolved(scene, known, timed, winners)
+    defaults = {
+        ladder.engine: found
+        for ladder in scene.ladders()
+        if ladder.default and (found := _default(search, ladder, timed)) is not None
+    }
+    return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
+
+
+def _timed(search: Search) -> list[Choice]:
+    """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
+    curves: dict[str, Tried] = {}
+    for one in search.meeting():
+        held = curves.get(one.setting.curve)
+        if held is None or one.setting.value > held.setting.value:
+            curves[one.setting.curve] = one
+    found = list(curves.values())
+    if not found:
+        return []
+    taken = _raced(search, _rivals(found))
+    longer = search.scene.whole / search.duration
+    seconds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
+    return [
+        Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False, seconds[one.setting])
+        for one in found
+    ]
+
+
+def _rivals(found: list[Tried]) -> list[Tried]:
+    """Those that may be an engine's fastest, or the fastest of all, where there is more than one."""
+    rivals = dict[Tried, None]()
+    for engine in ("", *dict.fromkeys(one.setting.engine for one in found)):
+        own = [one for one in found if one.setting.engine.startswith(engine)]
+        least = min(one.seconds for one in own)
+        near = [one for one in own if one.seconds <= (FAR if one.setting.default else NEAR) * least]
+        rivals |= dict.fromkeys(near if len(near) > 1 else [])
+    return list(rivals)
+
+
+def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
+    """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
+    seconds = _rounds(search, rivals, FEWEST)
+    middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
+    least = {
+        engine: min(own for setting, own in middle.items() if setting.engine == engine)
+        for engine in dict.fromkeys(setting.engine for setting in middle)
+    }
+    left = [
+        one
+        for one in rivals
+        if middle[one.setting] <= (USUAL_BEHIND if one.setting.default else BEHIND) * least[one.setting.engine]
+    ]
+    more = min(ROUNDS, int(PATIENCE / max(sum(middle[one.setting] for one in left), 1e-9))) - FEWEST
+    further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
+    return seconds | {setting: np.concatenate((seconds[setting], own)) for setting, own in further.items()}
+
+
+def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, np.ndarray]:
+    jobs = [partial(search.scene.solve, one.setting, search.duration) for one in rivals]
+    lasted = [one.seconds for one in rivals]
+    taken = interleave(jobs, rounds, LEAST, lasted=lasted, clock=time.process_time)
+    return dict(zip((one.setting for one in rivals), taken, strict=True))
+
+
+def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
+    """The least cost; an engine's default method is kept where it does not take longer beyond doubt: seconds wander."""
+    able = [one for one in timed if one.tried.setting.engine.startswith(engine)]
+    if not able:
+        return None
+    best = min(able, key=lambda one: getattr(one, kind))
+    usual = [one for one in able if one.tried.setting.default and kind == "seconds" and not _slower(one, best)]
+    return min(usual, key=lambda one: one.seconds) if usual else best
+
+
+def _slower(one: Choice, best: Choice) -> bool:
+    """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
+    both = min(len(one.rounds), len(best.rounds))
+    if both < FEWEST:
+        return one.seconds > best.seconds
+    return paired_ratio(one.rounds[:both], best.rounds[:both])[1] > SLOWER
+
+
+def _confirmed(
+    search: Search, timed: list[Choice], winners: dict[tuple[str, str], Choice]
+) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
+    """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
+    scene = search.scene
+    known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
+    over = Search(scene, known, search.tolerance, scene.whole)
+    ladders = {f"{one.engine} {one.method}": one for one in scene.ladders()}
+    able = [*winners.values(), *(one for one in timed if one.tried.setting.default)]
+    found = {one.tried.setting: _over_all(over, ladders[one.tried.setting.curve], one) for one in able}
+    search.tried += [one for one in over.tried if one.status != "ok"]
+    held = [one for one in found.values() if one is not None]
+    again = {key: _cheapest(held, *key) for key in winners}
+    return known, held, {key: one for key, one in again.items() if one is not None}
+
+
+def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
+    """A setting, or the next finer one of its method that meets the tolerance over the whole run."""
+    i, first = ladder.values.index(one.tried.setting.value), one.tried
+    for _ in range(ATTEMPTS):
+        now = over.attempt(ladder.setting(i))
+        if now.error <= over.held:
+            ratio = ladder.work(first.setting.value, now.setting.value)
+            return Choice(now, now.error, now.calls, ratio * one.seconds, True, tuple(ratio * s for s in one.rounds))
+        finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
+        wanted = ladder.values[i] / finer
+        i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
+        if i < 0:
+            return None
+    return None
+
+
+def _resolved(
+    scene: OwnScene, known: Truth, timed: list[Choice], winners: dict[tuple[str, str], Choice]
+) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
+    """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
+    be far better than its tolerance asks, and as good as the reference that judged it."""
+    shown = list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
+    errors = {one.tried.setting: one.error for one in shown}
+    if _blurred(known, errors):
+        known, errors = _finer(
+            scene, known, {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
+        )
+    told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
+    return (
+        known,
+        [told.get(one.tried.setting, one) for one in timed],
+        {key: told[one.tried.setting] for key, one in winners.items()},
+    )
+
+
+def _blurred(known: Truth, errors: dict[Setting, float]) -> bool:
+    """Whether an error is as small as the truth is uncertain, and another truth takes seconds, not minutes."""
+    return min(errors.values(), default=np.inf) < RESOLVED * known.uncertainty and DEARER * known.seconds < PATIENCE
+
+
+def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tuple[Truth, dict[Setting, float]]:
+    """A truth that resolves the errors of all answers, or the best that there is time for; those errors."""
+    errors = {setting: known.error(answer) for setting, answer in answers.items()}
+    while _blurred(known, errors):
+        try:
+            finer = truth(scene, scene.reference().sure * known.uncertainty, scene.whole, known.rung, twice=False)
+        except (InputError, RunFailed):
+            break  # as well known as rounding and the reference's finest step let it be
+        if not finer.uncertainty < known.uncertainty:
+            break
+        known, errors = finer, {setting: finer.error(answer) for setting, answer in answers.items()}
+    return known, errors
+
+
+def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
+    """What the engine's default does as it comes, and what it takes to meet the tolerance."""
+    curve = f"{ladder.engine} {ladder.method}"
+    own = [one for one in search.tried if one.setting.curve == curve]
+    if not own:
+        return None
+    as_it_is = min(own, key=lambda one: abs(np.log(one.setting.value / ladder.default)))
+    met = next((one for one in timed if one.tried.setting.curve == curve), None)
+    if met is not None:
+        return Default(as_it_is, met, False)
+    clear = [one for one in own if one.status == "ok"]
+    if not clear:
+        return Default(as_it_is, None, False)
+    finest = min(clear, key=lambda one: one.setting.value)
+    finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
+    setting = replace(finest.setting, value=finest.setting.value / finer)
+    longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration
+    guess = Tried(setting, "ok", "", search.tolerance)
+    refined = Choice(guess, search.tolerance, longer * finest.calls, longer * finest.seconds, False)
+    return Default(as_it_is, refined, True)

@@ -1,0 +1,176 @@
+"""The coarsest setting of every method that meets a tolerance, found without running what cannot win."""
+
+import time
+from bisect import bisect_left
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from models.advice.price import Ladder, OwnScene
+from models.advice.price.problem import Setting
+from models.advice.price.runner import Status
+from models.advice.price.truth import Truth
+from models.core.errors import InputError, RunFailed
+
+START = 2e-3
+"""s: the step that is tried first; an engine's default method begins with its default step."""
+COARSE = 1 / 11
+"""Of a contact: the cells that are tried first."""
+LOOSE = 1e-3
+"""The tolerance that an adaptive method is tried with first."""
+WORTH = 2.0
+"""A method is given up once it takes this many times the seconds and the force calls of its engine's best."""
+PATIENCE = 0.05
+"""s: an engine's default method is refined for as long as a run takes no longer than this, or than the engine's best
+that has met the tolerance, if one has.
+"""
+TOO_LONG = 10.0
+"""s: a run that would take longer is not made where another engine meets the tolerance in half of that, or less."""
+BEYOND = 10.0
+"""An error of so many times the quantity's own size is no answer any more."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run, as the
+    processor counts them: other work on the machine is not in them."""
+
+    setting: Setting
+    status: Status
+    reason: str = ""
+    error: float = float("inf")
+    calls: int = 0
+    seconds: float = 0.0
+
+
+@dataclass
+class Search:
+    """Settings of a scene tried over ``duration`` (s) against its truth."""
+
+    scene: OwnScene
+    truth: Truth
+    tolerance: float
+    duration: float
+    tried: list[Tried] = field(default_factory=list)
+
+    @property
+    def held(self) -> float:
+        """Error that a setting may show beside a truth which is uncertain itself."""
+        return self.tolerance - self.truth.uncertainty
+
+    def everything(self) -> "Search":
+        """Every ladder, those of high order first: what they cost tells when others are given up."""
+        for ladder in {one.engine: one for one in self.scene.ladders()}.values():
+            self._warm(ladder)
+        for ladder in sorted(self.scene.ladders(), key=lambda one: (one.adaptive, -one.order)):
+            self.climb(ladder)
+        return self
+
+    def attempt(self, setting: Setting) -> Tried:
+        """Try one setting, and keep what became of it."""
+        begun = time.process_time()
+        try:
+            solution = self.scene.solve(setting, self.duration)
+        except InputError as error:
+            found = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
+        except RunFailed as error:
+            found = Tried(setting, "raised", str(error))
+        else:
+            seconds, answer = time.process_time() - begun, self.scene.answer(solution)
+            error_of = self.truth.error(answer)
+            lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
+            why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
+            found = Tried(
+                setting, "SILENT" if lies else "ok", why, error_of, answer.counts.get(self.scene.counted, 0), seconds
+            )
+        self.tried.append(found)
+        return found
+
+    def _warm(self, ladder: Ladder) -> None:
+        """One run that is not timed: an engine's first one imports and compiles."""
+        with suppress(InputError, RunFailed):
+            self.scene.solve(ladder.setting(_next(ladder, 0, len(ladder.values), None, self.tolerance)), self.duration)
+
+    def climb(self, ladder: Ladder) -> None:
+        """Find a ladder's coarsest setting that meets the tolerance: each one tried halves what is left, at least
+        nearly always, and the declared order says where to try next, or another engine with the same method."""
+        low, high, last, same = 0, len(ladder.values), None, self._elsewhere(ladder)
+        while low < high:
+            i = _next(ladder, low, high, last, self.tolerance)
+            if same and (last is not None or not ladder.default):
+                i, same = _rung(ladder, same, low, high), 0.0
+            if ladder.default and last is not None and self.meeting(ladder.engine):
+                i = min(i, self._affordable(ladder, last))
+            if i < low or self._hopeless(ladder, i, last) or self._too_long(ladder, i, last):
+                return
+            last = self.attempt(ladder.setting(i))
+            if last.error <= self.held:
+                high = i
+            elif ladder.cells and last.status in ("refused", "raised"):
+                return  # its step is too long, however many cells there are
+            else:
+                low = i + 1
+
+    def meeting(self, engine: str = "") -> list[Tried]:
+        """Those that meet the tolerance, of one engine or of all."""
+        return [one for one in self.tried if one.error <= self.held and one.setting.engine.startswith(engine)]
+
+    def _elsewhere(self, ladder: Ladder) -> float:
+        """The value that the method needs in another engine, 0 where none has it."""
+        return max(
+            (
+                one.setting.value
+                for one in self.meeting()
+                if one.setting.method == ladder.method and one.setting.value in ladder.values
+            ),
+            default=0.0,
+        )
+
+    def _affordable(self, ladder: Ladder, last: Tried) -> int:
+        """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
+        best = min(one.seconds for one in self.meeting(ladder.engine))
+        most = max(PATIENCE, best) / max(last.seconds, 1e-9)
+        return max(
+            i for i, value in enumerate(ladder.values) if i == 0 or ladder.work(last.setting.value, value) <= most
+        )
+
+    def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+        """Whether a rung would cost far more than what its engine has that meets the tolerance."""
+        if last is None or not last.seconds:
+            return False
+        finer = ladder.work(last.setting.value, ladder.values[i])
+        seconds, calls, best = finer * last.seconds, finer * last.calls, self.meeting(ladder.engine)
+        if ladder.default or not best:
+            return False
+        return seconds > WORTH * min(one.seconds for one in best) and calls > WORTH * min(one.calls for one in best)
+
+    def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
+        """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
+        best = min((one.seconds for one in self.meeting()), default=float("inf"))
+        seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
+        if seconds <= max(TOO_LONG, WORTH * best):
+            return False
+        self.tried.append(
+            Tried(
+                ladder.setting(i),
+                "refused",
+                f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s",
+            )
+        )
+        return True
+
+
+def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:
+    """The rung to try: by the declared order from the last one, in the middle where that says nothing."""
+    if last is None:
+        wanted = LOOSE if ladder.adaptive else ladder.default or (COARSE if ladder.cells else START)
+    elif last.status == "ok" and last.error > 0.0:
+        wanted = last.setting.value * (tolerance / last.error) ** (1 / (1 if ladder.adaptive else ladder.order or 2))
+    else:
+        return (low + high) // 2
+    return _rung(ladder, wanted, low, high)
+
+
+def _rung(ladder: Ladder, wanted: float, low: int, high: int) -> int:
+    """The coarsest rung that is no coarser than what is wanted, of those left."""
+    i = bisect_left(ladder.values, -wanted * (1 + 1e-9), key=lambda value: -value)
+    return min(max(i, low), high - 1)

@@ -1,0 +1,128 @@
+"""What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder, OwnScene
+from models.advice.price.problem import Setting
+from models.core.errors import InputError, RunFailed
+
+AGREED = 4.0
+"""A solver of another family differs by less than this part of the tolerance."""
+NEARLY = 1e-3
+"""Of a row's spacing: times so near to a row are its own, to the rounding of times."""
+MOST_ROWS = 4_000_000
+"""Rows of a reference: beyond, it takes gigabytes."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder; cell : s
+    between kinks of the quantity, 0 where there are none; seconds : that the reference took."""
+
+    answer: Answer
+    uncertainty: float
+    how: str
+    rung: int
+    cell: float = 0.0
+    seconds: float = 0.0
+
+    def error(self, other: Answer) -> float:
+        """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
+        if not np.isfinite(other.values).all():
+            return float("inf")
+        return float(np.abs(other.values - at(self.answer, other.times, self.cell)).max())
+
+    @property
+    def size(self) -> float:
+        """Largest magnitude of the quantity."""
+        return float(np.abs(self.answer.values).max())
+
+
+def at(answer: Answer, times: np.ndarray, cell: float = 0.0) -> np.ndarray:
+    """Values (m, k) at ``times`` (m,) in s: those of the rows where they lie on them, else cubic between four rows,
+    all of them of one cell."""
+    last = len(answer.times) - 1
+    step = float(answer.times[-1]) / last
+    place = times / step
+    index = np.rint(place).astype(int)
+    if np.abs(place - index).max() < NEARLY:
+        return answer.values[np.minimum(index, last)]
+    rows = max(3, round(cell / step)) if cell else last
+    first = np.minimum((place + NEARLY) // rows * rows, last - 3).astype(int)
+    left = np.clip(np.floor(place).astype(int) - 1, first, np.minimum(first + rows, last) - 3)
+    s = place - left
+    weights = (
+        -(s - 1) * (s - 2) * (s - 3) / 6,
+        s * (s - 2) * (s - 3) / 2,
+        -s * (s - 1) * (s - 3) / 2,
+        s * (s - 1) * (s - 2) / 6,
+    )
+    return sum((w[:, None] * answer.values[left + i] for i, w in enumerate(weights)), np.zeros((1, 1)))
+
+
+def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twice: bool = True) -> Truth:
+    """The quantity over ``duration`` (s), known to a twentieth of ``tolerance``; ``twice`` : by a second family too.
+
+    InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
+    """
+    ladder = scene.reference()
+    found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
+    said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
+    other = scene.second(ladder.setting(rung)) if twice else None
+    finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
+    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds)
+    if other is None:
+        return alone
+    differs = alone.error(scene.answer(scene.solve(other, duration)))
+    if differs > tolerance / AGREED:
+        raise RunFailed(
+            "reference",
+            f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged",
+        )
+    return replace(alone, uncertainty=max(change, differs), how=f"{said} and {_named(other)}, which differ by")
+
+
+def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
+    """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
+    both = ((now, before), (before, now))
+    return max(Truth(one, 0.0, "", 0, scene.cell).error(other) for one, other in both)
+
+
+def _named(setting: Setting) -> str:
+    return f"{setting.engine} {setting.method} at {setting.label()}"
+
+
+def _settled(
+    scene: OwnScene, ladder: Ladder, tolerance: float, duration: float, rung: int
+) -> tuple[Answer, int, float, float]:
+    """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
+    seconds that it took."""
+    before: Answer | None = None
+    change, failure = float("inf"), ""
+    for i in range(rung, len(ladder.values)):
+        if duration / ladder.values[i] > MOST_ROWS:
+            break
+        begun = time.perf_counter()
+        try:
+            now = scene.answer(scene.solve(ladder.setting(i), duration))
+        except (InputError, RunFailed) as error:
+            before, failure = None, str(error)
+            continue
+        if before is not None:
+            last, change = change, _change(scene, before, now)
+            if change <= tolerance / ladder.sure:
+                return now, i, change, time.perf_counter() - begun
+            if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
+                break  # rounding: finer steps no longer help
+        before = now
+    if before is None:
+        raise RunFailed("reference", failure or "no step is fine enough")
+    raise InputError(
+        "--tolerance",
+        "",
+        tolerance,
+        f"is finer than the scene's own reference can be known here: at least {ladder.sure * change:.2g} {scene.unit}",
+    )

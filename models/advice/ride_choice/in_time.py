@@ -1,0 +1,264 @@
+"""A ride scene with bent springs as it is run in time, less what is left out: copies of its vehicle on random roads.
+
+The copies know nothing of each other, and two runs meet the same roads, so that what leaving something out changes is
+known with its standard error. A longer step reads every so many rows of the same roads.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError, RunFailed
+from models.core.scene_effects import absent, beside
+from models.core.strict import LARGEST, Strict, quantity
+from models.ride.gaussian_laws import of_curve, of_friction
+from models.ride.nonlinear_copies import EVERY, March, forgotten, usual_step
+from models.ride.road_path import RoadPath, check_rates, road_path
+from models.ride.statistical_linearisation import BentSpring, bent, statistically_linear
+from models.road.excitation import Excitation
+from models.systems.ride.of_scene import vehicle_of
+from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal
+from models.systems.ride.reduced_scene import without as held_without
+from models.systems.ride.scene import RideScene
+from models.vehicles.linear_vehicle import Output
+from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
+
+FEWEST = 12
+"""Copies of which a standard error can be told, its own error about a fifth."""
+UNIT = 48
+"""Steps are whole numbers of so many, before and while outputs count: a step may be any divisor of it times as long."""
+ROOM = 3e8
+"""Bytes of roads that are kept, which many variants share, before one more."""
+
+
+class Samples(Strict):
+    """What a scene's [options] say of its copies."""
+
+    copies: int = Field(default=48, ge=FEWEST, le=100_000, description="of the vehicle, each on a road of its own")
+    lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
+    seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads")
+
+
+@dataclass(frozen=True)
+class Pace:
+    """At one speed (m/s): the road's ``half`` step (s), steps before outputs count and while they do, and how the bent
+    springs of the whole vehicle move."""
+
+    speed: float
+    half: float
+    settling: int
+    counted: int
+    springs: dict[str, BentSpring]
+
+    @property
+    def steps(self) -> int:
+        """Of a copy."""
+        return self.settling + self.counted
+
+
+@dataclass(frozen=True)
+class InTime:
+    """A scene's copies at all its speeds, less ``left_out``, with steps so many ``times`` as long."""
+
+    held: Held
+    samples: Samples
+    paces: tuple[Pace, ...]
+    effects: tuple[Effect, ...]
+    left_out: frozenset[str] = frozenset()
+    times: int = 1
+    system = "ride"
+
+    @property
+    def file(self) -> str:
+        """The scene's."""
+        return self.held.scene.file
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Effects that are there."""
+        return tuple(effect.name for effect in self.effects if effect.name not in self.left_out)
+
+    @property
+    def said(self) -> dict[str, str]:
+        """What leaving each of all effects out means."""
+        return {effect.name: effect.says for effect in self.effects}
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """Effects that the scene does not name."""
+        return absent(self.held.scene)
+
+    def beside(self, name: str) -> "InTime":
+        """With one of these at its usual values; InputError where it cannot be."""
+        scene = beside(self.held.scene, name)
+        held = Held(scene, vehicle_of(scene))
+        _check(held)
+        return replace(self, held=held)
+
+    @property
+    def steps(self) -> int:
+        """Of all copies at all speeds."""
+        return self.samples.copies * sum(pace.steps for pace in self.paces) // self.times
+
+    def without(self, names: Iterable[str]) -> "InTime":
+        """Less these effects; InputError where they may not go."""
+        left_out = self.left_out | set(names)
+        chosen = [effect for effect in self.effects if effect.name in left_out]
+        why = illegal(chosen)
+        if why:
+            raise InputError(self.file, "effects", None, why)
+        fresh = [effect for effect in chosen if effect.name not in self.left_out]
+        return replace(self, held=held_without(self.held, fresh), left_out=left_out)
+
+    def longer(self, times: int) -> "InTime":
+        """With steps so many times as long."""
+        return replace(self, times=self.times * times)
+
+    def fewer(self, steps: int) -> "InTime":
+        """With as many copies as take about so many steps, and no fewer than tell a standard error."""
+        copies = max(FEWEST, -(-self.samples.copies * steps // self.steps))
+        return replace(self, samples=self.samples.model_copy(update={"copies": min(copies, self.samples.copies)}))
+
+    @cached_property
+    def _excitation(self) -> Excitation:
+        return self.held.excitation()
+
+    def vehicle(self, pace: Pace) -> SpatialVehicle:
+        """What is left of the vehicle at a speed; InputError where a run in time cannot do without it."""
+        return left(self.held, pace.springs)
+
+    def roads(self, pace: Pace) -> np.ndarray:
+        """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
+        roads = _roads(RoadPath(self._excitation, pace.speed, pace.half), pace.steps, self.samples)
+        return np.ascontiguousarray(roads[:: self.times])
+
+    def squares(self, pace: Pace, roads: np.ndarray) -> tuple[tuple[Output, ...], np.ndarray]:
+        """Outputs, and each copy's mean square (copies, p) about the mean of all."""
+        step = 2.0 * pace.half * self.times
+        march = March(self.vehicle(pace), pace.speed, step, self.samples.copies)
+        every = max(1, EVERY // self.times)
+        march.over(roads, pace.settling // self.times, every)
+        count = len(range(0, pace.counted // self.times, every))
+        first, second = march.sums[0].T / count, march.sums[1].T / count
+        if not (second < LARGEST).all():
+            raise RunFailed("reference", f"grows without end in steps of {step:.3g} s", step)
+        mean = first.mean(axis=0)
+        return march.plain.outputs, second - 2 * mean * first + mean**2
+
+
+def in_time(held: Held) -> InTime:
+    """The whole of a scene; InputError for one that has a closed form, or that no copies answer."""
+    _check(held)
+    scene = held.scene
+    assert scene.speeds is not None
+    own = {key: value for key, value in scene.options.items() if key in Samples.model_fields}
+    samples = Samples.model_validate(own)
+    paces = tuple(_pace(held, float(speed), samples.lasting) for speed in scene.speeds.all())
+    return InTime(held, samples, paces, tuple(effect for effect in effects_of(held) if _may_go(held, effect)))
+
+
+def goes_in_time(scene: RideScene) -> bool:
+    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them, or tyres
+    may lift."""
+    return not scene.vehicle.small_motion and _in_time_only(vehicle_of(scene))
+
+
+def _in_time_only(vehicle: SpatialVehicle) -> bool:
+    return bool(bent(vehicle)) or vehicle.lifts
+
+
+def _check(held: Held) -> None:
+    scene = held.scene
+    if scene.vehicle.small_motion or not _in_time_only(held.vehicle):
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
+    if scene.speeds is None:
+        raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
+    for name, by in scene.weighting.items():
+        raise InputError(scene.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
+    check_rates(held.vehicle, held.excitation(), scene.file)
+
+
+def _pace(held: Held, speed: float, lasting: float) -> Pace:
+    excitation = held.excitation()
+    found = statistically_linear(held.vehicle.with_tyres(pushes_only=False), excitation, speed)
+    half = road_path(excitation, speed, usual_step(held.vehicle, speed, found.vehicle)).half
+    unit = 2.0 * half * UNIT
+    settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(found.vehicle), lasting))
+    return Pace(speed, half, settling, counted, found.springs)
+
+
+def _may_go(held: Held, effect: Effect) -> bool:
+    """Whether a run in time can do without an effect and all that it takes along."""
+    rest = effect.without(held)
+    bushings = rest.rigid and any({s.one, s.two} & _wheels(held.vehicle) for s in _named(held.vehicle, rest.rigid))
+    return not (rest.massless or bushings)
+
+
+def left(held: Held, moving: dict[str, BentSpring]) -> SpatialVehicle:
+    """The vehicle of what is held; ``moving``: how bent springs move, for the gains of straight laws."""
+    vehicle = replace(
+        held.vehicle,
+        springs=tuple(_straight(s, held.straight, moving) for s in held.vehicle.springs if s.name not in held.rigid),
+    )
+    seats = {s.one: s.two for s in _named(held.vehicle, held.rigid) if s.two is not None}
+    bodies = [_held(body, held, seats) for body in vehicle.bodies]
+    return replace(vehicle, bodies=tuple(sorted(bodies, key=lambda body: body.name in seats)))
+
+
+def _held(body: Body, held: Held, seats: dict[str, str]) -> Body:
+    if body.name in seats:
+        return replace(body, freedoms=(), parent=seats[body.name])
+    return replace(body, freedoms=tuple(f for f in body.freedoms if (body.name, f) not in held.locked))
+
+
+def _straight(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
+    """Gains of statistical linearisation in place of these laws."""
+    own = moving.get(spring.name)
+    if own is None:
+        return spring
+    if "travel_force" in laws and spring.travel_force:
+        gain = of_curve(spring.travel_force, own.travel, own.deviation)[1]
+        spring = replace(spring, stiffness=spring.stiffness + gain, travel_force=None)
+    if "rate_force" in laws and spring.rate_force:
+        gain = of_curve(spring.rate_force, 0.0, own.rate)[1]
+        spring = replace(spring, damping=spring.damping + gain, rate_force=None)
+    if "friction" in laws and spring.friction:
+        gain = of_friction(spring.friction, spring.friction_rate, own.rate)
+        spring = replace(spring, damping=spring.damping + gain, friction=0.0)
+    return spring
+
+
+def _named(vehicle: SpatialVehicle, names: Iterable[str]) -> list[SpringDamper]:
+    return [spring for spring in vehicle.springs if spring.name in set(names)]
+
+
+def _wheels(vehicle: SpatialVehicle) -> set[str]:
+    return {tyre.body for tyre in vehicle.tyres}
+
+
+_kept: dict[tuple[object, ...], np.ndarray] = {}
+
+
+def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
+    """Heights and rates (2 steps + 1, 2 w, copies); the last few that were asked for are kept."""
+    own = path.excitation
+    key = (
+        own.F.tobytes(),
+        own.G.tobytes(),
+        *(H.tobytes() for H in own.heights),
+        own.lengths,
+        own.independent,
+        path.speed,
+        path.half,
+        steps,
+        samples.copies,
+        samples.seed,
+    )
+    if key not in _kept:
+        while sum(roads.nbytes for roads in _kept.values()) > ROOM:
+            del _kept[next(iter(_kept))]
+        _kept[key] = next(path.blocks(steps, samples.copies, samples.seed))
+    return _kept[key]

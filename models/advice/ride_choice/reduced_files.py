@@ -1,0 +1,89 @@
+"""The files of what a choice has left: a scene of the study ride and a reduced vehicle, which run as they stand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from models.core.scene_effects import own_table
+from models.core.scene_file import parse
+from models.systems.ride.of_scene import CLOSED
+from models.systems.ride.reduced_scene import Held
+from models.vehicles.vehicle_file import vehicle_path
+
+SCENE, VEHICLE = "reduced.toml", "reduced_vehicle.toml"
+ASKED = ("quantities", "tolerance", "options")
+"""Keys of a scene that belong to its question."""
+
+
+def write(rest: Held, folder: Path) -> Path:
+    """Write both into a folder; returns the scene's path."""
+    scene = own_table(rest.scene)
+    whole = scene["vehicle"]["file"]
+    vehicle = reduced(parse(vehicle_path(whole, rest.scene.folder)), rest)
+    notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
+    with (folder / VEHICLE).open("x") as file:
+        file.write(toml({**vehicle, "notes": notes}))
+    table = {key: value for key, value in scene.items() if key not in ASKED and value != "auto"}
+    road = dict(table.get("road", {}))
+    if "file" in road:
+        road["file"] = str(rest.scene.path(road["file"], "road.file").resolve())
+    changes = {
+        "title": f"{rest.scene.title}, less what was left out",
+        "system": "ride",
+        "study": CLOSED,
+        "vehicle": {**scene["vehicle"], "file": VEHICLE},
+    }
+    with (folder / SCENE).open("x") as file:
+        file.write(toml({**table, **changes, **({"road": road} if road else {})}))
+    return folder / SCENE
+
+
+def reduced(table: dict[str, Any], rest: Held) -> dict[str, Any]:
+    """The tables of the whole vehicle less bars, damping of tyres and what the limits name."""
+    bars = {bar.name for bar in rest.vehicle.bars}
+    undamped = {tyre.name for tyre in rest.vehicle.tyres if not tyre.damping}
+    found = dict(table)
+    if "anti_roll_bars" in table:
+        found["anti_roll_bars"] = [bar for bar in table["anti_roll_bars"] if bar["name"] in bars]
+    found["tyres"] = [{**tyre, "damping": 0.0} if tyre["name"] in undamped else tyre for tyre in table["tyres"]]
+    limits = {
+        "massless": sorted(rest.massless),
+        "rigid": sorted(rest.rigid),
+        "locked": [list(one) for one in sorted(rest.locked)],
+    }
+    given = {key: names for key, names in limits.items() if names}
+    return found | ({"reduced": given} if given else {})
+
+
+def toml(table: dict[str, Any]) -> str:
+    """Nested tables as a TOML file: plain keys first, then a block for each table and each table of a list."""
+    lines, blocks = list[str](), list[str]()
+    for key, value in table.items():
+        if isinstance(value, dict) and not value:
+            continue
+        if isinstance(value, dict):
+            blocks += ["", f"[{_key(key)}]", *_lines(value)]
+        elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+            for one in value:
+                blocks += ["", f"[[{_key(key)}]]", *_lines(one)]
+        else:
+            lines.append(f"{_key(key)} = {_value(value)}")
+    return "\n".join([*lines, *blocks]) + "\n"
+
+
+def _lines(table: dict[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(_lines(value)) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return json.dumps(value) if isinstance(value, str) else repr(value)

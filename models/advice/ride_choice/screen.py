@@ -1,0 +1,111 @@
+"""What leaving effects out does to quantities, from one covariance and one adjoint solve of the whole scene each.
+
+The variance of a reduced system, A_r, C_r, noise Q_r, is for **any** symmetric matrix P_m exactly
+
+    J_r = tr(L_r (A_r P_m + P_m A_r' + Q_r)) + C_r P_m C_r',    A_r' L_r + L_r A_r + C_r' C_r = 0.
+
+With P_m the whole scene's covariance P seen in the reduced state (``Reduced.left``) this is the certificate: two routes
+to one number. With L_r, too, replaced by the whole scene's L, T' L T, it is the screen: no equation is solved for the
+effect, and the error is a product of two small ones, the residual of P_m and the adjoint's own. For changed values
+alone, T = 1, it reads dJ = tr(L (dA P + P dA' + dQ)) + 2 dC P C' + dC P dC'.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
+
+from models.advice.ride_choice.reduced import Reduced
+from models.core.errors import InputError
+from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
+from models.ride.delayed_system import DelayedSystem
+from models.ride.marginal import parts
+
+SLOWEST = 1e-9
+"""Decay, by the fastest rate, below which a motion counts as one that does not die out."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Covariance P (n, n), adjoints L (quantities, n, n) and variances (quantities,), in extended precision."""
+
+    P: np.ndarray
+    L: np.ndarray
+    variance: np.ndarray
+
+
+def solve(system: DelayedSystem, rows: list[int]) -> Solved:
+    """P and L of a system whose every motion dies out; InputError for one with a motion that nothing pulls back."""
+    split = parts(system.A)
+    if split.marginal:
+        raise InputError("", "vehicle", None, "has a motion that nothing pulls back: no adjoint to screen effects with")
+    noise = noise_of(system)
+    Q = (split.W @ noise @ split.W.T).astype(float)
+    V, W = split.V, split.W
+    P = V @ lyapunov(split.S, Q)[0] @ V.T
+    C = system.C[rows]
+    seen = (C @ V).astype(float)
+    L = np.array([W.T @ lyapunov(split.S.T, np.outer(c, c))[0] @ W for c in seen])
+    return Solved(P, L, np.array([c @ P @ c for c in C.astype(np.longdouble)]))
+
+
+class Screen:
+    """Predictions for systems reduced further than ``base``, from its solution; quantities by their rows of C."""
+
+    def __init__(self, base: Reduced, rows: list[int]) -> None:
+        self.base, self.rows = base, rows
+        A, C = base.system.A, base.system.C[rows]
+        if still(A):
+            raise InputError(
+                "",
+                "vehicle",
+                None,
+                "has a motion that nothing pulls back, as one that is free to drive "
+                "away: effects are chosen for vehicles of which every motion dies out",
+            )
+        self.P = solve_continuous_lyapunov(A, -noise_of(base.system))
+        self.L = np.array([solve_continuous_lyapunov(A.T, -np.outer(c, c)) for c in C])
+
+    @cached_property
+    def solved(self) -> Solved:
+        """The base's solution in extended precision, for the certificate."""
+        return solve(self.base.system, self.rows)
+
+    def predicted(self, reduced: Reduced) -> np.ndarray:
+        """Variances (quantities,) of the reduced system; inf where it passes white noise."""
+        system, left, T = reduced.system, reduced.left @ self.base.T, self.base.left @ reduced.T
+        P, C = left @ self.P @ left.T, system.C[self.rows]
+        half = system.A @ P
+        rest = half + half.T + noise_of(system)
+        J = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", T.T @ self.L @ T, rest)
+        white = sum((d[self.rows] ** 2).sum(axis=1) for d in system.D) > 0
+        return np.where(white, np.inf, np.maximum(J, 0.0))
+
+    def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
+        """Certificate: variances (quantities,) by the whole scene's P and the reduced L, and by the reduced P."""
+        system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
+        own = solve(system, self.rows)
+        P = left @ self.solved.P @ left.T
+        half = system.A.astype(np.longdouble) @ P
+        rest = half + half.T + noise_of(system)
+        C = system.C[self.rows].astype(np.longdouble)
+        found = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", own.L, rest)
+        return found.astype(float), own.variance.astype(float)
+
+
+def still(A: np.ndarray) -> bool:
+    """Whether x' = A x has a motion that does not die out, or not to speak of."""
+    values = np.linalg.eigvals(A)
+    return bool(values.real.max(initial=-np.inf) > -SLOWEST * abs(values).max(initial=0.0))
+
+
+def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
+    found: Covariance = stationary(reduced.system)
+    return np.array([found.variance[row] if found.status[row] == FINITE else np.inf for row in rows])
+
+
+def silent(reduced: Reduced, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) up to which there is nothing but rounding."""
+    return silence(reduced.system.C[rows], stationary(reduced.system).P)

@@ -1,0 +1,61 @@
+"""A brake: from chamber pressure to torque, with push-out pressure, hysteresis and a gradient for either way.
+
+Torque rises along ``rising`` (p - push_out) and falls along ``falling`` (p - release), and between these two lines it
+stays: T = max(up(p), min(down(p), T)). The upper line is the one on which pressure falls, so that the loop is run
+through in the sense of friction, with the area between the lines, and torque never changes its sign. Source of the
+form: the paper's brake model "includes pushout pressure and hysteresis", and "different gradients when pressure is
+rising and decreasing".
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import model_validator
+
+from models.core.strict import Strict, quantity
+from models.machine.compiled import lean
+
+
+class Brake(Strict):
+    """The brake of one wheel; raises InputError if torque were to fall below the line on which it rises."""
+
+    push_out: float = quantity("bar", "pressure above which torque rises from none", zero=True)
+    release: float = quantity("bar", "pressure below which there is no torque; at most push_out", zero=True)
+    rising: float = quantity("N m/bar", "gradient of the torque while pressure rises")
+    falling: float = quantity("N m/bar", "gradient of the torque while pressure falls; at least rising")
+
+    @model_validator(mode="after")
+    def _a_loop(self) -> "Brake":
+        if self.release > self.push_out:
+            raise ValueError(f"release must be at most push_out, {self.push_out:g} bar: brakes let go below that")
+        if self.falling < self.rising:
+            raise ValueError(f"falling must be at least rising, {self.rising:g} N m/bar: hysteresis holds torque back")
+        return self
+
+
+class Brakes(NamedTuple):
+    """Brakes of W wheels for compiled functions, each (W,): see ``Brake``."""
+
+    push_out: np.ndarray
+    release: np.ndarray
+    rising: np.ndarray
+    falling: np.ndarray
+
+
+def of_wheels(*brakes: Brake) -> Brakes:
+    """Numbers of the brakes of all wheels, in their order."""
+    return Brakes(*(np.array([getattr(brake, name) for brake in brakes]) for name in Brakes._fields))
+
+
+@lean
+def torque(i, pressure, before, brakes):
+    """Torque (N m) of brake i at a pressure (bar) that was reached without turning back since the torque ``before``."""
+    up = brakes.rising[i] * max(0.0, pressure - brakes.push_out[i])
+    down = brakes.falling[i] * max(0.0, pressure - brakes.release[i])
+    return max(up, min(down, before))
+
+
+PAPER_FRONT = Brake(push_out=0.75, release=0.71, rising=1500.0, falling=1500.0)
+PAPER_REAR = Brake(push_out=0.25, release=0.25, rising=1200.0, falling=1200.0)
+"""The paper's brakes as far as its printed data can be read: its hysteresis parameters (0.71, 0.75; 0.25, 0.25) are
+good, that they are these two pressures and that the factors are 1500 and 1200 N m/bar is guessed."""

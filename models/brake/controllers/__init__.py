@@ -1,0 +1,16 @@
+"""Controllers of anti-lock brakes, one file each; all decide wheel by wheel, or axle by axle where they select low."""
+
+from models.brake.controller import AllApplied
+from models.brake.controllers.acceleration_phases import AccelerationPhases
+from models.brake.controllers.five_phase import FivePhase
+from models.brake.controllers.slip_bang_bang import SlipBangBang
+from models.brake.controllers.slip_pi import SlipPI
+
+CONTROLLERS = {
+    "none": AllApplied,
+    "slip_bang_bang": SlipBangBang,
+    "acceleration_phases": AccelerationPhases,
+    "five_phase": FivePhase,
+    "slip_pi": SlipPI,
+}
+"""By the names that scenes give them; each is made from the number of wheels and its parameters."""

@@ -1,0 +1,91 @@
+"""The five-phase hybrid controller: by the wheel's acceleration alone, round a limit cycle about the tyre's peak.
+
+    1  pressure falls at ``falling``  until y >= e1
+    2  it holds                       until y >= e2
+    3  it rises at ``fast``           until y <= e3
+    4  it holds                       until y <= e4
+    5  it rises at ``slow``           until y <= -e5, then phase 1
+
+with y = r w' the acceleration of the wheel's rim. It begins with phase 3 until y <= -e5. Source: W. Pasillas-Lepine,
+Hybrid modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms, Vehicle System Dynamics
+44 (2006) 173-188; M. Gerard, W. Pasillas-Lepine, E. de Vries, M. Verhaegen, Adaptation of hybrid five-phase ABS
+algorithms for experimental validation, AAC 2010. e1 has to be large enough for the wheel not to lock in phase 2. Where
+one set of thresholds has to do for all roads three rules of ours hold the cycle together: a wheel that in phase 2 gains
+speed no more (y <= e4), or in phase 1 has no pressure left and rolls, goes on with phase 5, and one at a deep slip
+with phase 1.
+"""
+
+from dataclasses import dataclass
+
+from models.brake.controller import Command, Sample
+from models.brake.controllers.per_wheel import ACCELERATION, PRESSURE_RATE, SLIP, Common, PerWheel
+from models.core.errors import InputError
+
+
+@dataclass
+class FivePhase(Common):
+    """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
+
+    wheels: int
+    e1: float = 4.0
+    e2: float = 5.0
+    e3: float = 4.5
+    e4: float = 1.0
+    e5: float = 13.0
+    falling: float = 40.0
+    fast: float = 20.0
+    slow: float = 5.0
+    deep: float = 0.3
+
+    def __post_init__(self) -> None:
+        self.check(
+            **dict.fromkeys(("e1", "e2", "e3", "e5"), ACCELERATION),
+            e4=(-1e4, 1e4),
+            deep=SLIP,
+            **dict.fromkeys(("falling", "fast", "slow"), PRESSURE_RATE),
+        )
+        if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
+            raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
+        self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)
+
+    def sample(self, given: Sample) -> Command:
+        """Pressures."""
+        return self._loop.command(given)
+
+
+FIRST = 0
+
+
+def end_of(phase: int, own: FivePhase) -> tuple[float, float]:
+    """Sign of the way in which the wheel's acceleration (m/s^2) ends a phase, and the level at which it does."""
+    if phase in (1, 2):
+        return 1.0, own.e1 if phase == 1 else own.e2
+    return -1.0, {3: own.e3, 4: own.e4}.get(phase, -own.e5)
+
+
+def rate(phase: int, own: FivePhase) -> float:
+    """Rate of the pressure (bar/s) in a phase."""
+    return (own.fast, -own.falling, 0.0, own.fast, 0.0, own.slow)[phase]
+
+
+class _Logic:
+    def __init__(self, own: FivePhase) -> None:
+        self._own, self._phase, self._pressure = own, FIRST, 0.0
+
+    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+        sign, level = end_of(self._phase, self._own)
+        if sign * (gains - level) >= 0.0:
+            self._phase = self._phase % 5 + 1
+        elif self._rolls_on(slip, gains):
+            self._phase = 5
+        if self._phase != 1 and slip > self._own.deep:
+            self._phase = 1
+        raised = self._pressure + rate(self._phase, self._own) * self._own.period
+        self._pressure = min(max(raised, 0.0), supply)
+        return self._pressure
+
+    def _rolls_on(self, slip: float, gains: float) -> bool:
+        """Whether a wheel gains speed no more, or rolls with no pressure left."""
+        if self._phase == 1:
+            return self._pressure == 0.0 and slip <= self._own.deep
+        return self._phase == 2 and gains <= self._own.e4

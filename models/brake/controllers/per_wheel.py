@@ -1,0 +1,110 @@
+"""What all controllers share: a logic per wheel or axle, the vehicle's speed, and an end of control when it is slow."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from models.brake.controller import APPLY, RELEASE, SAMPLE, Command, Sample
+from models.brake.speed_estimate import SpeedEstimate, speed_of
+from models.core.errors import InputError
+
+MEMORY = 0.1
+"""s"""
+SMALLEST = 5e-324
+"""What is above its negative is zero or more, and what is at most its negative is below zero."""
+ACCELERATION, PRESSURE_RATE = (0.0, 1e4), (0.0, 1e5)
+"""Bounds of thresholds of a wheel's acceleration (m/s^2) and of rates of pressure (bar/s): no wheel, no valve is
+faster."""
+SLIP = (0.0, 1.0)
+"""Bounds of thresholds of slip: a wheel that stands has 1."""
+
+
+class Logic(Protocol):
+    """Decides for one wheel, or for one axle by the slower of its wheels."""
+
+    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+        """State of a valve, or a pressure (bar), from the wheel's slip, its acceleration less that of the vehicle
+        (m/s^2), the vehicle's speed (m/s) and the supply (bar)."""
+        ...
+
+
+@dataclass(kw_only=True)
+class Common:
+    """Parameters of every controller.
+
+    select_low : axles, from 0, whose two wheels get what the slower one needs; cut_off : speed of the vehicle (m/s)
+    below which all brakes are applied, so that it comes to rest; period : s between two samples.
+    """
+
+    select_low: tuple[int, ...] = ()
+    cut_off: float = 1.5
+    period: float = SAMPLE
+
+    def check(self, **bounds: tuple[float, float]) -> None:
+        """Refuse what is no number, or is outside the bounds of its name: above the first, up to the second.
+
+        Raises InputError; for axles that are none, ``PerWheel`` does.
+        """
+        for name, (above, most) in {"period": (0.0, 1.0), "cut_off": (-SMALLEST, 100.0), **bounds}.items():
+            value, place = getattr(self, name), f"controller.parameters.{name}"
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+                raise InputError("", place, value, "must be a number")
+            if not above < value <= most:
+                least = "0 or more" if above == -SMALLEST else f"above {above:g}"
+                largest = "below 0" if most == -SMALLEST else f"at most {most:g}"
+                raise InputError("", place, value, f"must be {least}, {largest}")
+        self.select_low = tuple(self.select_low)
+
+
+class PerWheel:
+    """The loop over wheels of every controller; ``pressures`` tells whether its logics answer with those."""
+
+    def __init__(self, wheels: int, common: Common, logic: Callable[[], Logic], pressures: bool = False) -> None:
+        for axle in common.select_low:
+            if not (isinstance(axle, int) and 0 <= 2 * axle + 1 < wheels):
+                raise InputError("", "controller.parameters.select_low", axle, f"must be axles 0 to {wheels // 2 - 1}")
+        shared = [(2 * axle, 2 * axle + 1) for axle in common.select_low]
+        alone = [(i, i) for i in range(wheels) if i // 2 not in common.select_low]
+        self._groups = sorted(shared + alone)
+        self._logics = [logic() for _ in self._groups]
+        self._common, self._pressures, self._wheels = common, pressures, wheels
+        self._estimate, self._before = SpeedEstimate(common.period), [np.nan] * len(self._groups)
+        self._speed, self._slowing = np.nan, 0.0
+
+    def command(self, given: Sample) -> Command:
+        """Answer to one sample; without the brake switch all is released."""
+        wheels = given.wheels.tolist()
+        speed = speed_of(given.speed, wheels, self._estimate)
+        slowing = self._mean_slowing(speed)
+        if not given.brake:
+            return self._all(0.0 if self._pressures else RELEASE)
+        out = [0.0] * self._wheels
+        for k, (first, last) in enumerate(self._groups):
+            wheel = min(wheels[first], wheels[last])
+            before = self._before[k]
+            gains = (wheel - before) / self._common.period - slowing if before == before else 0.0
+            self._before[k] = wheel
+            if speed > 0.0:
+                answer = self._logics[k].decide(1.0 - wheel / speed, gains, speed, given.supply)
+                out[first] = out[last] = answer
+        if speed < self._common.cut_off:
+            return self._all(given.supply if self._pressures else APPLY)
+        return self._said(out)
+
+    def _mean_slowing(self, speed: float) -> float:
+        """Acceleration of the vehicle (m/s^2), its mean over the last ``MEMORY`` seconds or so."""
+        if self._speed == self._speed:
+            latest = (speed - self._speed) / self._common.period
+            self._slowing += (latest - self._slowing) * min(self._common.period / MEMORY, 1.0)
+        self._speed = speed
+        return self._slowing
+
+    def _all(self, answer: float) -> Command:
+        return self._said([answer] * self._wheels)
+
+    def _said(self, answers: list[float]) -> Command:
+        if self._pressures:
+            return Command(pressures=np.array(answers, dtype=float))
+        return Command(valves=np.array(answers, dtype=np.int64))

@@ -1,0 +1,172 @@
+"""What test engineers call a stop: decelerations, distances, adhesion utilisation, split friction, turns.
+
+Formulas of UN Regulation 13, of ISO 21994, 16552 and 14794 as they are commonly quoted: not checked against the text of
+the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration by g.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.plane_vehicle import GRAVITY
+from models.core.errors import InputError
+
+KMH = 1.0 / 3.6
+"""m/s of a kilometre per hour."""
+NOT_CHECKED = "not checked against the text of the regulation"
+ROLLING_DRIVEN, ROLLING_FREE = 0.015, 0.010
+"""Rolling resistance by load that Annex 13 takes for an axle without brake: of a driven and of an undriven one."""
+UTILISED = 0.75
+"""Least adhesion utilisation of a category 1 system."""
+
+
+@dataclass(frozen=True)
+class Axles:
+    """Static loads (N) of front and rear, wheelbase and height of the centre of mass (m)."""
+
+    front: float
+    rear: float
+    wheelbase: float
+    height: float
+
+    @property
+    def weight(self) -> float:
+        """Of the vehicle (N)."""
+        return self.front + self.rear
+
+    def dynamic(self, z: float) -> tuple[float, float]:
+        """Loads (N) of front and rear at a deceleration z g."""
+        moved = self.height / self.wheelbase * z * self.weight
+        return self.front + moved, self.rear - moved
+
+
+def crossing(times: np.ndarray, speeds: np.ndarray, speed: float) -> float:
+    """Time (s) at which a speed is first fallen below, linear between samples; not a number if it never is."""
+    below = np.flatnonzero(speeds < speed)
+    if below.size == 0 or below[0] == 0:
+        return float("nan")
+    i = below[0]
+    share = (speeds[i - 1] - speed) / (speeds[i - 1] - speeds[i])
+    return float(times[i - 1] + share * (times[i] - times[i - 1]))
+
+
+def way_at(times: np.ndarray, way: np.ndarray, speeds: np.ndarray, time: float) -> float:
+    """Way (m) at a time between two samples, at constant deceleration within that sample."""
+    i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
+    passed, long = time - times[i], times[i + 1] - times[i]
+    rate = (speeds[i + 1] - speeds[i]) / long
+    whole = long * (speeds[i] + 0.5 * rate * long)
+    some = passed * (speeds[i] + 0.5 * rate * passed)
+    return float(way[i] + (way[i + 1] - way[i]) * (some / whole if whole > 0.0 else 0.0))
+
+
+def mean_fully_developed(times: np.ndarray, way: np.ndarray, speeds: np.ndarray) -> float:
+    """MFDD (m/s^2): (vb^2 - ve^2) / (2 (s_e - s_b)) between vb = 0.8 v0 and ve = 0.1 v0.
+
+    Source: UN R13, Annex 4, d_m = (vb^2 - ve^2) / (25.92 (s_e - s_b)) in km/h and m; not checked against the text of
+    the regulation. Not a number if the vehicle does not get so slow.
+    """
+    high, low = 0.8 * speeds[0], 0.1 * speeds[0]
+    begin, end = (crossing(times, speeds, speed) for speed in (high, low))
+    if not np.isfinite(begin + end):
+        return float("nan")
+    covered = way_at(times, way, speeds, end) - way_at(times, way, speeds, begin)
+    return float((high**2 - low**2) / (2.0 * covered))
+
+
+def equivalent_deceleration(speed: float, distance: float) -> float:
+    """v0^2 / (2 d) in m/s^2: the uniform deceleration that stops in the same distance."""
+    return speed**2 / (2.0 * distance)
+
+
+def braking_rate(high: float, low: float, time: float) -> float:
+    """z of a vehicle that takes ``time`` (s) from one speed to a lower one (m/s).
+
+    From 40 to 20 km/h it is 0.566 / t, from 45 to 15 km/h 0.849 / t (UN R13, Annex 13; not checked against the text).
+    """
+    return (high - low) / (GRAVITY * time)
+
+
+def mean_of_fastest(times: np.ndarray) -> float:
+    """Mean of the (at most three) least times within 1.05 of the least one.
+
+    Source: UN R13, Annex 13, appendix 2; not checked against the text of the regulation.
+    """
+    ordered = np.sort(np.asarray(times, float)[np.isfinite(times)])
+    if ordered.size == 0:
+        raise InputError("", "times", [], "needs at least one run that slows down far enough")
+    return float(ordered[ordered <= 1.05 * ordered[0]][:3].mean())
+
+
+def adhesion_front(z: float, axles: Axles) -> float:
+    """k of the front axle from the braking rate with that axle alone braked, the rear one driven: rounded to 0.001.
+
+    (z P g - 0.015 F2) / (F1 + (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
+    """
+    return round((z * axles.weight - ROLLING_DRIVEN * axles.rear) / axles.dynamic(z)[0], 3)
+
+
+def adhesion_rear(z: float, axles: Axles) -> float:
+    """k of the rear axle from the braking rate with that axle alone braked, the front one not driven.
+
+    (z P g - 0.010 F1) / (F2 - (h / E) z P g). Source: UN R13, Annex 13; not checked against the text of the regulation.
+    """
+    return round((z * axles.weight - ROLLING_FREE * axles.front) / axles.dynamic(z)[1], 3)
+
+
+def adhesion_trailer(z: float, weight: float, load: float) -> float:
+    """k of one axle of a trailer from the braking rate of the train (weight in N) with it alone braked: z P g / F_dyn.
+
+    load: F_dyn, N. Ours; nothing is taken off for wheels that roll, as none has rolling resistance here, and a whole
+    train's would be a third of what one axle does on ice.
+    """
+    return round(z * weight / load, 3)
+
+
+def adhesion_of_vehicle(z: float, k_front: float, k_rear: float, axles: Axles) -> float:
+    """k_M = (k_f F_fdyn + k_r F_rdyn) / (P g) with the loads at the braking rate z of the anti-lock system.
+
+    Source: UN R13, Annex 13; not checked against the text of the regulation.
+    """
+    front, rear = axles.dynamic(z)
+    return (k_front * front + k_rear * rear) / axles.weight
+
+
+def split_rate(k_low: float, k_high: float) -> float:
+    """Least z_MALS on split friction: the larger of 0.75 (4 k_L + k_H) / 5 and k_L.
+
+    Source: UN R13, Annex 13, laden vehicles of category 1; not checked against the text of the regulation.
+    """
+    return max(UTILISED * (4.0 * k_low + k_high) / 5.0, k_low)
+
+
+def yaw_ratio(yaw_rate: float, speed: float, radius: float) -> float:
+    """Yaw rate by that of the circle at the momentary speed, r R / v: 1 of a vehicle that stays on its circle.
+
+    Source: ISO 7975 and ISO 14794, one second after the brake is applied; not checked against the text of the standard.
+    """
+    return yaw_rate * radius / speed
+
+
+@dataclass(frozen=True)
+class Locks:
+    """Of each wheel (W,): time locked (s), share of the time, longest lock (s), above a speed of the vehicle."""
+
+    time: np.ndarray
+    share: np.ndarray
+    longest: np.ndarray
+
+
+def lock_table(lengths: np.ndarray, locked: np.ndarray, speeds: np.ndarray, above: float = 15.0 * KMH) -> Locks:
+    """Locks above a speed (m/s): lengths (n,) of the samples in s, locked (n, W) whether a wheel stands, speeds (n,).
+
+    UN R13, Annex 13 lets wheels lock below 15 km/h, and briefly above; not checked against the text of the regulation.
+    """
+    counted = locked & (speeds > above)[:, None]
+    longest, now = np.zeros(locked.shape[1]), np.zeros(locked.shape[1])
+    for length, row in zip(lengths, counted, strict=True):
+        now = np.where(row, now + length, 0.0)
+        longest = np.maximum(longest, now)
+    time = lengths @ counted
+    whole = float(lengths[speeds > above].sum())
+    return Locks(time, time / whole if whole else time, longest)

@@ -1,0 +1,114 @@
+"""Units in the plane, each hinged to the one before it: a truck alone, or a truck, a drawbar and a trailer's body.
+
+Coordinates (n = 2 + U): X, Y of the first unit's centre of mass, then the heading of each unit. The centre of unit k
+is at (X, Y) + sum_j reach[k, j] e(psi_j) with e(psi) = (cos psi, sin psi). If the first point is a hook whose motion is
+prescribed, only the headings are free.
+"""
+
+import math
+
+from models.machine.compiled import inlined, lean
+
+ALONE = 3
+"""Coordinates of one unit that has no other."""
+
+
+@lean
+def point(k, x, y, positions, rates, reach):
+    """Velocity (2) in the ground's axes of the point (x, y) of unit k, in that unit's axes."""
+    vx, vy = rates[0], rates[1]
+    for j in range(reach.shape[1]):
+        way = reach[k, j] + (x if j == k else 0.0)
+        c, s = math.cos(positions[2 + j]), math.sin(positions[2 + j])
+        side = y if j == k else 0.0
+        vx += rates[2 + j] * (-way * s - side * c)
+        vy += rates[2 + j] * (way * c - side * s)
+    return vx, vy
+
+
+@lean
+def place_of(k, x, y, positions, reach):
+    """Place (2) on the ground of the point (x, y) of unit k."""
+    px, py = positions[0], positions[1]
+    for j in range(reach.shape[1]):
+        way = reach[k, j] + (x if j == k else 0.0)
+        c, s = math.cos(positions[2 + j]), math.sin(positions[2 + j])
+        side = y if j == k else 0.0
+        px += way * c - side * s
+        py += way * s + side * c
+    return px, py
+
+
+@inlined
+def headings(positions, units):
+    """Fill the cosine and the sine of the heading of every unit (U, 2)."""
+    for j in range(units.shape[0]):
+        units[j, 0], units[j, 1] = math.cos(positions[2 + j]), math.sin(positions[2 + j])
+
+
+@inlined
+def rows(k, x, y, c, s, units, rates, reach, along, across):
+    """Fill the two rows (n,) that give the velocity of the point (x, y) of unit k in axes whose heading has the cosine
+    c and the sine s; ``units`` : see ``headings``.
+
+    Its acceleration is the rows times those of the coordinates, plus the two terms returned (m/s^2); a force in these
+    axes acts on the coordinates by the rows' transposes.
+    """
+    along[0], along[1], across[0], across[1] = c, s, -s, c
+    ahead, aside = 0.0, 0.0
+    for j in range(units.shape[0]):
+        way, side = reach[k, j], 0.0
+        if j == k:
+            way, side = way + x, y
+        turned, aslant = c * units[j, 0] + s * units[j, 1], s * units[j, 0] - c * units[j, 1]
+        along[2 + j], across[2 + j] = way * aslant - side * turned, way * turned + side * aslant
+        ahead -= across[2 + j] * rates[2 + j] ** 2
+        aside += along[2 + j] * rates[2 + j] ** 2
+    return ahead, aside
+
+
+@inlined
+def inertia(units, rates, masses, inertias, reach, mass, right, along, across):
+    """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,).
+
+    units : see ``headings``; along, across (n,) : room to work in.
+    """
+    mass[:], right[:] = 0.0, 0.0
+    for k in range(units.shape[0]):
+        ahead, aside = rows(k, 0.0, 0.0, 1.0, 0.0, units, rates, reach, along, across)
+        for a in range(right.size):
+            right[a] -= masses[k] * (along[a] * ahead + across[a] * aside)
+            for b in range(right.size):
+                mass[a, b] += masses[k] * (along[a] * along[b] + across[a] * across[b])
+        mass[2 + k, 2 + k] += inertias[k]
+
+
+@inlined
+def factor(mass, first):
+    """Cholesky's factor of the mass matrix from row ``first`` on, in place of its lower triangle; of a unit alone the
+    matrix itself, which is diagonal."""
+    if mass.shape[0] == ALONE:
+        return
+    for a in range(first, mass.shape[0]):
+        for b in range(first, a + 1):
+            rest = mass[a, b]
+            for c in range(first, b):
+                rest -= mass[a, c] * mass[b, c]
+            mass[a, b] = math.sqrt(rest) if a == b else rest / mass[b, b]
+
+
+@inlined
+def solve(mass, first, right):
+    """Forces (n,) to accelerations from row ``first`` on, in place, by ``factor``'s."""
+    if right.size == ALONE:
+        for a in range(ALONE):
+            right[a] /= mass[a, a]
+        return
+    for a in range(first, right.size):
+        for b in range(first, a):
+            right[a] -= mass[a, b] * right[b]
+        right[a] /= mass[a, a]
+    for a in range(right.size - 1, first - 1, -1):
+        for b in range(a + 1, right.size):
+            right[a] -= mass[b, a] * right[b]
+        right[a] /= mass[a, a]

@@ -1,0 +1,144 @@
+"""A vehicle in the plane as numbers for compiled functions: units, wheels, and how loads follow accelerations."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity
+
+GRAVITY = 9.81
+"""m/s^2"""
+
+
+class Axle(Strict):
+    """Two wheels at one place along a unit."""
+
+    x: float = quantity("m", "ahead of the unit's centre of mass", signed=True)
+    track: float = quantity("m", "distance of the two wheels' centres")
+    radius: float = quantity("m", "of a wheel")
+    spin_inertia: float = quantity("kg m^2", "of a wheel about its axle")
+    roll_share: float = quantity("", "share of the load transfer by lateral acceleration", zero=True)
+
+
+class Truck(Strict):
+    """A vehicle of two axles; its load transfer is semi-static.
+
+    Source of the form: the paper's four-wheel vehicle, whose load transfer has its front and rear share as input.
+    """
+
+    mass: float = quantity("kg", "of the vehicle")
+    yaw_inertia: float = quantity("kg m^2", "about the vertical through its centre of mass")
+    height: float = quantity("m", "of the centre of mass", zero=True)
+    front: Axle
+    rear: Axle
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance of the axles (m)."""
+        return self.front.x - self.rear.x
+
+
+class Plane(NamedTuple):
+    """What compiled functions read of a vehicle of U units and W wheels.
+
+    masses, inertias (U,); reach (U, U): see ``plane_chain``; unit, group (W,): of each wheel, the group being the unit
+    whose acceleration moves its load; place (W, 2): m, in its unit's axes; radius, spin (W,): m, kg m^2;
+    static (W,): N; by_x, by_y (W,): change of load by the group's acceleration, N s^2/m; hooked: 1 if the first two
+    coordinates are prescribed; fold: rad, angle of a hinge beyond which a train jackknifes; units (U,): their
+    numbers, of one alone as a tuple, whose size compiled functions know beforehand, so that none of them counts units
+    where there is no trailer.
+    """
+
+    masses: np.ndarray
+    inertias: np.ndarray
+    reach: np.ndarray
+    unit: np.ndarray
+    group: np.ndarray
+    place: np.ndarray
+    radius: np.ndarray
+    spin: np.ndarray
+    static: np.ndarray
+    by_x: np.ndarray
+    by_y: np.ndarray
+    hooked: int
+    fold: float = math.inf
+    units: np.ndarray | tuple[int] = (0,)
+
+    @property
+    def wheels(self) -> int:
+        """Number of wheels."""
+        return self.unit.size
+
+
+def truck(vehicle: Truck, transfer: bool = True) -> Plane:
+    """Numbers of a vehicle of two axles; without ``transfer`` its loads stay as they are at rest."""
+    check_wheels(vehicle, vehicle.mass)
+    none = np.zeros(4, dtype=np.int64)
+    place, radius, spin, static, by_x, by_y = wheels(vehicle, transfer)
+    return Plane(
+        np.array([vehicle.mass]),
+        np.array([vehicle.yaw_inertia]),
+        np.zeros((1, 1)),
+        none,
+        none.copy(),
+        place,
+        radius,
+        spin,
+        static,
+        by_x,
+        by_y,
+        0,
+    )
+
+
+def check_wheels(vehicle: Truck, mass: float) -> None:
+    """Refuse two axles whose wheels cannot be part of a mass (kg): no wheel is lighter than J / r^2, all in its rim."""
+    least = sum(2.0 * axle.spin_inertia / axle.radius**2 for axle in (vehicle.front, vehicle.rear))
+    if mass <= least:
+        allowed = f"must be above {least:.4g} kg: J / r^2 of its wheels, which cannot be lighter"
+        raise InputError("", "mass", mass, allowed)
+
+
+def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
+    """place (4, 2), radius, spin, static, by_x and by_y (4,) of ``Plane`` for the wheels of two axles under a body."""
+    if not vehicle.front.x > 0.0 > vehicle.rear.x:
+        raise InputError("", "rear.x", vehicle.rear.x, "must be below 0, and front.x above")
+    shares = vehicle.front.roll_share + vehicle.rear.roll_share
+    if transfer and abs(shares - 1.0) > 1e-9:
+        raise InputError("", "roll_share", shares, "of both axles must add up to 1")
+    axles, weight = (vehicle.front, vehicle.rear), vehicle.mass * GRAVITY
+    arms = (-vehicle.rear.x / vehicle.wheelbase, vehicle.front.x / vehicle.wheelbase)
+    rows = []
+    for axle, share, lean in zip(axles, arms, (-1.0, 1.0), strict=True):
+        for side in (1.0, -1.0):
+            pitch = lean * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
+            roll = -side * axle.roll_share * vehicle.mass * vehicle.height / axle.track
+            rows.append(
+                [
+                    axle.x,
+                    side * axle.track / 2.0,
+                    axle.radius,
+                    axle.spin_inertia,
+                    weight * share / 2.0,
+                    pitch * transfer,
+                    roll * transfer,
+                ]
+            )
+    x, y, *others = np.ascontiguousarray(np.array(rows).T)
+    return np.column_stack((x, y)), *others
+
+
+PAPER = Truck(
+    mass=5640.0,
+    yaw_inertia=25000.0,
+    height=1.2,
+    front=Axle(x=1.42, track=1.9, radius=0.5, spin_inertia=13.35, roll_share=0.3),
+    rear=Axle(x=-2.19, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.7),
+)
+"""The paper's unladen truck of two axles as far as its printed data can be read.
+
+Firm: radius, the shares 0.3 and 0.7, the total weight to 15 %. Guessed from a damaged print: yaw inertia, spin
+inertias (the rear one that of twin wheels), height, tracks, wheelbase 3.61 m. Chosen: the place of the centre of mass,
+by axle loads of 33.6 and 21.8 kN."""

@@ -1,0 +1,131 @@
+"""One exchange with a controller: whatever it does wrong ends the run in one named error."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from traceback import extract_tb
+
+import numpy as np
+
+from models.brake.controller import APPLY, HOLD, LARGEST_PRESSURE, RELEASE, SLOW, Command, Controller, Sample
+from models.core.errors import RunFailed
+
+NAMES = (
+    "crash",
+    "silence",
+    "wrong length",
+    "wrong frame",
+    "wrong number",
+    "not a number",
+    "no state of a valve",
+    "below zero",
+    "too high",
+)
+"""What a controller can do wrong: it raised, died or closed; did not answer in time; answered with too little or too
+much; what is no answer frame; to another sample; with what is no finite number; with a valve in none of
+-1, 0, 1, or 2 where there are such valves; with a pressure below none, or above that of the supply."""
+
+STATES = frozenset((RELEASE, HOLD, APPLY))
+WITH_SLOW = STATES | {SLOW}
+"""States of valves, and of those that can also apply slowly."""
+
+
+ROUNDING = 1e-9
+"""Share by which a pressure may exceed that of the supply."""
+HERE = Path(__file__).parent
+LONGEST = 500
+"""Characters that are kept of an error's text."""
+
+
+class ControllerFailed(RunFailed):
+    """A controller did not answer, or not with what can be done. name : one of ``NAMES``; number : of the sample;
+    why : the fault, as a phrase."""
+
+    def __init__(self, given: Sample, name: str, reason: str) -> None:
+        reason = " ".join(reason.encode(errors="backslashreplace").decode().split())[:LONGEST]
+        self.name, self.number, self.why = name, given.number, reason
+        super().__init__("controller", f"sample {given.number}: {name}: {reason}", 1e-9 * given.time)
+
+
+def ask(
+    controller: Controller, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+) -> Command:
+    """A controller's answer, checked; most : largest pressure (bar).
+
+    Raises ControllerFailed, whatever the controller raises.
+    """
+    try:
+        command = controller.sample(given)
+    except RunFailed:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ControllerFailed(given, "crash", raised(error)) from error
+    return checked(command, given, states, most)
+
+
+def raised(error: BaseException) -> str:
+    """Kind and text of an error, and the line of the user's file that raised it or led there."""
+    lines = [
+        frame
+        for frame in extract_tb(error.__traceback__)
+        if "site-packages" not in frame.filename and Path(frame.filename).parent != HERE
+    ]
+    where = f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
+    return f"{type(error).__name__}: {error}"[: LONGEST - len(where)] + where
+
+
+@dataclass
+class Asked:
+    """A controller whose answers are checked before anything is done with them."""
+
+    inner: Controller
+    states: frozenset[int] = STATES
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer; raises ControllerFailed."""
+        return ask(self.inner, given, self.states, given.supply)
+
+
+def checked(
+    command: Command, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
+) -> Command:
+    """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
+    if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
+        raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
+    valves = command.valves
+    whole = valves if isinstance(valves, np.ndarray) and valves.dtype == np.int64 else None
+    if whole is not None and whole.shape == given.wheels.shape and states.issuperset(whole.tolist()):
+        return command
+    values = _array(command.pressures if command.valves is None else command.valves, given)
+    for value in values.tolist():
+        if not math.isfinite(value):
+            raise ControllerFailed(given, "not a number", f"{value:g} for a wheel")
+        if command.pressures is not None and value < 0.0:
+            raise ControllerFailed(given, "below zero", f"a pressure of {value:g} bar")
+        if command.pressures is not None and value > most * (1.0 + ROUNDING):
+            raise ControllerFailed(
+                given, "too high", f"a pressure of {value:g} bar, above the {most:g} bar that there are"
+            )
+        if command.valves is not None and value not in states:
+            raise ControllerFailed(given, "no state of a valve", f"{value:g} is none of {_listed(states)}")
+    return Command(pressures=values) if command.valves is None else Command(valves=values.astype(np.int64))
+
+
+def _listed(states: frozenset[int]) -> str:
+    return ", ".join(map(str, sorted(states)))
+
+
+def _array(values: object, given: Sample) -> np.ndarray:
+    if np.ma.is_masked(values):
+        raise ControllerFailed(given, "not a number", "a masked value for a wheel")
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "c":
+            raise TypeError("complex numbers")
+        array = array.astype(float)
+    except (TypeError, ValueError) as error:
+        raise ControllerFailed(given, "wrong frame", str(error)) from None
+    if array.shape != given.wheels.shape:
+        size = " x ".join(map(str, array.shape)) or "one"
+        raise ControllerFailed(given, "wrong length", f"{size} values for {given.wheels.size} wheels")
+    return array

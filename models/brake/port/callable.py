@@ -1,0 +1,48 @@
+"""A controller as a Python class or function that makes one, named as "module:Name" or "file.py:Name"."""
+
+import importlib.util
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from models.brake.controller import Controller
+from models.core.errors import InputError
+
+
+def named_controller(name: str, folder: Path, wheels: int, parameters: dict[str, Any], file: str = "") -> Controller:
+    """Controller that ``name`` makes of the number of wheels and its parameters; raises InputError.
+
+    name : "module:Name", or "file.py:Name" with a path from ``folder``.
+    """
+    make = _find(name, folder, file)
+    try:
+        made = make(wheels, **parameters)
+    except (Exception, SystemExit) as error:
+        raise InputError(file, "port.callable", name, f"was not made: {type(error).__name__}: {error}") from error
+    if not callable(getattr(made, "sample", None)):
+        raise InputError(file, "port.callable", name, "makes something that has no method sample(given)")
+    return made
+
+
+def _find(name: str, folder: Path, file: str) -> Callable[..., Any]:
+    place, _, attribute = name.rpartition(":")
+    if not place or not attribute:
+        raise InputError(file, "port.callable", name, 'must be "module:Name" or "file.py:Name"')
+    try:
+        module = _of_file(folder / place) if place.endswith(".py") else import_module(place)
+    except (Exception, SystemExit) as error:
+        raise InputError(file, "port.callable", name, f"was not loaded: {type(error).__name__}: {error}") from error
+    choices = tuple(key for key in vars(module) if not key.startswith("_"))
+    if attribute not in choices:
+        raise InputError(file, "port.callable", attribute, f"{place} has no such name", choices)
+    return getattr(module, attribute)
+
+
+def _of_file(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

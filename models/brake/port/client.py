@@ -1,0 +1,31 @@
+"""The other end of the socket for controllers in Python: ``python -m models.brake.port.client module:Name PORT``."""
+
+import socket
+import sys
+from pathlib import Path
+
+from models.brake.controller import Controller
+from models.brake.port.callable import named_controller
+from models.brake.port.frame import QUESTION, answer, sample
+from models.brake.port.socket_port import LOOPBACK
+
+
+def serve(controller: Controller, port: int) -> int:
+    """Answer every question at a port of this machine until the connection is closed; the number of answers."""
+    count = 0
+    with socket.create_connection((LOOPBACK, port)) as link, link.makefile("rb") as reader:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while len(frame := reader.read(QUESTION.size)) == QUESTION.size:
+            given = sample(frame)
+            link.sendall(answer(given.number, controller.sample(given)))
+            count += 1
+    return count
+
+
+def main(name: str, port: str, wheels: str = "4") -> None:
+    """Serve the controller of a name."""
+    serve(named_controller(name, Path(), int(wheels), {}), int(port))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,96 @@
+"""Faults on demand, each within a window of time: samples lost or delayed, valves stuck, teeth missing."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from models.brake.controller import APPLY, RELEASE, Command, Controller, Sample
+from models.core.strict import Strict, quantity
+
+
+class Fault(Strict):
+    """One fault. ``lost``: signals stay as they were at the last sample before it; ``delayed``: they are those of
+    ``samples`` samples ago; ``stuck``: a valve stays in ``state``, or in that of its last sample before it; ``tooth``:
+    the tooth of this number is missing, for signals that are counted from teeth.
+    """
+
+    kind: Literal["lost", "delayed", "stuck", "tooth"]
+    start: float = quantity("s", "when it begins", default=0.0, zero=True)
+    end: float | None = quantity("s", "when it is over; never if not said", default=None)
+    wheels: list[int] | None = Field(default=None, min_length=1, description="numbers from 0; all if not said")
+    samples: int | None = Field(default=None, ge=1, le=1000, description="of the delay")
+    state: int | None = Field(default=None, ge=RELEASE, le=APPLY, description="of the stuck valve")
+    tooth: int | None = Field(default=None, ge=0, description="number of the missing tooth, from 0")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "Fault":
+        for key, kind, needed in (("samples", "delayed", True), ("state", "stuck", False), ("tooth", "tooth", True)):
+            if getattr(self, key) is not None and self.kind != kind:
+                raise ValueError(f"{key} has no meaning for a fault of kind {self.kind}")
+            if needed and self.kind == kind and getattr(self, key) is None:
+                raise ValueError(f"a fault of kind {kind} needs {key}")
+        if self.end is not None and self.end <= self.start:
+            raise ValueError("end must be after start")
+        return self
+
+    def holds(self, time: float) -> bool:
+        """Whether it is there at a time (s)."""
+        return self.start <= time and (self.end is None or time < self.end)
+
+    def of(self, wheels: int) -> list[int]:
+        """Numbers of its wheels."""
+        return list(range(wheels)) if self.wheels is None else self.wheels
+
+
+@dataclass
+class Faulty:
+    """A controller with faults on its way in and out; fresh for every run."""
+
+    inner: Controller
+    faults: list[Fault]
+    _past: deque[np.ndarray] = field(init=False)
+    _seen: np.ndarray | None = None
+    _valves: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self._past = deque(maxlen=1 + max((one.samples or 0 for one in self.faults), default=0))
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer to signals with faults, with faults."""
+        time = 1e-9 * given.time
+        here = [one for one in self.faults if one.holds(time)]
+        command = self.inner.sample(given._replace(wheels=self._signals(given.wheels, here)))
+        return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
+
+    def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
+        self._past.append(wheels)
+        seen = wheels.copy()
+        for one in here:
+            for i in one.of(wheels.size):
+                if one.kind == "delayed":
+                    seen[i] = self._past[max(len(self._past) - 1 - (one.samples or 0), 0)][i]
+                elif one.kind == "lost" and self._seen is not None:
+                    seen[i] = self._seen[i]
+        self._seen = seen
+        return seen
+
+    def _stuck(self, valves: np.ndarray, here: list[Fault]) -> np.ndarray:
+        for one in here:
+            for i in one.of(valves.size) if one.kind == "stuck" else ():
+                if one.state is not None:
+                    valves[i] = one.state
+                elif self._valves is not None:
+                    valves[i] = self._valves[i]
+        self._valves = valves
+        return valves
+
+
+def missing_teeth(faults: list[Fault], wheel: int, tooth: int, time: float) -> bool:
+    """Whether a tooth of a wheel is missing at a time (s)."""
+    return any(
+        one.kind == "tooth" and one.tooth == tooth and (one.wheels is None or wheel in one.wheels) and one.holds(time)
+        for one in faults
+    )

@@ -1,0 +1,112 @@
+"""A controller as an FMU (FMI 2.0, co-simulation), run through fmpy.
+
+Inputs: ``wheel_1`` to ``wheel_W`` (real, m/s), and as far as the FMU has them ``brake`` (boolean), ``supply`` (real,
+bar) and ``speed`` (real, m/s; not a number if it is not given). Outputs: ``valve_1`` to ``valve_W`` (real or integer;
+-1 release, 0 hold, 1 apply, 2 apply slowly where the scene has such valves) or ``pressure_1`` to ``pressure_W`` (real,
+bar). At each sample the inputs are set, one step of a sample's length is done, and the outputs then are the answer to
+that sample.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.brake.controller import Command, Sample
+from models.core.errors import InputError
+
+
+@contextmanager
+def opened(path: Path, folder: Path, wheels: int, sample: float) -> Iterator["FmuPort"]:
+    """The controller of an FMU file, unpacked to a folder, for as long as the block lasts; sample: s.
+
+    Raises InputError.
+    """
+    import fmpy
+
+    try:
+        description = fmpy.read_model_description(str(path))
+        fmpy.extract(str(path), str(folder))
+    except Exception as error:
+        raise InputError(path.name, "fmu", None, f"is no FMU: {type(error).__name__}: {error}") from None
+    if not description.fmiVersion.startswith("2.") or description.coSimulation is None:
+        raise InputError(path.name, "fmu", description.fmiVersion, "must be of FMI 2 with co-simulation")
+    names = _names(description, wheels, path.name)
+    with _slave(description, str(folder), path.name) as slave:
+        yield FmuPort(slave, names, wheels, sample)
+
+
+@contextmanager
+def _slave(description: Any, folder: str, file: str) -> Iterator[Any]:
+    """The FMU ready for its first step."""
+    from fmpy.fmi2 import FMU2Slave
+
+    try:
+        slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=folder,
+            instanceName="controller",
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )
+        slave.instantiate()
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+    except Exception as error:
+        raise InputError(file, "fmu", None, f"cannot be run here: {type(error).__name__}: {error}") from None
+    try:
+        yield slave
+    finally:
+        with suppress(Exception):  # one that has failed cannot be asked to end, and said so when it failed
+            slave.terminate()
+        slave.freeInstance()
+
+
+OPTIONAL = {"supply": "Real", "speed": "Real", "brake": "Boolean"}
+"""Inputs that an FMU may have."""
+
+
+class FmuPort:
+    """A running FMU. names : value reference and type of each variable, by its name."""
+
+    def __init__(self, slave: Any, names: dict[str, tuple[int, str]], wheels: int, sample: float) -> None:
+        self._slave, self._step = slave, sample
+        self._wheels = _references(names, "wheel", wheels)
+        self._extra = [(names[name][0], name) for name in ("supply", "speed") if name in names]
+        self._references = self._wheels + [reference for reference, _ in self._extra]
+        self._brake = [names["brake"][0]] if "brake" in names else []
+        self._mode = "valve" if "valve_1" in names else "pressure"
+        self._answers = _references(names, self._mode, wheels)
+        self._get = slave.getInteger if names[f"{self._mode}_1"][1] == "Integer" else slave.getReal
+
+    def sample(self, given: Sample) -> Command:
+        """Outputs after one step."""
+        self._slave.setReal(self._references, given.wheels.tolist() + [getattr(given, name) for _, name in self._extra])
+        if self._brake:
+            self._slave.setBoolean(self._brake, [given.brake])
+        self._slave.doStep(given.number * self._step, self._step)
+        values = np.array(self._get(self._answers), dtype=float)
+        return Command(valves=values) if self._mode == "valve" else Command(pressures=values)
+
+
+def _references(names: dict[str, tuple[int, str]], kind: str, wheels: int) -> list[int]:
+    return [names[f"{kind}_{i + 1}"][0] for i in range(wheels)]
+
+
+def _names(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:
+    """Variables by name; raises InputError if one is missing or of a type that does not fit."""
+    names = {one.name: (one.valueReference, one.type) for one in description.modelVariables}
+    kind = "valve" if "valve_1" in names else "pressure"
+    wanted: dict[str, tuple[str, ...]] = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}
+    wanted |= {f"{kind}_{i + 1}": ("Real", "Integer") if kind == "valve" else ("Real",) for i in range(wheels)}
+    wanted |= {name: (kind_of,) for name, kind_of in OPTIONAL.items() if name in names}
+    for name, types in wanted.items():
+        if name not in names:
+            raise InputError(file, name, None, f"is missing: an FMU for {wheels} wheels has it, and its outputs")
+        if names[name][1] not in types:
+            raise InputError(file, name, names[name][1], f"must be of type {' or '.join(types)}")
+    if kind == "valve" and len({names[f"valve_{i + 1}"][1] for i in range(wheels)}) > 1:
+        raise InputError(file, "valve_1", names["valve_1"][1], "must be of one type with all other valves")
+    return names

@@ -1,0 +1,90 @@
+"""Both frames of the port, byte by byte: fixed size, little-endian, numbers as IEEE 754 doubles bit for bit.
+
+Question, 104 bytes, from the vehicle
+
+    byte  type      what
+    0     4 bytes   "TRQ1"
+    4     uint32    number of the sample, from 0
+    8     int64     simulated time since the start, ns
+    16    uint8     W, number of wheels, 1 to 8
+    17    uint8     bit 0: brake switch closed; bit 1: the vehicle's speed is given
+    18    6 bytes   zero
+    24    double    supply pressure, bar
+    32    double    the vehicle's speed, m/s; not a number if it is not given
+    40    double[8] wheel-speed signals times the wheel's radius, m/s, axle by axle, the left one first; after W zero
+
+Answer, 80 bytes, from the controller
+
+    byte  type      what
+    0     4 bytes   "TRA1"
+    4     uint32    number of the sample that is answered
+    8     uint8     "V": states of valves, -1 release, 0 hold, 1 apply, 2 apply slowly where the scene has
+                      such valves; "P": pressures in the chambers, bar
+    9     uint8     W
+    10    6 bytes   zero
+    16    double[8] one value per wheel; after W zero
+
+Lock-step: the vehicle asks and waits, and no time passes for it meanwhile.
+"""
+
+import struct
+
+import numpy as np
+
+from models.brake.controller import Command, Sample
+
+QUESTION, ANSWER = struct.Struct("<4sIqBB6xdd8d"), struct.Struct("<4sIBB6x8d")
+MOST_WHEELS = 8
+SWITCH, GIVEN = 1, 2
+"""Bits of the question's flags."""
+
+
+class WrongFrame(ValueError):
+    """Bytes that are no frame of this port; name : as in ``ask.NAMES``."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        self.name = name
+        super().__init__(reason)
+
+
+def question(given: Sample) -> bytes:
+    """Frame of one sample."""
+    flags = SWITCH * given.brake | GIVEN * (given.speed == given.speed)
+    return QUESTION.pack(
+        b"TRQ1", given.number, given.time, given.wheels.size, flags, given.supply, given.speed, *_eight(given.wheels)
+    )
+
+
+def sample(frame: bytes) -> Sample:
+    """The sample of a question; raises WrongFrame."""
+    if len(frame) != QUESTION.size:
+        raise WrongFrame("wrong length", f"a question of {len(frame)} bytes, not {QUESTION.size}")
+    magic, number, time, wheels, flags, supply, speed, *signals = QUESTION.unpack(frame)
+    if magic != b"TRQ1" or not 1 <= wheels <= MOST_WHEELS:
+        raise WrongFrame("wrong frame", f"begins with {magic!r}, not with b'TRQ1' and 1 to {MOST_WHEELS} wheels")
+    return Sample(number, time, np.array(signals[:wheels]), bool(flags & SWITCH), supply, speed)
+
+
+def answer(number: int, command: Command) -> bytes:
+    """Frame of what a controller answers to a sample."""
+    mode, values = (b"P", command.pressures) if command.valves is None else (b"V", command.valves)
+    assert values is not None
+    return ANSWER.pack(b"TRA1", number, mode[0], len(values), *_eight(values))
+
+
+def command(frame: bytes, number: int) -> Command:
+    """What an answer to the sample of this number commands; raises WrongFrame."""
+    magic, answered, mode, wheels, *values = ANSWER.unpack(frame)
+    if magic != b"TRA1" or mode not in b"VP":
+        raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")
+    if answered != number:
+        raise WrongFrame("wrong number", f"the answer is one to sample {answered}")
+    if wheels > MOST_WHEELS:
+        raise WrongFrame("wrong length", f"values for {wheels} wheels, at most {MOST_WHEELS} fit")
+    array = np.array(values[:wheels])
+    return Command(pressures=array) if mode == ord("P") else Command(valves=array)
+
+
+def _eight(values: np.ndarray) -> list[float]:
+    """Values of all wheels, filled up with zeros."""
+    return [*np.asarray(values, dtype=float).tolist(), *[0.0] * (MOST_WHEELS - len(values))]

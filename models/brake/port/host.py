@@ -1,0 +1,96 @@
+"""The other end of a hosted controller: the process in which a callable or an FMU runs, and nothing else does.
+
+It connects, is told what to make, says that it has all that it needs for that, says when the controller is made, and
+answers frame by frame as ``frame`` documents. What goes"""
+
+import json
+import pickle
+import socket
+import struct
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from models.brake.controller import Controller
+from models.brake.port.ask import WITH_SLOW, ControllerFailed, ask, raised
+from models.brake.port.frame import QUESTION, answer, sample
+from models.brake.port.socket_port import LOOPBACK
+from models.core.errors import InputError
+
+LENGTH, READY, TOLD = struct.Struct("<Q"), b"TRR1", b"TRE1"
+HEAD = struct.Struct("<4sI")
+
+
+class Guest(NamedTuple):
+    """What is to be made: name "module:Name" or "file.py:Name" of a callable, or else the path of an FMU.
+
+    folder : of the callable's path, or to which the FMU is unpacked; wheels : their number; sample : s; parameters : of
+    the callable; file : of the scene, for messages.
+    """
+
+    callable: str | None
+    fmu: Path | None
+    folder: Path
+    wheels: int
+    sample: float
+    parameters: dict[str, Any]
+    file: str
+
+
+@contextmanager
+def made(guest: Guest) -> Iterator[Controller]:
+    """The controller, for as long as the block lasts; raises InputError."""
+    if guest.fmu is not None:
+        from models.brake.port.fmu_port import opened
+
+        with opened(guest.fmu, guest.folder, guest.wheels, guest.sample) as fmu:
+            yield fmu
+    else:
+        from models.brake.port.callable import named_controller
+
+        yield named_controller(str(guest.callable), guest.folder, guest.wheels, guest.parameters, guest.file)
+
+
+def told(**what: Any) -> bytes:
+    """Frame of what went wrong."""
+    text = json.dumps(what, default=str).encode()
+    return HEAD.pack(TOLD, len(text)) + text
+
+
+def serve(link: socket.socket) -> None:
+    """Make the controller that is asked for, and answer until the connection is closed."""
+    with link.makefile("rb") as reader:
+        guest = pickle.loads(reader.read(LENGTH.unpack(reader.read(LENGTH.size))[0]))
+        if guest.fmu is not None:
+            import fmpy.fmi2  # noqa: F401 the library's time is none of the FMU's
+        link.sendall(HEAD.pack(READY, 0))
+        with made(guest) as controller:
+            link.sendall(HEAD.pack(READY, 0))
+            while len(frame := reader.read(QUESTION.size)) == QUESTION.size:
+                given = sample(frame)
+                link.sendall(answer(given.number, ask(controller, given, WITH_SLOW)))
+
+
+def main(port: int) -> None:
+    """Serve at a port of this machine; whatever is raised is told, as far as it can be."""
+    with socket.create_connection((LOOPBACK, port)) as link:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            serve(link)
+            return
+        except ControllerFailed as error:
+            what = told(name=error.name, reason=error.why)
+        except InputError as error:
+            what = told(
+                file=error.file, place=error.place, value=error.value, allowed=error.allowed, choices=error.choices
+            )
+        except BaseException as error:
+            what = told(name="crash", reason=raised(error))
+        with suppress(OSError):  # nobody is left to hear it
+            link.sendall(what)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,125 @@
+"""A callable or an FMU in a process of its own, which is ended when its time is over: nothing in it can prevent that.
+
+So a controller that never returns, whatever it catches, or that takes its process with it, ends the run in one named
+error. The process is started once per run, before anything of the controller is timed: its start-up is our own. An
+exchange costs the way there and back.
+"""
+
+import json
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from socket import socket
+from typing import Any
+
+from models.brake.controller import Command, Sample
+from models.brake.port.ask import NAMES, ControllerFailed
+from models.brake.port.frame import ANSWER, WrongFrame, command, question
+from models.brake.port.host import HEAD, LENGTH, READY, TOLD, Guest
+from models.brake.port.socket_port import LONGER, connected, fate
+from models.core.errors import InputError, RunFailed
+
+MOST_TOLD = 100_000
+"""Bytes of what a process may tell of its failure."""
+STARTUP = 30.0
+"""s for the process to be there, with all that the host needs, before it touches the controller."""
+
+
+class Failed(Exception):
+    """What the process told; what : its table."""
+
+    def __init__(self, what: dict[str, Any]) -> None:
+        self.what = what
+        super().__init__()
+
+
+@dataclass
+class Hosted:
+    """A controller in a process of its own; each answer must be there within ``timeout`` seconds."""
+
+    link: socket
+    process: subprocess.Popen[bytes] | None
+    timeout: float
+
+    def begin(self, guest: Guest, start: float) -> None:
+        """Have the controller made within so many seconds; raises InputError, RunFailed."""
+        text = pickle.dumps(guest)
+        try:
+            self._got(LENGTH.pack(len(text)) + text, HEAD.size, READY, STARTUP)
+            self._got(b"", HEAD.size, READY, start)
+        except Failed as error:
+            raise _as_input(error.what) from None
+        except TimeoutError:
+            raise RunFailed("controller", f"silence: it was not made within {start:g} s; {LONGER}") from None
+        except (OSError, EOFError):
+            raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer; raises ControllerFailed."""
+        try:
+            return command(self._got(question(given), ANSWER.size, b"", self.timeout), given.number)
+        except WrongFrame as error:
+            raise ControllerFailed(given, error.name, str(error)) from None
+        except Failed as error:
+            name = str(error.what.get("name"))
+            raise ControllerFailed(given, name if name in NAMES else "crash", str(error.what.get("reason"))) from None
+        except TimeoutError:
+            raise ControllerFailed(given, "silence", f"no answer within {self.timeout:g} s") from None
+        except (OSError, EOFError):
+            lost = f"the controller was lost{fate(self.process, self.timeout)}"
+            raise ControllerFailed(given, "crash", lost) from None
+
+    def _got(self, said: bytes, size: int, begins: bytes, seconds: float) -> bytes:
+        """What comes back within so many seconds; raises Failed, TimeoutError, OSError, EOFError."""
+        end = time.perf_counter() + seconds
+        self.link.settimeout(seconds)
+        self.link.sendall(said)
+        got = self._more(b"", size, end)
+        if got[:4] == TOLD:
+            length = HEAD.unpack_from(got)[1]
+            raise Failed(json.loads(self._more(got, min(HEAD.size + length, MOST_TOLD), end)[HEAD.size :]))
+        if not got.startswith(begins):
+            raise EOFError
+        return got
+
+    def _more(self, got: bytes, size: int, end: float) -> bytes:
+        """So many bytes, of which some are there; fewer if what went wrong is told in fewer."""
+        while len(got) < size and not (got[:4] == TOLD and HEAD.size <= len(got) == _told(got)):
+            part = self.link.recv(size - len(got))
+            left = end - time.perf_counter()
+            if left <= 0.0:
+                raise TimeoutError
+            if not part:
+                raise EOFError
+            got += part
+            if len(got) < size:
+                self.link.settimeout(left)
+        return got
+
+
+def _told(got: bytes) -> int:
+    """Length of a frame that tells what went wrong."""
+    return HEAD.size + int(HEAD.unpack_from(got)[1])
+
+
+def _as_input(what: dict[str, Any]) -> InputError | RunFailed:
+    if "place" not in what:
+        return RunFailed("controller", f"{what.get('name')}: {what.get('reason')}")
+    return InputError(what["file"], what["place"], what["value"], what["allowed"], tuple(what["choices"]))
+
+
+@contextmanager
+def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
+    """The controller of a guest for as long as the block lasts; start : seconds for making it.
+
+    However the block ends, no process of it stays. Raises InputError, RunFailed.
+    """
+    code = f"import sys; sys.path[:] = {sys.path!r}; from models.brake.port.host import main; main(int(sys.argv[1]))"
+    with connected([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP) as port:
+        own = Hosted(port.link, port.process, timeout)
+        own.begin(guest, start)
+        yield own

@@ -1,0 +1,85 @@
+"""Every exchange in a file, and a controller that replays it.
+
+File: the line ``twinrig braking port log 1``, one line with 64 hexadecimal digits that name the scene, then per
+exchange the frame of the question and that of the answer, as in ``frame``.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import BinaryIO
+
+from models.brake.controller import Command, Controller, Sample
+from models.brake.port.frame import ANSWER, QUESTION, answer, command, question
+from models.core.errors import InputError, RunFailed
+
+TITLE = b"twinrig braking port log 1\n"
+RECORD = QUESTION.size + ANSWER.size
+
+
+def name_of(scene: str) -> str:
+    """64 hexadecimal digits that name a scene by its text."""
+    return sha256(scene.encode()).hexdigest()
+
+
+@dataclass
+class Logged:
+    """A controller whose exchanges are written as they happen."""
+
+    inner: Controller
+    file: BinaryIO
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer, written down."""
+        asked = question(given)  # before a controller can write into what it is given
+        said = self.inner.sample(given)
+        self.file.write(asked + answer(given.number, said))
+        return said
+
+
+@contextmanager
+def logged(inner: Controller, path: Path, scene: str) -> Iterator[Logged]:
+    """A controller with its log for as long as the block lasts; scene: of ``name_of``."""
+    with path.open("wb") as file:
+        file.write(TITLE + scene.encode() + b"\n")
+        yield Logged(inner, file)
+
+
+def refusal(path: Path) -> str:
+    """Why no log can be written to a path, "" if one can: a log of before is written anew, no other file is."""
+    if path.is_dir():
+        return "is a folder: name a file"
+    if not path.parent.is_dir():
+        return f"no such folder: {str(path.parent)!r}"
+    if not path.exists():
+        return ""
+    with path.open("rb") as file:
+        known = file.read(len(TITLE)) == TITLE
+    return "" if known else "is a file that is no log, and would be overwritten: name another one"
+
+
+class Replay:
+    """Answers as a log does, as long as it is asked as the log was; raises InputError for the log of another scene."""
+
+    def __init__(self, path: Path, scene: str) -> None:
+        try:
+            title, name, records = (path.read_bytes() + b"\n\n").split(b"\n", 2)
+        except OSError as error:
+            raise InputError(path.name, "replay", None, f"cannot be read: {error.strerror}") from None
+        if title + b"\n" != TITLE:
+            raise InputError(path.name, "replay", None, "is no log of the port, or of another version of it")
+        if name != scene.encode():
+            raise InputError(path.name, "replay", None, "is the log of another scene")
+        self._records, self._path = records, path
+
+    def sample(self, given: Sample) -> Command:
+        """The logged answer; raises RunFailed if the log has none, or if the question was another one."""
+        start = given.number * RECORD
+        record, place = self._records[start : start + RECORD], f"sample {given.number}: {self._path.name}"
+        if len(record) < RECORD:
+            raise RunFailed("replay", f"{place} has ended", 1e-9 * given.time)
+        if record[: QUESTION.size] != question(given):
+            raise RunFailed("replay", f"{place} was asked something else", 1e-9 * given.time)
+        return command(record[QUESTION.size :], given.number)

@@ -1,0 +1,39 @@
+"""The clock on the wall: each exchange at its time, with overruns counted; the numbers stay the same."""
+
+import time
+from dataclasses import dataclass
+
+from models.brake.controller import Command, Controller, Sample
+
+
+@dataclass
+class WallClock:
+    """A controller that is asked at the times of the samples, counted from the first one.
+
+    An exchange overruns if its answer comes after the time (s) of the next sample. overruns : their number; worst : the
+    longest time (s) by which one was late.
+    """
+
+    inner: Controller
+    period: float
+    overruns: int = 0
+    worst: float = 0.0
+    _start: float | None = None
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer, asked for no sooner than at its time."""
+        now = time.perf_counter()
+        if self._start is None:
+            self._start = now - 1e-9 * given.time
+        due = self._start + 1e-9 * given.time
+        if now < due:
+            time.sleep(due - now)
+        command = self.inner.sample(given)
+        late = time.perf_counter() - (due + self.period)
+        if late > 0.0:
+            self.overruns, self.worst = self.overruns + 1, max(self.worst, late)
+        return command
+
+    def report(self) -> str:
+        """One line on overruns."""
+        return f"{self.overruns} overruns, the worst by {1e3 * self.worst:.3f} ms"

@@ -1,0 +1,88 @@
+"""Signals on their way to the controller, and pressures on their way back: gain, offset, noise and bits.
+
+A signal x arrives as ``gain x + offset + noise``, and with ``bits`` it is converted: cut to 0 to ``range`` and rounded
+to one of the 2^bits codes, of which the last is ``range``. Nothing named, nothing changes, not by a bit.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from models.brake.controller import Command, Controller, Sample
+from models.brake.port.teeth import Counted
+from models.core.noise import BLOCK, BRAKE_PRESSURES, BRAKE_SIGNALS, normal
+from models.core.strict import Strict, quantity
+
+
+class Conversion(Strict):
+    """What becomes of a signal; with ``bits`` it needs a ``range``."""
+
+    gain: float = quantity("", "factor", default=1.0)
+    offset: float = quantity("unit of the signal", "added", default=0.0, signed=True)
+    noise: float = quantity("unit of the signal", "standard deviation of white noise", default=0.0, zero=True)
+    seed: int = Field(default=0, ge=0, lt=2**64, description="of the noise")
+    bits: int | None = Field(default=None, ge=1, le=32, description="of the conversion; exact without")
+    range: float | None = quantity("unit of the signal", "value of the last code", default=None)
+
+    @model_validator(mode="after")
+    def _converted(self) -> "Conversion":
+        if (self.bits is None) != (self.range is None):
+            raise ValueError("bits and range are given together")
+        return self
+
+
+class Channels:
+    """A conversion of several signals, sample by sample from 0 on. source: of the noise, see ``models.core.noise``."""
+
+    def __init__(self, conversion: Conversion, count: int, source: int) -> None:
+        self.conversion, self._count, self._source = conversion, count, source
+        self._block, self._noise = -1, np.zeros((0, count))
+
+    def __call__(self, number: int, values: np.ndarray) -> np.ndarray:
+        """What arrives of the values (count,) of a sample."""
+        own = self.conversion
+        if own.gain != 1.0 or own.offset != 0.0:
+            values = own.gain * values + own.offset
+        if own.noise > 0.0:
+            values = values + own.noise * self._drawn(number)
+        if own.bits is not None and own.range is not None:
+            last = 2.0**own.bits - 1.0
+            values = np.rint(np.clip(values / own.range, 0.0, 1.0) * last) * own.range / last
+        return values
+
+    def _drawn(self, number: int) -> np.ndarray:
+        """Standard normal numbers (count,) of a sample, from the block that holds it."""
+        block, place = divmod(number, BLOCK)
+        if block != self._block:
+            first = block * BLOCK
+            self._block = block
+            self._noise = normal(self.conversion.seed, 0, BLOCK, self._count, first, self._source)
+        return self._noise[place]
+
+
+@dataclass
+class Sensed:
+    """A controller that sees wheels through sensors, and whose pressures are measured; fresh for every run.
+
+    teeth : counts the wheels' teeth first; None: their speed is known.
+    """
+
+    inner: Controller
+    wheels: Channels
+    pressures: Channels
+    teeth: Counted | None = None
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer to what it sees, as it arrives; a pressure that arrives as one below none is none."""
+        seen = given.wheels if self.teeth is None else self.teeth(given)
+        command = self.inner.sample(given._replace(wheels=self.wheels(given.number, seen)))
+        if command.pressures is None:
+            return command
+        return Command(pressures=np.maximum(self.pressures(given.number, np.asarray(command.pressures)), 0.0))
+
+
+def sensed(inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any) -> Sensed:
+    """A controller behind the sensors of W wheels."""
+    return Sensed(inner, Channels(signals, wheels, BRAKE_SIGNALS), Channels(pressures, wheels, BRAKE_PRESSURES), **more)

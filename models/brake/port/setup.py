@@ -1,0 +1,167 @@
+"""The port as a scene gives it: what stands behind it, its signals, faults, log and clock; opened for one run."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from models.brake.controller import Controller
+from models.brake.port import socket_port
+from models.brake.port.ask import STATES, WITH_SLOW, Asked
+from models.brake.port.faults import Fault, Faulty, missing_teeth
+from models.brake.port.host import Guest
+from models.brake.port.hosted import hosted
+from models.brake.port.log import Replay, logged, name_of, refusal
+from models.brake.port.pace import WallClock
+from models.brake.port.sensors import Conversion, sensed
+from models.brake.port.teeth import Counted, Teeth
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity
+
+BEHIND = ("callable", "command", "port", "fmu", "replay")
+"""What can stand behind the port in place of a controller of the scene; at most one does."""
+BY_HAND = 20.0
+"""s for a process that somebody starts by hand to connect to a port, where the scene does not say."""
+
+
+class PortTable(Strict):
+    """[port]: paths are seen from the scene's folder; {procedure} in them is the name of what is driven, {engine} that
+    of what computes it."""
+
+    callable: str | None = Field(default=None, description="module:Name or file.py:Name, a class")
+    parameters: dict[str, Any] = Field(default_factory=dict, description="of the callable")
+    command: list[str] | None = Field(default=None, min_length=1, description="starts a process that connects")
+    port: int | None = Field(default=None, ge=1, le=65535, description="of this machine, at which a process connects")
+    fmu: str | None = Field(default=None, description="an FMU file, FMI 2 co-simulation")
+    replay: str | None = Field(default=None, description="a log of this scene")
+    timeout: float = quantity("s", "for one answer", default=1.0)
+    start: float | None = quantity(
+        "s", "for a command to connect, for a callable or an FMU to be made; as timeout if not given", default=None
+    )
+    pace: Literal["simulated", "wall"] = Field(default="simulated", description="simulated, or wall: the clock's")
+    log: str | None = Field(default=None, description="file to which every exchange is written")
+    signals: Conversion = Conversion()
+    pressures: Conversion = Conversion()
+    teeth: Teeth | None = Field(default=None, description="signals are counted from teeth; not named, they are known")
+    faults: list[Fault] = Field(default_factory=list, description="on demand")
+
+    @property
+    def patience(self) -> float:
+        """Time (s) until the controller must be there."""
+        if self.start is not None:
+            return self.start
+        return self.timeout if self.port is None else BY_HAND
+
+    @model_validator(mode="after")
+    def _one_behind(self) -> "PortTable":
+        named = [key for key in BEHIND if getattr(self, key) is not None]
+        if len(named) > 1:
+            raise ValueError(f"at most one of {', '.join(BEHIND)} can be there, not {' and '.join(named)}")
+        if self.parameters and self.callable is None:
+            raise ValueError("parameters has no meaning without callable")
+        if self.teeth is None and any(fault.kind == "tooth" for fault in self.faults):
+            raise ValueError("a missing tooth needs signals that are counted from teeth")
+        return self
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the port needs to know of a run. radius (W,): of the wheels, m; sample: s; scene: its text, by which a log
+    is known; folder: of its paths; file: its name, for messages; procedure, engine: names for those of its files;
+    slow: whether valves can apply slowly.
+    """
+
+    radius: np.ndarray
+    sample: float
+    scene: str = ""
+    folder: Path = Path()
+    file: str = ""
+    procedure: str = ""
+    engine: str = ""
+    slow: bool = False
+
+    def path(self, name: str) -> Path:
+        """A file that the table names."""
+        return self.folder / name.replace("{procedure}", self.procedure).replace("{engine}", self.engine)
+
+
+@contextmanager
+def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Controller, WallClock | None]]:
+    """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
+
+    own : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
+    """
+    check_port(table, run)
+    with ExitStack() as stack:
+        inner = Asked(stack.enter_context(_behind(table, run, own)), WITH_SLOW if run.slow else STATES)
+        clock = WallClock(inner, run.sample) if table.pace == "wall" else None
+        watched: Controller = inner if clock is None else clock
+        if table.log is not None:
+            watched = stack.enter_context(logged(watched, run.path(table.log), name_of(run.scene)))
+        faulty = Faulty(watched, table.faults) if table.faults else watched
+        teeth = None if table.teeth is None else Counted(table.teeth, run.radius, partial(missing_teeth, table.faults))
+        plain = teeth is None and table.signals == table.pressures == Conversion()
+        wheels = run.radius.size
+        yield faulty if plain else sensed(faulty, wheels, table.signals, table.pressures, teeth=teeth), clock
+
+
+@contextmanager
+def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]:
+    """What answers."""
+    with ExitStack() as stack:
+        if table.command is not None or table.port is not None:
+            with _told_of_scene(table, run):
+                link = socket_port.connected(table.command, table.port or 0, table.timeout, table.patience, run.folder)
+                entered = stack.enter_context(link)
+            yield entered
+        elif table.replay is not None:
+            with _told_of_scene(table, run):
+                replay = Replay(run.path(table.replay), name_of(run.scene))
+            yield replay
+        elif table.callable is not None or table.fmu is not None:
+            folder = run.folder if table.fmu is None else Path(stack.enter_context(TemporaryDirectory()))
+            fmu = None if table.fmu is None else run.path(table.fmu).absolute()
+            guest = Guest(table.callable, fmu, folder, run.radius.size, run.sample, table.parameters, run.file)
+            with _told_of_scene(table, run):
+                made = stack.enter_context(hosted(guest, table.timeout, table.patience))
+            yield made
+        else:
+            yield own
+
+
+@contextmanager
+def _told_of_scene(table: PortTable, run: Run) -> Iterator[None]:
+    """What is wrong with what a key names is told as that of the scene; what is wrong within a file, as the file's."""
+    try:
+        yield
+    except InputError as error:
+        if error.place not in BEHIND:
+            raise
+        raise InputError(run.file, f"port.{error.place}", getattr(table, error.place), error.allowed) from None
+
+
+def check_port(table: PortTable, run: Run) -> None:
+    """Refuse files that are not there or must stay as they are, and faults of wheels or teeth that are not."""
+    for key in ("fmu", "replay"):
+        name = getattr(table, key)
+        if name is not None and not run.path(name).is_file():
+            raise InputError(run.file, f"port.{key}", name, f"no such file, looked for as {str(run.path(name))!r}")
+    if table.fmu is not None and find_spec("fmpy") is None:
+        raise InputError(run.file, "port.fmu", table.fmu, "needs fmpy: pip install 'twinrig[fmi]'")
+    reason = "" if table.log is None else refusal(run.path(table.log))
+    if reason:
+        raise InputError(run.file, "port.log", table.log, reason)
+    wheels = run.radius.size
+    for i, fault in enumerate(table.faults):
+        for wheel in fault.of(wheels):
+            if not 0 <= wheel < wheels:
+                raise InputError(run.file, f"port.faults.{i}.wheels", wheel, f"must be from 0 to {wheels - 1}")
+        if fault.tooth is not None and table.teeth is not None and fault.tooth >= table.teeth.teeth:
+            raise InputError(run.file, f"port.faults.{i}.tooth", fault.tooth, f"must be below {table.teeth.teeth}")

@@ -1,0 +1,166 @@
+"""A controller in a second process, over a TCP socket of this machine alone; the frames are those of ``frame``."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from models.brake.controller import Command, Sample
+from models.brake.port.ask import ControllerFailed
+from models.brake.port.frame import ANSWER, WrongFrame, command, question
+from models.core.errors import InputError, RunFailed
+
+LOOPBACK = "127.0.0.1"
+"""The only address that this port ever listens on."""
+STDERR = 2
+"""Where a controller's own prints go: standard output is for the results alone."""
+LONGER = "if it needs longer, give start (s) under [port]"
+"""Remedy where a controller is not there in time."""
+GRACE = 0.5
+"""Seconds for a process to end by itself once its connection is closed at the end of a run."""
+
+
+@dataclass
+class SocketPort:
+    """The controller at the other end of a connection; each answer must be whole within ``timeout`` seconds.
+
+    process : that answers, if it was started here.
+    """
+
+    link: socket.socket
+    timeout: float
+    process: subprocess.Popen[bytes] | None = None
+
+    def sample(self, given: Sample) -> Command:
+        """Its answer; raises ControllerFailed."""
+        end = time.perf_counter() + self.timeout
+        try:
+            self.link.settimeout(self.timeout)
+            self.link.sendall(question(given))
+            return command(self._frame(given, end), given.number)
+        except WrongFrame as error:
+            raise ControllerFailed(given, error.name, str(error)) from None
+        except TimeoutError:
+            raise ControllerFailed(given, "silence", f"it does not read within {self.timeout:g} s") from None
+        except OSError as error:
+            raise ControllerFailed(
+                given, "crash", f"the connection broke: {error.strerror or error}{fate(self.process, self.timeout)}"
+            ) from None
+
+    def _frame(self, given: Sample, end: float) -> bytes:
+        """Exactly one answer; bytes beyond it would belong to a question not yet asked."""
+        got = b""
+        while len(got) < ANSWER.size:
+            try:
+                part = self.link.recv(ANSWER.size + 1 - len(got))
+            except TimeoutError:
+                part = None
+            if part is None or time.perf_counter() > end:
+                raise ControllerFailed(given, "silence", f"{_some(got)} within {self.timeout:g} s")
+            if not part:
+                raise ControllerFailed(
+                    given, "crash", f"the connection was closed after {_some(got)}{fate(self.process, self.timeout)}"
+                )
+            got += part
+            if len(got) < ANSWER.size:
+                self.link.settimeout(max(end - time.perf_counter(), 1e-6))
+        if len(got) > ANSWER.size:
+            raise WrongFrame("wrong length", f"an answer of more than {ANSWER.size} bytes")
+        return got
+
+
+def fate(process: subprocess.Popen[bytes] | None, patience: float) -> str:
+    """How a process ended whose connection is closed, "" if it did not within some seconds."""
+    if process is None:
+        return ""
+    with suppress(subprocess.TimeoutExpired):
+        status = process.wait(min(patience, GRACE))
+        return f", its process ended with status {status}" if status >= 0 else f", its process got {_signal(-status)}"
+    return ""
+
+
+def _signal(number: int) -> str:
+    with suppress(ValueError):
+        return signal.Signals(number).name
+    return f"signal {number}"
+
+
+def _some(got: bytes) -> str:
+    return f"{len(got)} of {ANSWER.size} bytes" if got else "no answer"
+
+
+@contextmanager
+def listening(address: int = 0) -> Iterator[socket.socket]:
+    """A socket that waits for a controller at a port of this machine, any free one if 0; raises InputError."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            server.bind((LOOPBACK, address))
+        except OSError as error:
+            raise InputError("", "port", address, f"cannot be listened on: {error.strerror}") from None
+        server.listen(1)
+        yield server
+
+
+@contextmanager
+def connected(
+    words: Sequence[str] | None, address: int, timeout: float, start: float, folder: Path = Path()
+) -> Iterator[SocketPort]:
+    """The controller that a command starts, or that connects by itself, for as long as the block lasts.
+
+    words : the command, in which "{port}" stands for the number of the port; None waits for a controller that somebody
+    else starts; start : seconds until it must have connected; folder : in which the command runs. However the block
+    ends, no process of it stays. Raises InputError for a command that cannot be started, RunFailed where none connects.
+    """
+    with listening(address) as server, _started(words, server.getsockname()[1], folder) as process:
+        link = _accepted(server, process, start)
+        with link:
+            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            yield SocketPort(link, timeout, process)
+
+
+def _accepted(server: socket.socket, process: subprocess.Popen[bytes] | None, start: float) -> socket.socket:
+    """The first connection within ``start`` seconds."""
+    end = time.perf_counter() + start
+    server.settimeout(min(0.05, start))
+    while time.perf_counter() < end:
+        with suppress(TimeoutError):
+            return server.accept()[0]
+        status = None if process is None else process.poll()
+        if status is not None:
+            raise RunFailed("controller", f"crash: its command ended with status {status} before it connected")
+    where = f"{LOOPBACK}:{server.getsockname()[1]}"
+    raise RunFailed("controller", f"silence: nobody connected to {where} within {start:g} s; {LONGER}")
+
+
+@contextmanager
+def _started(words: Sequence[str] | None, port: int, folder: Path) -> Iterator[subprocess.Popen[bytes] | None]:
+    """The process of a command, ended with the block at the latest."""
+    if words is None:
+        yield None
+        return
+    said = [word.replace("{port}", str(port)) for word in words]
+    try:
+        process = subprocess.Popen(said, cwd=folder, stdin=subprocess.DEVNULL, stdout=STDERR, start_new_session=True)
+    except OSError as error:
+        raise InputError("", "command", list(words), f"cannot be started: {error.strerror}") from None
+    grace = 0.0
+    try:
+        yield process
+        grace = GRACE
+    finally:
+        _ended(process, grace)
+
+
+def _ended(process: subprocess.Popen[bytes], grace: float) -> None:
+    """Wait for it for some seconds, then end it with all that it started."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(grace)
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
+    process.wait()

@@ -1,0 +1,80 @@
+"""Wheel speed counted from a toothed wheel with a timer: period measurement.
+
+Between two samples a wheel's speed is taken to be linear in time, so that the instant of each tooth's edge is the root
+of a quadratic. A timer of ticks tells that instant, rounded down. A sample's speed is the way of the edges that came
+since the last one seen before it, over the time between these two edges; with no edge since then it stays, but is at
+most one tooth over the time that has passed without. Way is that of ``teeth`` equal teeth, also if one is missing.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from pydantic import Field
+
+from models.brake.controller import Sample
+from models.core.strict import Strict, quantity
+
+Missing = Callable[[int, int, float], bool]
+
+
+class Teeth(Strict):
+    """A toothed wheel and its timer."""
+
+    teeth: int = Field(default=100, ge=1, le=10000, description="of one turn")
+    tick: float = quantity("s", "of the timer", default=1e-6)
+
+
+class Counted:
+    """Teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s): whether one is missing."""
+
+    def __init__(self, own: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
+        self._own, self._missing = own, missing
+        self._way = (2.0 * math.pi / own.teeth * radius).tolist()
+        self._wheels: list[_Wheel] = []
+        self._before = 0.0
+
+    def __call__(self, given: Sample) -> np.ndarray:
+        """Signals (W,) in m/s."""
+        speeds, now = np.abs(given.wheels).tolist(), 1e-9 * given.time
+        if not self._wheels:
+            self._wheels = [_Wheel(speed) for speed in speeds]
+        elif now > self._before:
+            for i, (wheel, speed) in enumerate(zip(self._wheels, speeds, strict=True)):
+                self._go_on(i, wheel, speed, now)
+        self._before = now
+        return np.array([wheel.shown for wheel in self._wheels])
+
+    def _go_on(self, i: int, wheel: "_Wheel", speed: float, now: float) -> None:
+        """One sample of wheel i, from the sample before to now."""
+        way, step = self._way[i], now - self._before
+        turned = wheel.turned + 0.5 * (wheel.speed + speed) * step / way
+        edges = [
+            k
+            for k in range(math.floor(wheel.turned) + 1, math.floor(turned) + 1)
+            if self._missing is None or not self._missing(i, k % self._own.teeth, now)
+        ]
+        if edges:
+            at = self._before + _instant((edges[-1] - wheel.turned) * way, wheel.speed, speed, step)
+            at = math.floor(at / self._own.tick) * self._own.tick
+            if wheel.edge is not None and at > wheel.edge:
+                wheel.shown = len(edges) * way / (at - wheel.edge)
+            wheel.edge = at
+        elif wheel.edge is not None:
+            wheel.shown = min(wheel.shown, way / (now - wheel.edge))
+        wheel.turned, wheel.speed = turned, speed
+
+
+class _Wheel:
+    """What its electronics and its angle remember: in teeth since the start, s, m/s."""
+
+    def __init__(self, speed: float) -> None:
+        self.turned, self.speed, self.shown = 0.5, speed, speed
+        self.edge: float | None = None
+
+
+def _instant(way: float, before: float, after: float, step: float) -> float:
+    """Time after which a way is covered by a speed that goes linearly from one to another over a step."""
+    slope = (after - before) / step
+    root = math.sqrt(max(before * before + 2.0 * slope * way, 0.0))
+    return min(2.0 * way / (before + root), step)

@@ -1,0 +1,118 @@
+"""Pressures in the brake chambers over one sample, and the torques that follow them in order.
+
+Mode V: the controller sets valves. A chamber then fills from the supply or empties to the air, each by a first-order
+law, exact over a step; a valve that can apply slowly, by a throttle or by pulses too short to be told apart, fills it
+with a longer time constant; a change of a valve takes effect after the valves' delay, also between two samples. The
+supply is a reservoir: what a chamber takes in, p V, it gives. Mode P: the controller sets the pressures themselves, as
+the paper measured them, and each is held over the sample.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from models.brake.brake import torque
+from models.brake.controller import APPLY, RELEASE, SLOW
+from models.core.errors import InputError
+from models.machine.compiled import lean
+
+NONE = np.zeros(0)
+
+
+class Chambers(NamedTuple):
+    """How chambers (W,) fill and empty: time constants (s) of their first-order pressure; supply pressure (bar).
+
+    volumes (W,) : of the chambers with their pistons out, and reservoir : of the supply, in litres; an infinite one
+    keeps its pressure and asks for no volumes. delay : of the valves (s). slow (W,) : time constants (s) of filling by
+    valves that apply slowly, none where there are no such valves.
+    """
+
+    fill: np.ndarray
+    empty: np.ndarray
+    supply: float
+    volumes: np.ndarray = NONE
+    reservoir: float = math.inf
+    delay: float = 0.0
+    slow: np.ndarray = NONE
+
+
+class Air(NamedTuple):
+    """What pressures go on from, all of it moved in place.
+
+    pressure, torque (W,) : bar, N m, with which the hysteresis remembers; supply (1,) : bar; commands (d + 2, W) :
+    states of the valves as they were commanded, the latest last, d the whole samples of the valves' delay.
+    """
+
+    pressure: np.ndarray
+    torque: np.ndarray
+    supply: np.ndarray
+    commands: np.ndarray
+
+
+def still(chambers: Chambers, sample: float) -> Air:
+    """No pressure anywhere but in the supply, all valves released; sample (s)."""
+    wheels = chambers.fill.size
+    if math.isfinite(chambers.reservoir) and chambers.volumes.size != wheels:
+        raise InputError("", "volumes", chambers.volumes.tolist(), f"a reservoir asks for those of {wheels} chambers")
+    rows = int(chambers.delay / sample) + 2
+    return Air(
+        np.zeros(wheels),
+        np.zeros(wheels),
+        np.array([float(chambers.supply)]),
+        np.full((rows, wheels), RELEASE, dtype=np.int64),
+    )
+
+
+@lean
+def chamber(pressure, valve, time, fill, empty, supply):
+    """Pressure (bar) of a chamber after a time (s) with its valve in a state."""
+    if valve >= APPLY:
+        return supply + (pressure - supply) * math.exp(-time / fill) if fill > 0.0 else supply
+    if valve == RELEASE:
+        return pressure * math.exp(-time / empty) if empty > 0.0 else 0.0
+    return pressure
+
+
+@lean
+def press(valves, time, air, chambers, brakes):
+    """Go on for a time (s) with valves (W,) as they are: no pressure turns back, so the torque law holds."""
+    taken = 0.0
+    for i in range(valves.size):
+        before = air.pressure[i]
+        fill = chambers.slow[i] if valves[i] == SLOW else chambers.fill[i]
+        after = chamber(before, valves[i], time, fill, chambers.empty[i], air.supply[0])
+        air.pressure[i], air.torque[i] = after, torque(i, after, air.torque[i], brakes)
+        if valves[i] >= APPLY and chambers.reservoir < math.inf:
+            taken += chambers.volumes[i] * (after - before)
+    if taken > 0.0:
+        air.supply[0] -= taken / chambers.reservoir
+
+
+@lean
+def by_valves(valves, sample, air, chambers, brakes, torques):
+    """Mode V: fill ``torques`` (n + 1, W), those at the ends of the n steps of a sample (s)."""
+    steps, last = torques.shape[0] - 1, air.commands.shape[0] - 1
+    for i in range(valves.size):
+        for k in range(last):
+            air.commands[k, i] = air.commands[k + 1, i]
+        air.commands[last, i], torques[0, i] = valves[i], air.torque[i]
+    late = chambers.delay - (last - 1) * sample
+    step = sample / steps
+    for n in range(steps):
+        wait = min(max(late - n * step, 0.0), step)
+        if wait > 0.0:
+            press(air.commands[0], wait, air, chambers, brakes)
+        if wait < step:
+            press(air.commands[1], step - wait, air, chambers, brakes)
+        for i in range(valves.size):
+            torques[n + 1, i] = air.torque[i]
+
+
+@lean
+def by_pressures(pressures, air, brakes, torques):
+    """Mode P: pressures (W,) in bar are there at once and stay for the sample; ``torques`` (n + 1, W) as above."""
+    for i in range(pressures.size):
+        air.pressure[i], air.torque[i] = pressures[i], torque(i, pressures[i], air.torque[i], brakes)
+        for n in range(torques.shape[0]):
+            torques[n, i] = air.torque[i]

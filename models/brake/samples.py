@@ -1,0 +1,92 @@
+"""A braked vehicle moved on sample by sample, to whatever its valves, chambers and steering are told in between.
+
+All of it is one generator, which as compiled code goes on within a microsecond: what it works on is given to it once
+and not in every sample.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from types import FunctionType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from models.brake.advance import AT_REST, FINE, advance
+from models.brake.brake import Brakes
+from models.brake.pressure import Air, Chambers, by_pressures, by_valves
+from models.machine.compiled import named, njit
+
+
+class Told(NamedTuple):
+    """What holds for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,) in bar,
+    of which the first is not a number where valves hold, and steer angles (W,) in rad."""
+
+    samples: np.ndarray
+    valves: np.ndarray
+    pressures: np.ndarray
+    steer: np.ndarray
+
+
+class Kept(NamedTuple):
+    """What is recorded: now (k,), the moment as numbers of which the first is the time (s); rows (m, k), such moments,
+    of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or after."""
+
+    now: np.ndarray
+    rows: np.ndarray
+    left: np.ndarray
+    until: float
+
+
+class Braking(NamedTuple):
+    """Brakes and their pressures; torques (n + 1, W) in N m: at the ends of the n steps of a sample."""
+
+    air: Air
+    chambers: Chambers
+    brakes: Brakes
+    torques: np.ndarray
+
+
+go: Callable[..., Any] = advance
+"""Stands here for what ``moved`` puts in its place."""
+
+
+def samples(told, kept, sample, braking, state, turning, *others):
+    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by as many samples at a
+    time as it is told for, less only where it does not move any further.
+
+    Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
+    (m/s) and the supply (bar).
+    """
+    air, chambers, brakes, torques = braking
+    status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
+    while True:
+        yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
+        for _ in range(told.samples[0]):
+            if math.isnan(told.pressures[0]):
+                by_valves(told.valves, sample, air, chambers, brakes, torques)
+            else:
+                by_pressures(told.pressures, air, brakes, torques)
+            status, used = go(state, turning, torques, step, told.steer, *others)
+            time += used
+            if status not in (FINE, AT_REST):
+                break
+            kept.now[0] = time
+            kept.rows[kept.left[0]] = kept.now
+            kept.left[0] += 1
+            if status == AT_REST or time >= kept.until:
+                break
+
+
+def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+    """``samples`` by one ``go``: a global of the function and no cell of a closure, by whose contents numba would know
+    it, and which are others in every process if they are compiled."""
+    return FunctionType(samples.__code__, globals() | {"go": go}, "samples")
+
+
+def compiled(go: Callable[..., Any], name: str) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
+    """``moved`` by a compiled function, compiled."""
+    return njit(cache=True, error_model="numpy")(named(moved(go), name))
+
+
+by_steps = compiled(advance, "by_steps")
+"""The vehicle moved by its own steps."""

@@ -1,0 +1,114 @@
+"""A braked vehicle on its suspension: the bodies of a vehicle file on a carrier that turns through any angle.
+
+Its coordinates begin with those of the plane vehicle of the same file, x, y and heading of its centre of mass in the
+design position; heave, roll and pitch of the chassis follow (see ``models.vehicles.free_vehicle``). Loads are those
+that springs and tyres have at the time. Wheels turn as in the plane and are no bodies of their own.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.brake.plane_vehicle import Axle, Truck
+from models.core.errors import InputError
+from models.multibody.numbers import Handling, Tyres
+from models.vehicles.free_vehicle import CARRIER, SWAY
+from models.vehicles.spatial import Freedom, SpatialVehicle, Vector
+
+ROLL, PITCH = 4, 5
+"""Places of the chassis' roll and pitch among the coordinates."""
+LEADING: tuple[tuple[str, Freedom], ...] = (
+    (CARRIER, "x"),
+    (CARRIER, "y"),
+    (CARRIER, "rz"),
+    (SWAY, "z"),
+    (SWAY, "rx"),
+    (SWAY, "ry"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Sprung:
+    """The vehicle as the engines build it, and the plane one that has its mass, axles and wheels."""
+
+    handling: Handling
+    plane: Truck
+
+    @property
+    def size(self) -> int:
+        """How many coordinates there are."""
+        return len(self.handling.vehicle.coordinates())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return tuple(" ".join(place) for place in self.handling.vehicle.coordinates())
+
+
+def sprung(vehicle: SpatialVehicle, spin_inertia: float, front: float = 0.5) -> Sprung:
+    """A vehicle of two axles with two wheels each; spin_inertia (kg m^2): of a wheel.
+
+    front : share of the front axle in the plane vehicle's load transfer by lateral acceleration, which springs know
+    here. Raises InputError for a vehicle of other axles, or that cannot be steered.
+    """
+    tyres = sorted(vehicle.tyres, key=lambda tyre: (tyre.axle, -tyre.point[1]))
+    if [tyre.axle for tyre in tyres] != [0, 0, 1, 1] or any(
+        left.point[1] <= right.point[1] for left, right in (tyres[:2], tyres[2:])
+    ):
+        raise InputError(vehicle.name, "tyres", [tyre.name for tyre in tyres], "must be two of each of two axles")
+    centred = _moved(replace(vehicle, tyres=tuple(tyres)), -centre(vehicle))
+    handling = Handling(centred, Tyres(spin_inertia=0.0))
+    if handling.vehicle.coordinates()[: len(LEADING)] != LEADING:
+        raise ValueError("the carrier and the sway are not the first bodies")
+    return Sprung(handling, _plane(centred, spin_inertia, front))
+
+
+def centre(vehicle: SpatialVehicle) -> np.ndarray:
+    """(3,) m: centre of mass in the design position."""
+    masses = np.array([body.mass for body in vehicle.bodies])
+    return masses @ np.array([body.position for body in vehicle.bodies]) / masses.sum()
+
+
+def _moved(vehicle: SpatialVehicle, way: np.ndarray) -> SpatialVehicle:
+    """The vehicle drawn elsewhere on the ground."""
+    by = np.array([*way[:2], 0.0])
+
+    def at(point: Vector) -> Vector:
+        x, y, z = np.add(point, by)
+        return float(x), float(y), float(z)
+
+    return replace(
+        vehicle,
+        bodies=tuple(replace(body, position=at(body.position)) for body in vehicle.bodies),
+        springs=tuple(replace(s, point_one=at(s.point_one), point_two=at(s.point_two)) for s in vehicle.springs),
+        tyres=tuple(replace(tyre, point=at(tyre.point)) for tyre in vehicle.tyres),
+        bars=tuple(
+            replace(bar, point_left=at(bar.point_left), point_right=at(bar.point_right)) for bar in vehicle.bars
+        ),
+        side_forces=tuple(replace(force, point=at(force.point)) for force in vehicle.side_forces),
+        axles=tuple(float(x + by[0]) for x in vehicle.axles),
+    )
+
+
+def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:
+    """The plane vehicle of a centred one."""
+    turn = sum(
+        body.inertia[2][2] + body.mass * (body.position[0] ** 2 + body.position[1] ** 2) for body in vehicle.bodies
+    )
+    front_axle, rear_axle = (
+        Axle(
+            x=left.point[0],
+            track=left.point[1] - right.point[1],
+            radius=left.point[2],
+            spin_inertia=spin_inertia,
+            roll_share=share,
+        )
+        for left, right, share in zip(vehicle.tyres[::2], vehicle.tyres[1::2], (front, 1.0 - front), strict=True)
+    )
+    return Truck(
+        mass=sum(body.mass for body in vehicle.bodies),
+        yaw_inertia=turn,
+        height=float(centre(vehicle)[2]),
+        front=front_axle,
+        rear=rear_axle,
+    )

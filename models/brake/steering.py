@@ -1,0 +1,59 @@
+"""The driver's steering by time, and how fast a vehicle answers to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.figures_of_merit import crossing
+
+REACHED, HALF = 0.9, 0.5
+"""Share of the steady yaw rate by which the response is timed, and of the last angle from which."""
+SETTLED = 0.05
+"""Largest range of a yaw rate that is called steady, by its mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Steering:
+    """Angles (n,) in rad at times (n,) in s of the wheels that ``steered`` (W,) marks: linear between, held outside."""
+
+    times: np.ndarray
+    angles: np.ndarray
+    steered: np.ndarray
+
+    def __call__(self, time: float) -> np.ndarray:
+        """Steer angles (W,) at a time (s)."""
+        return self.steered * np.interp(time, self.times, self.angles)
+
+    @property
+    def half(self) -> float:
+        """Time (s) at which the angle first reaches half of its last one."""
+        goal, last = HALF * abs(self.angles[-1]), np.sign(self.angles[-1])
+        reached = last * self.angles >= goal
+        i = int(np.argmax(reached))
+        if i == 0:
+            return float(self.times[0])
+        return float(np.interp(goal, last * self.angles[i - 1 : i + 1], self.times[i - 1 : i + 1]))
+
+
+@dataclass(frozen=True)
+class Response:
+    """time : from half of the steering to 0.9 of the steady yaw rate, s; overshoot : of the largest beyond the steady
+    one, by it; steady : yaw rate, rad/s."""
+
+    time: float
+    overshoot: float
+    steady: float
+
+
+def response(times: np.ndarray, yaw_rates: np.ndarray, half: float) -> Response | None:
+    """Of yaw rates (n,) in rad/s at times (n,) in s, the last second of which is to be steady; None if it is not.
+
+    half : time (s) at which the steering reaches half of its last angle. Source: ISO 7401 (cars), ISO 14793 (heavy
+    vehicles); not checked against the text of the standard.
+    """
+    end = yaw_rates[times >= times[-1] - 1.0]
+    steady = float(end.mean())
+    if np.ptp(end) > SETTLED * abs(steady) or steady == 0.0:
+        return None
+    share = yaw_rates / steady
+    return Response(crossing(times, -share, -REACHED) - half, float(max(share.max() - 1.0, 0.0)), steady)

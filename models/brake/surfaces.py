@@ -1,0 +1,103 @@
+"""Which tyre table holds where on the road: stretches along x, each with its own surface left and right of a line."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from models.brake.plane_chain import place_of, point
+from models.core.errors import InputError
+from models.machine.compiled import inlined, lean
+
+
+class Road(NamedTuple):
+    """Stretches of a road for compiled functions.
+
+    starts (n,): x in m at which each stretch begins, the first at minus infinity; left, right (n,): numbers of their
+    surfaces; line: y in m from which on the left one holds. Table of a wheel: surface * kinds + kind of its tyre.
+    """
+
+    starts: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    line: float
+    kinds: int
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From x (m) on, the numbers of the surfaces left and right of the line."""
+
+    x: float
+    left: int
+    right: int
+
+
+def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
+    """Road of stretches in the order of their x; the first also holds before it begins.
+
+    Another level of friction on a stretch is a surface of its own, ``TyreTable.scaled``.
+    """
+    starts = np.array([stretch.x for stretch in stretches], dtype=float)
+    if starts.size == 0 or not np.isfinite(starts).all() or (np.diff(starts) <= 0.0).any():
+        raise InputError("", "stretches", starts.tolist(), "must be at least one, with finite x that rise strictly")
+    starts[0] = -np.inf
+    left, right = (np.array([getattr(s, side) for s in stretches], dtype=np.int64) for side in ("left", "right"))
+    if min(left.min(), right.min()) < 0:
+        raise InputError("", "stretches", int(min(left.min(), right.min())), "numbers of surfaces count from 0")
+    return Road(starts, left, right, line, kinds)
+
+
+def check_way(own: Road, way: float) -> None:
+    """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
+    shortest = float(np.diff(own.starts[1:]).min()) if own.starts.size > 2 else np.inf
+    if way > shortest:
+        raise InputError(
+            "",
+            "stretches",
+            shortest,
+            f"must be at least as long as the way in a step, {way:.3g} m: take longer stretches or more substeps",
+        )
+
+
+@inlined
+def even(road):
+    """Whether one surface is everywhere."""
+    return road.starts.size == 1 and road.left[0] == road.right[0]
+
+
+@lean
+def under_wheels(state, step, plane, kind, road, surface):
+    """Fill ``surface`` (W, 3): tables of each wheel and the share of the second.
+
+    state (2, 2 + U): positions and rates, by which wheels are taken to move over the step; kind (W,): of each wheel's
+    tyre. Of two stretches that a wheel passes in the step, or of the two sides of the line, each has the share of the
+    way on it, forwards or backwards, so that no place of the road counts by how steps fall on it. A wheel that passes
+    both in one step is on the side where it is in the middle of the step.
+    """
+    if even(road):
+        for i in range(kind.size):
+            surface[i, 0] = surface[i, 1] = road.left[0] * road.kinds + kind[i]
+            surface[i, 2] = 0.0
+        return
+    for i in range(plane.unit.size):
+        k, x, y = plane.unit[i], plane.place[i, 0], plane.place[i, 1]
+        px, py = place_of(k, x, y, state[0], plane.reach)
+        vx, vy = point(k, x, y, state[0], state[1], plane.reach)
+        low, high = min(px, px + step * vx), max(px, px + step * vx)
+        right, left = min(py, py + step * vy), max(py, py + step * vy)
+        here = max(np.searchsorted(road.starts, low, side="right") - 1, 0)
+        there = max(np.searchsorted(road.starts, high, side="right") - 1, 0)
+        share = 0.0
+        if there > here:
+            side = road.left if py + 0.5 * step * vy >= road.line else road.right
+            first, second = side[here], side[there]
+            share = (high - road.starts[there]) / (high - low)
+        elif right < road.line <= left:
+            first, second = road.right[here], road.left[here]
+            share = (left - road.line) / (left - right)
+        else:
+            first = second = road.left[here] if right >= road.line else road.right[here]
+        surface[i, 0] = first * road.kinds + kind[i]
+        surface[i, 1] = second * road.kinds + kind[i]
+        surface[i, 2] = share if first != second else 0.0

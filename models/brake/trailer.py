@@ -1,0 +1,143 @@
+"""A drawbar trailer of two axles, behind a truck or with its hook on a motion that is prescribed.
+
+The drawbar turns about the hook and carries the front axle at its end, where its own centre of mass is; there the
+trailer's body turns on it, and the rear axle is fixed to the body. Loads under both axles follow from the acceleration
+of the body. The hook bears no load, and its force is taken to act at the ground: at a height h it would shift F h by
+the wheelbase from one axle to the other.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.brake.plane_chain import headings, inertia
+from models.brake.plane_step import FORCE_X, FORCE_Y, step_on
+from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
+from models.core.errors import InputError
+from models.core.strict import quantity
+from models.machine.compiled import njit
+from models.tyre.tyre_table import Tables
+
+
+class Trailer(Truck):
+    """The body, with its axles ahead of and behind its centre of mass, and the drawbar."""
+
+    drawbar: float = quantity("m", "from the hook to the front axle")
+    drawbar_mass: float = quantity("kg", "of the drawbar with the front axle")
+    drawbar_inertia: float = quantity("kg m^2", "of both about the vertical through the front axle")
+    hook: float = Field(default=-3.5, description="m, of the hook ahead of the truck's centre of mass", lt=0.0)
+    fold: float = Field(
+        default=math.pi / 2.0,
+        gt=0.0,
+        le=math.pi,
+        description="rad, of the drawbar against the "
+        "truck, and of the body against it: beyond it a train jackknifes, and a run ends",
+    )
+
+
+def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
+    """Numbers of a trailer whose hook, the first two coordinates, follows a prescribed motion."""
+    reach = np.array([[-trailer.drawbar, 0.0], [-trailer.drawbar, -trailer.front.x]])
+    parts: list[Any] = [*_units(trailer), reach, *_wheels(trailer, 0, transfer), 1, trailer.fold, np.arange(2)]
+    return Plane(*parts)
+
+
+def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
+    """Numbers of a truck with a trailer on its hook: eight wheels."""
+    own, reach = truck(vehicle, transfer), np.zeros((3, 3))
+    reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
+    units = (np.concatenate((a, b)) for a, b in zip(own[:2], _units(trailer), strict=True))
+    both = (np.concatenate((a, b)) for a, b in zip(own[3:11], _wheels(trailer, 1, transfer), strict=True))
+    parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
+    return Plane(*parts)
+
+
+def _units(trailer: Trailer) -> tuple[np.ndarray, np.ndarray]:
+    return (np.array([trailer.drawbar_mass, trailer.mass]), np.array([trailer.drawbar_inertia, trailer.yaw_inertia]))
+
+
+def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, ...]:
+    """Unit, group and what ``wheels`` gives, the front ones on the drawbar, which is unit ``first``."""
+    check_wheels(trailer, trailer.mass + trailer.drawbar_mass)
+    place, radius, spin, static, by_x, by_y = wheels(trailer, transfer)
+    place[:2, 0] = 0.0
+    static[:2] += trailer.drawbar_mass * GRAVITY / 2.0
+    unit = np.array([first, first, first + 1, first + 1])
+    return unit, np.full(4, first + 1), place, radius, spin, static, by_x, by_y
+
+
+def follow(
+    plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A hooked trailer behind a hook of given velocities (n + 1, 2) in m/s, one at every step (s).
+
+    state (2, 2 + U) : positions and rates at the start; slope : see ``advance``; torques (W,) : of its brakes, N m.
+    Returns the states (n + 1, 2, 2 + U) and the mean forces (n, 2) in N that the hook has from the vehicle, in the
+    ground's axes. Raises InputError.
+    """
+    if not plane.hooked:
+        raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
+    states, forces = np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2))
+    states[0] = state
+    turning = np.hypot(*state[1, :2]) / plane.radius
+    if not _follow(
+        states,
+        forces,
+        turning,
+        np.ascontiguousarray(hook),
+        step,
+        slope * GRAVITY * step,
+        plane,
+        tables.packed,
+        np.asarray(torques, float),
+    ):
+        raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
+    return states, forces
+
+
+@njit(cache=True, error_model="numpy")
+def _follow(states, forces, turning, hook, step, regular, plane, tables, torques):
+    wheels, size = turning.size, states.shape[2]
+    surface, steer, report, found = np.zeros((wheels, 3)), np.zeros(wheels), np.zeros((wheels, 7)), np.zeros(size)
+    mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
+    for n in range(hook.shape[0] - 1):
+        state = states[n].copy()
+        found[:2] = (hook[n + 1] - hook[n]) / step
+        if step_on(state, turning, torques, torques, step, steer, surface, regular, plane, tables, found, report) < 0.0:
+            return False
+        states[n + 1] = state
+        headings(0.5 * (states[n, 0] + state[0]), units)
+        inertia(
+            units,
+            0.5 * (states[n, 1] + state[1]),
+            plane.masses,
+            plane.inertias,
+            plane.reach,
+            mass,
+            right,
+            along,
+            across,
+        )
+        forces[n] = (mass @ found - right)[:2]
+        for i in range(wheels):
+            psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])
+            fx, fy = report[i, FORCE_X], report[i, FORCE_Y]
+            forces[n, 0] -= np.cos(psi) * fx - np.sin(psi) * fy
+            forces[n, 1] -= np.sin(psi) * fx + np.cos(psi) * fy
+    return True
+
+
+CHOSEN = Trailer(
+    mass=4500.0,
+    yaw_inertia=15000.0,
+    height=1.2,
+    drawbar=2.5,
+    drawbar_mass=700.0,
+    drawbar_inertia=500.0,
+    hook=-3.5,
+    front=Axle(x=2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
+    rear=Axle(x=-2.0, track=1.8, radius=0.5, spin_inertia=27.0, roll_share=0.5),
+)
+"""An unladen trailer of two axles behind the paper's truck. All of it is chosen: the paper prints no trailer data."""

@@ -1,0 +1,98 @@
+"""The truck written out once more, for comparison only: Newton and Euler in its own axes, wheels as ordinary states.
+
+Nothing of the compiled step is used: velocities are those along and across the vehicle, slips follow from the wheels'
+own speeds, loads from a linear system, and a solver of stiff equations marches all of it. Wheels must not lock.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from models.brake.plane_vehicle import GRAVITY, Truck
+from models.core.errors import RunFailed
+from models.tyre.tyre_table import TyreTable
+
+TIGHT = 1e-9
+
+
+class Turned(NamedTuple):
+    """Where a vehicle is once it has slowed down: x, y (m), heading (rad) and time (s)."""
+
+    x: float
+    y: float
+    heading: float
+    time: float
+
+
+def turned(
+    vehicle: Truck, tyre: TyreTable, steer: float, torques: tuple[float, float], speed: float, until: float
+) -> Turned:
+    """From steady rolling at a speed to another one (m/s), front wheels steered (rad), torques of the axles (N m).
+
+    The tyre's friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
+    """
+    equations = _Equations(vehicle, tyre, steer, np.repeat(torques, 2))
+    start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius))
+
+    def slow(_: float, state: np.ndarray) -> float:
+        return float(np.hypot(state[3], state[4]) - until)
+
+    slow.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(equations, (0.0, 200.0), start, method="LSODA", rtol=TIGHT, atol=TIGHT, events=slow)
+    if not found.success or not found.t_events[0].size:
+        raise RunFailed("written", "the vehicle does not slow down", float(found.t[-1]))
+    x, y, heading = found.y_events[0][0][:3]
+    return Turned(float(x), float(y), float(heading), float(found.t_events[0][0]))
+
+
+class _Equations:
+    """Derivative of x, y, heading, speeds along and across, yaw rate and the speeds of the four wheels."""
+
+    def __init__(self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray) -> None:
+        self.vehicle, self.tyre, self.torques = vehicle, tyre, torques
+        axles, sides = (vehicle.front, vehicle.front, vehicle.rear, vehicle.rear), np.array([1.0, -1.0, 1.0, -1.0])
+        self.x = np.array([axle.x for axle in axles])
+        self.y = sides * [axle.track / 2.0 for axle in axles]
+        self.radius = np.array([axle.radius for axle in axles])
+        self.inertia = np.array([axle.spin_inertia for axle in axles])
+        self.c, self.s = np.cos([steer, steer, 0.0, 0.0]), np.sin([steer, steer, 0.0, 0.0])
+        other, m, h = np.array([-vehicle.rear.x] * 2 + [vehicle.front.x] * 2), vehicle.mass, vehicle.height
+        self.rest = m * GRAVITY * other / vehicle.wheelbase / 2.0
+        self.by_x = m * h / vehicle.wheelbase / 2.0 * np.array([-1.0, -1.0, 1.0, 1.0])
+        self.by_y = -sides * m * h * [axle.roll_share / axle.track for axle in axles]
+
+    def __call__(self, _: float, state: np.ndarray) -> np.ndarray:
+        psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:]
+        vx, vy = u - r * self.y, v + r * self.x
+        along, aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
+        mu_x, mu_y = self._friction(1.0 - self.radius * turning / along, np.arctan2(np.abs(aside), along))
+        mu_y = -np.sign(aside) * mu_y
+        ahead, left = -self.c * mu_x - self.s * mu_y, -self.s * mu_x + self.c * mu_y
+        m = self.vehicle.mass
+        system = np.array([[m - ahead @ self.by_x, -ahead @ self.by_y], [-left @ self.by_x, m - left @ self.by_y]])
+        ax, ay = np.linalg.solve(system, [ahead @ self.rest, left @ self.rest])
+        loads = self.rest + self.by_x * ax + self.by_y * ay
+        yaw = (self.x * left - self.y * ahead) @ loads / self.vehicle.yaw_inertia
+        wheels = (self.radius * mu_x * loads - self.torques) / self.inertia
+        moved = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r, ax + v * r, ay - u * r, yaw]
+        return np.concatenate((moved, wheels))
+
+    def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """mu_x with the sign of the slip, and mu_y."""
+        tyre = self.tyre
+        i, p = _cell(tyre.angles, angles)
+        k, w = _cell(tyre.slips, np.abs(slips))
+
+        def mean(table: np.ndarray) -> np.ndarray:
+            low, high = (1 - w) * table[i, k] + w * table[i, k + 1], (1 - w) * table[i + 1, k] + w * table[i + 1, k + 1]
+            return (1 - p) * low + p * high
+
+        h = tyre.h[:, 0]
+        return np.sign(slips) * mean(tyre.mu_x[:, 0, :]), mean(tyre.g) * ((1 - p) * h[i] + p * h[i + 1])
+
+
+def _cell(nodes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cells in which values lie and their shares."""
+    cell = np.clip(np.searchsorted(nodes, values, side="right") - 1, 0, nodes.size - 2)
+    return cell, (values - nodes[cell]) / (nodes[cell + 1] - nodes[cell])

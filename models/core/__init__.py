@@ -1,0 +1,1 @@
+"""What every system shares: scene files, strict reading, effects, results, tables, signals, errors."""

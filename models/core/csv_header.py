@@ -1,0 +1,181 @@
+"""Where the numbers of a CSV file begin and what stands above them: titles, groups, headings, units.
+
+The line of headings is the first one with a heading that the caller knows (a clock, say) above a row of numbers with as
+many cells. Whatever exporters write above it is kept: title rows, a row of groups; beneath it a row of units.
+"""
+
+import csv
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from models.core.errors import InputError
+
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+BETWEEN = 3
+"""Most rows between the headings and the numbers."""
+NUMBER = re.compile(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?\s*", re.IGNORECASE)
+MARKS = re.compile(
+    r"\s*([+-]?nan(\(ind\))?|#?n/?a|n\.a\.|null|none|-+|inv(alid)?|missing|\*+|\?+|no ?data|void|"
+    r"#value!|#div/0!|[+-]?1[.,]#(qnan|ind)0*)?\s*",
+    re.IGNORECASE,
+)
+"""Cells that say that nothing was measured."""
+TIMED = re.compile(
+    r"\s*(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[ T]+)?\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?\s*(z|[+-]\d{2}:?\d{2}|"
+    r"am|pm)?\s*",
+    re.IGNORECASE,
+)
+"""Cells that are a time of the clock, in whatever notation."""
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_HEADING = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\])?", re.DOTALL)
+
+
+class Line(NamedTuple):
+    """A line of the file: its number from 1, its text without the line end, the bytes where it begins and ends."""
+
+    number: int
+    text: str
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands above the numbers.
+
+    header : the line of headings. separator : between its cells. names : its cells, those that are empty at its end
+    left out. width : cells of the rows of numbers. titles : lines above the headings. between : rows between headings
+    and numbers. begin, line : byte where the rows of numbers begin, and number of the line before them.
+    """
+
+    header: Line
+    separator: str
+    names: tuple[str, ...]
+    width: int
+    titles: tuple[Line, ...]
+    between: tuple[Line, ...]
+    begin: int
+    line: int
+
+    def cells(self, line: Line) -> tuple[str, ...]:
+        """Cells of a line, as many as there are headings."""
+        found = split(line.text, self.separator)
+        return tuple((*found, *[""] * len(self.names))[: len(self.names)])
+
+    def groups(self) -> tuple[str, ...]:
+        """Group of every heading from the row above them, where it has as many cells; a cell that is empty carries on
+        the one before it. Nothing where there is no such row."""
+        above = split(self.titles[-1].text, self.separator) if self.titles else []
+        if len(self.names) < 3 or len(trimmed(above)) < 2 or len(above) not in (len(self.names), self.width):
+            return ()
+        groups = [""]
+        for cell in above[: len(self.names)]:
+            groups.append(cell or groups[-1])
+        return tuple(groups[1:])
+
+
+def heading(text: str) -> tuple[str, str]:
+    """Name and unit of one heading; the unit is the last pair of brackets, empty where there is none."""
+    found = _HEADING.fullmatch(text)
+    name, unit = found.groups() if found else (text, "")
+    return name.strip(), (unit or "").strip()
+
+
+def split(text: str, separator: str) -> list[str]:
+    """Cells of a line, without quotes and spaces around them."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])]
+    except csv.Error:
+        return [text]
+
+
+def trimmed(cells: Sequence[str]) -> list[str]:
+    """Cells without those that are empty at the end."""
+    used = max((i for i, cell in enumerate(cells, start=1) if cell), default=0)
+    return list(cells[:used])
+
+
+def separator_line(text: str) -> str:
+    """Separator that a first line ``sep=;`` names; empty where it is no such line."""
+    found = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
+    return found[1] if found else ""
+
+
+def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[str]) -> str:
+    """Decimal sign of cells, the first of which are in ``line``; InputError where commas have two meanings."""
+    commas = [cell for cell in cells if "," in cell]
+    if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
+        raise InputError(
+            path,
+            f"line {line} and after",
+            commas[0],
+            "the numbers hold points and commas: write them "
+            "with one decimal sign and nothing else, without separators of thousands",
+        )
+    if commas and separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
+        raise InputError(
+            path,
+            f"line {line} and after",
+            commas[0],
+            "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else",
+        )
+    return "," if commas else "."
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal point or comma."""
+    return NUMBER.fullmatch(cell) is not None
+
+
+def find_head(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
+    """Headings above numbers by every separator that makes sense of the first line that has such; none where no line
+    has."""
+    for i in range(len(lines)):
+        heads = [head for sign in separators if (head := _head(lines, i, known, sign)) is not None]
+        if heads:
+            return heads
+    return []
+
+
+def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
+    """The same of the first line with a heading that is known, whatever is beneath it: what is wrong there has to be
+    told by whoever reads the rows."""
+    for i, line in enumerate(lines):
+        parted = {sign: trimmed(split(line.text, sign)) for sign in separators}
+        heads = [
+            Head(line, sign, tuple(names), len(names), tuple(lines[:i]), (), line.end, line.number)
+            for sign, names in parted.items()
+            if len(names) > 1 and any(map(known, names))
+        ]
+        if heads:
+            return heads
+    return []
+
+
+def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator: str) -> Head | None:
+    """Headings in line ``i`` above a row of numbers; None where this is not so."""
+    names = trimmed(split(lines[i].text, separator))
+    place = next((k for k, name in enumerate(names) if known(name)), None)
+    if place is None or len(names) < 2 or any(is_number(name) or TIMED.fullmatch(name) for name in names):
+        return None
+    for j in range(i + 1, min(i + 2 + BETWEEN, len(lines))):
+        cells = split(lines[j].text, separator)
+        if not (len(cells) >= len(names) >= len(trimmed(cells))):
+            return None
+        if is_number(cells[place]) or TIMED.fullmatch(cells[place]):
+            return Head(
+                lines[i],
+                separator,
+                tuple(names),
+                len(cells),
+                tuple(lines[:i]),
+                tuple(lines[i + 1 : j]),
+                lines[j].begin,
+                lines[j].number - 1,
+            )
+        if any(is_number(cell) or known(cell) for cell in cells):
+            return None
+    return None

@@ -1,0 +1,62 @@
+"""Counter-based noise: any block of any stream can be made alone, in any order, on any worker.
+
+A stream is named by (seed, path, source); its samples are made in blocks of BLOCK that the counter numbers, so
+sample i of path j is the same number whoever asks for it and whatever was asked for before. The source says whose
+noise it is: an engineer who gives one seed to forces and gyro still gets independent noise.
+"""
+
+import numpy as np
+
+from models.core.errors import InputError
+
+BLOCK = 4096
+"""Samples per block; part of what names a sample, so it never changes."""
+
+
+(
+    FORCES,
+    GYRO,
+    GYRO_BIAS,
+    PITCH_SENSOR,
+    ACCELEROMETERS,
+    ROAD,
+    BRAKE_SIGNALS,
+    BRAKE_PRESSURES,
+    SPEED,
+    TRANSDUCERS,
+    DROPOUTS,
+) = range(11)
+"""Sources of noise; a new one takes the next number."""
+
+
+def normal_block(
+    seed: int, path: int, block: int, channels: int, source: int = FORCES, rows: int = BLOCK
+) -> np.ndarray:
+    """Standard normal samples (rows, channels) of one block, its first: samples BLOCK block and following of a stream.
+
+    seed : 0 to 2**64 - 1; path : 0 to 2**64 - 1; block : 0 to 2**64 - 1; InputError for others, which would name the
+    stream of another one. Philox with the key (seed, path), the block in the counter's third word and the source in
+    its fourth, so that blocks never overlap.
+    """
+    key = np.array([_word("seed", seed), _word("path", path)], dtype=np.uint64)
+    bits = np.random.Philox(key=key, counter=np.array([0, 0, _word("block", block), source], dtype=np.uint64))
+    return np.random.Generator(bits).standard_normal((rows, channels))
+
+
+def _word(name: str, value: int) -> int:
+    """A whole number of 64 bits."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < 2**64:
+        raise InputError("", name, value, "must be a whole number from 0 to 2^64 - 1")
+    return int(value)
+
+
+def normal(seed: int, path: int, count: int, channels: int, first: int = 0, source: int = FORCES) -> np.ndarray:
+    """Standard normal samples (count, channels) of a stream from sample ``first`` on; raises InputError."""
+    if min(count, first) < 0:
+        raise InputError("", "count, first", (count, first), "must be 0 or more")
+    start, end = first // BLOCK, -(-(first + count) // BLOCK)
+    blocks = [
+        normal_block(seed, path, block, channels, source, rows=min(BLOCK, first + count - block * BLOCK))
+        for block in range(start, end)
+    ]  # what lies behind the last sample is never drawn
+    return np.concatenate(blocks)[first - start * BLOCK :] if blocks else np.empty((0, channels))

@@ -1,0 +1,43 @@
+"""Compiled evaluation of piecewise polynomials, with their derivatives, and of lines between samples."""
+
+import numpy as np
+
+from models.machine.compiled import njit
+
+
+@njit(cache=True)
+def evaluate(coefficients, period, start, step, count, derivatives):
+    """Values at start + i step, then first derivatives, then second: shape (count, columns (derivatives + 1)).
+
+    coefficients : (degree + 1, pieces, columns), lowest power first, in the time since each piece's start;
+    the pieces lie ``period`` (s) apart from t = 0 on, and the outer ones go on beyond their ends.
+    """
+    powers, pieces, columns = coefficients.shape
+    out = np.empty((count, columns * (derivatives + 1)))
+    for row in range(count):
+        time = start + row * step
+        piece = min(max(int(np.floor(time / period + 1e-9)), 0), pieces - 1)
+        since = time - piece * period
+        for order in range(derivatives + 1):
+            for column in range(columns):
+                value = 0.0
+                for power in range(powers - 1, order - 1, -1):
+                    factor = 1.0
+                    for i in range(order):
+                        factor *= power - i
+                    value = value * since + factor * coefficients[power, piece, column]
+                out[row, order * columns + column] = value
+    return out
+
+
+@njit(cache=True, nogil=True)
+def interpolate(values, index, part):
+    """Values (n, columns) the given parts of a period after the samples ``index``, linear up to the next sample."""
+    rows, columns = values.shape
+    out = np.empty((len(index), columns))
+    for i in range(len(index)):
+        row = index[i]
+        after = min(row + 1, rows - 1)
+        for column in range(columns):
+            out[i, column] = values[row, column] + part[i] * (values[after, column] - values[row, column])
+    return out

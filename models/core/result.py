@@ -1,0 +1,210 @@
+"""Results: labelled arrays with units, counts and provenance, saved as netCDF; the only thing that a run saves."""
+
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.tables import write_table
+from models.core.whole_files import write_whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PACKAGES = ("exudyn", "mujoco", "numpy", "scipy", "numba")
+_version = cache(version)
+"""Version of an installed package; finding it out takes longer than a short run."""
+
+
+class Channel(NamedTuple):
+    """An array with the names of its axes (one name, or one for each), its unit and its meaning."""
+
+    axes: str | tuple[str, ...]
+    values: Any
+    unit: str = ""
+    meaning: str = ""
+
+    def labelled(self) -> tuple[Any, ...]:
+        """As xarray takes it."""
+        return self.axes, self.values, {"units": self.unit, "long_name": self.meaning}
+
+
+@dataclass(frozen=True)
+class Result:
+    """One run: ``data`` is an xarray Dataset of channels with their axes, units and meanings.
+
+    Its attributes hold, as text (JSON) or numbers, title, file, system and table of the scene, engine, status, doubts,
+    counts, error, assumptions and provenance, and ``seconds`` until it is saved. ``detail`` is what the system's own
+    computations go on with, in the system's own types; it is not saved.
+    """
+
+    data: "xr.Dataset"
+    detail: Any = field(default=None, repr=False)
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        """Values of a channel, shape (n,)."""
+        return self.data[channel].values
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times (n,) in s."""
+        return self.data["time"].values
+
+    @property
+    def states(self) -> np.ndarray:
+        """States (n, 2 k): the k coordinates that the run integrated, then their rates."""
+        names = json.loads(self.data.attrs["integrated"])
+        return np.column_stack([self[name] for name in (*names, *(f"{name}_rate" for name in names))])
+
+    def counts(self) -> dict[str, int]:
+        """Steps and force calls of the run."""
+        return json.loads(self.data.attrs["counts"])
+
+    def every(self, spacing: float) -> "Result":
+        """The same with rows ``spacing`` (s) apart, or all of them where they already are."""
+        step = max(1, round(spacing / float(self.times[1] - self.times[0])))
+        return Result(self.data.isel(time=slice(None, None, step)), self.detail)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of the march; of a result that was read from a file there are none."""
+        return float(self.data.attrs["seconds"])
+
+    def save(self, path: Path) -> None:
+        """Write netCDF without the seconds: the same run gives the same bytes.
+
+        It is written whole or not at all; numbers have checksums, so that whoever reads a damaged file is told.
+        """
+        kept = {name: value for name, value in self.data.attrs.items() if name != "seconds"}
+        data = self.data.drop_attrs(deep=False).assign_attrs(kept)
+        checked = {
+            name: {"fletcher32": True}
+            for name, own in data.variables.items()
+            if own.size and own.ndim and own.dtype.kind in "fiu"
+        }
+        write_whole(path, data.to_netcdf(engine="h5netcdf", encoding=checked))  # HDF5 itself crashes on a full disk
+
+    def save_table(self, path: Path, *channels: str) -> None:
+        """Write channels that share one axis, or all of them, as columns of a CSV."""
+        names = channels or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
+        write_table(path, {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
+
+
+def result(
+    scene: Any,
+    channels: Mapping[str, Channel],
+    axes: Mapping[str, Channel],
+    *,
+    engine: str = "",
+    counts: Mapping[str, int] | None = None,
+    seconds: float = 0.0,
+    doubts: Sequence[str] = (),
+    detail: Any = None,
+    **attributes: Any,
+) -> Result:
+    """The result of a scene's run.
+
+    axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
+    doubts : sentences on what contradicts the scene; attributes : more of them, numbers or text.
+    """
+    import xarray as xr
+
+    data = xr.Dataset(
+        {name: channel.labelled() for name, channel in channels.items()},
+        coords={name: axis.labelled() for name, axis in axes.items()},
+    )
+    data.attrs = {
+        "title": scene.title,
+        "scene": scene.file,
+        "system": scene.system,
+        "engine": engine,
+        **attributes,
+        "status": "complete, in doubt" if doubts else "complete",
+        "doubts": json.dumps(list(doubts)),
+        "counts": json.dumps(dict(counts or {})),
+        "error": "{}",
+        "assumptions": "{}",
+        "seconds": seconds,
+        "scene_table": json.dumps(scene.table()),
+        "provenance": json.dumps(provenance()),
+    }
+    return Result(data, detail)
+
+
+def joined(results: Mapping[str, Result], axis: str) -> Result:
+    """Results with the same channels as one, along a new first axis whose places have the mapping's names.
+
+    The attributes are those of the first; counts and seconds stand by name.
+    """
+    import xarray as xr
+
+    every = list(results.values())
+    data = xr.concat([one.data for one in every], xr.Variable(axis, list(results)), combine_attrs="override")
+    data.attrs["engine"] = ", ".join(one.data.attrs["engine"] for one in every)
+    data.attrs["counts"] = json.dumps({name: one.counts() for name, one in results.items()})
+    data.attrs["seconds"] = sum(one.seconds for one in every)
+    return Result(data)
+
+
+def load(path: Path) -> Result:
+    """Read a saved result; raises InputError if the file is not one."""
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as data:
+            return Result(data.load())
+    except (OSError, ValueError, KeyError, RuntimeError) as error:  # the last: what HDF5 finds in its own headers
+        reason = str(error).splitlines()[0]
+        raise InputError(path, "", None, f"not a saved result, or a damaged one: {reason}") from None
+
+
+def provenance(command: str = "") -> dict[str, Any]:
+    """Versions, machine and commit: what someone needs to repeat a figure."""
+    return {
+        "twinrig": _version("twinrig"),
+        "commit": _commit(),
+        "versions": {name: _version(name) for name in PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {_processor()}",
+        "system": f"{platform.system()} {platform.release()}",
+        "command": command,
+    }
+
+
+@cache
+def _commit() -> str:
+    """Commit of the checkout that runs, with a mark if it was changed since."""
+
+    def ask(*arguments: str) -> str:
+        here = Path(__file__).parent
+        done = subprocess.run(["git", *arguments], cwd=here, capture_output=True, text=True, timeout=10, check=False)
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    try:
+        commit = ask("rev-parse", "--short=12", "HEAD")
+        return f"{commit}, changed since" if commit and ask("status", "--porcelain") else commit or "not a checkout"
+    except OSError:
+        return "not a checkout"
+
+
+@cache
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown processor"
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown processor")
+
+
+def write(data: "xr.Dataset", path: Path) -> None:
+    """Write a dataset as ``Result.save`` does."""
+    Result(data).save(path)

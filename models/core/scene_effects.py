@@ -1,0 +1,369 @@
+"""Effects of the scenes of every system: lines of the system's table, and files found by listing its folder.
+
+A system's ``effects`` is the package that holds them. What a key of the system's own tables names is a line (``Entry``)
+of its ``TABLE``; an effect with physics or code of its own has a file, which nothing registers. The file has
+
+- a docstring, whose first sentence is its line in every list;
+- ``COST``, one sentence on what it takes;
+- what ``Effect`` names, as far as there is any.
+
+A scene names it in one of two ways. Either by a table [effects.NAME]: then the file has ``Parameters``, ``EXAMPLE``, a
+table of usual values, and ``extend(built, parameters)``, which puts it into what its system builds. Or by the system's
+own tables: then the file has ``PLACE``, the key that names it, ``named(scene)``, and two edits of the scene's table,
+``leave_out(table, scene)`` and, if there are usual values, ``put_in(table, scene)``; both raise InputError with the
+remedy where it cannot be. Where an effect is a choice of method, to leave it out is the next cheaper one.
+"""
+
+import ast
+import re
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from models.core.errors import InputError, RunFailed
+from models.core.strict import read
+from models.core.systems import SYSTEMS
+
+Table = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of a system's table of effects: one that a key of the system's own tables names.
+
+    says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
+    adds in every engine; needs, excludes, why, after, modules, channels : as of ``Effect``.
+    usual : what the key is where the effect has usual values, None where there are none. An effect that is not the
+    presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
+    ``put_in(table, scene)``.
+    """
+
+    says: str
+    place: str
+    cost: str
+    counts: Mapping[str, int] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    why: str = ""
+    after: tuple[str, ...] = ()
+    modules: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ()
+    usual: Any = None
+    there: Callable[[Any], bool] | None = None
+    leave_out: Callable[[Table, Any], None] | None = None
+    put_in: Callable[[Table, Any], None] | None = None
+
+    def named(self, scene: Any) -> bool:
+        """Whether a scene names the effect."""
+        if self.there is not None:
+            return self.there(scene)
+        value = scene
+        for key in self.place.split("."):
+            value = getattr(value, key, None)
+        return value is not None and value is not False and value != 0.0
+
+    def drop(self, table: Table, scene: Any) -> None:
+        """Take the effect out of a scene's table."""
+        if self.leave_out is not None:
+            return self.leave_out(table, scene)
+        *above, key = self.place.split(".")
+        for name in above:
+            table = table[name]
+        del table[key]
+
+    def add(self, table: Table, scene: Any) -> None:
+        """Put the effect into a scene's table, with its usual values."""
+        if self.put_in is not None:
+            return self.put_in(table, scene)
+        *above, key = self.place.split(".")
+        for name in above:
+            table = table.setdefault(name, {})
+        table[key] = deepcopy(self.usual)
+
+
+class Effect:
+    """An effect as its file or its line of the table gives it; what it has not of these is as here.
+
+    Attributes
+    ----------
+    NEEDS, EXCLUDES : names of other effects of its system; WHY : a phrase for both
+    AFTER : effects that come first where both are named, beside those that it needs
+    COUNTS : {"all" or an engine: {count: change}}, what it adds to a scene; the proof of absence finds no others
+    MODULES : those that are imported for its sake alone
+    CHANNELS : names of further results of a run
+    BESIDE : tables of effects that it needs, if those with usual values do not serve
+    """
+
+    NEEDS: tuple[str, ...] = ()
+    EXCLUDES: tuple[str, ...] = ()
+    WHY = ""
+    AFTER: tuple[str, ...] = ()
+    COUNTS: Mapping[str, Mapping[str, int]] = {}
+    MODULES: tuple[str, ...] = ()
+    CHANNELS: tuple[str, ...] = ()
+    BESIDE: Mapping[str, Table] = {}
+
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        vars(self).update(names)
+
+
+def _of_entry(entry: Entry) -> Effect:
+    """An effect of the table, with the names that an effect's file has."""
+    said = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
+    known = {key.upper(): getattr(entry, key) for key in said}
+    known |= {"COUNTS": {"all": entry.counts}} if entry.counts else {}
+    known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
+    return Effect(known if entry.usual is None and entry.put_in is None else known | {"put_in": entry.add})
+
+
+def names_of(system: str) -> tuple[str, ...]:
+    """All effects that scenes of a system may have; none is imported."""
+    return tuple(sorted({*_files(system), *_table(system)}))
+
+
+def _table(system: str) -> Mapping[str, Entry]:
+    """The table of effects of a system; empty where all of them have files."""
+    package = SYSTEMS[system].effects
+    return getattr(import_module(package), "TABLE", {}) if package else {}
+
+
+def _files(system: str) -> dict[str, Path]:
+    package = SYSTEMS[system].effects
+    folders = import_module(package).__path__ if package else ()
+    return {file.stem: file for folder in folders for file in Path(folder).glob("[!_]*.py")}
+
+
+def listing(system: str) -> dict[str, str]:
+    """First sentence of every effect of a system, read and not imported."""
+    says = {name: _says(file) for name, file in _files(system).items()}
+    says |= {name: entry.says.rstrip(".") for name, entry in _table(system).items()}
+    return dict(sorted(says.items()))
+
+
+def _says(file: Path) -> str:
+    try:
+        text = ast.get_docstring(ast.parse(file.read_text())) or ""
+    except SyntaxError as error:
+        return f"(cannot be read: line {error.lineno}: {error.msg})"
+    return text.partition("\n")[0].rstrip(".")
+
+
+def module_of(system: str, name: str) -> Any:
+    """``Effect`` of a name; any other attribute is its file's own. Raises InputError for a file that is none."""
+    if entry := _table(system).get(name):
+        return _of_entry(entry)
+    try:
+        file = import_module(f"{SYSTEMS[system].effects}.{name}")
+    except (ImportError, SyntaxError) as error:
+        raise InputError(f"{name}.py", "", None, f"is no effect of {system} that can be imported: {error}") from None
+    own = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
+    missing = [key for key in ("COST", *own) if not hasattr(file, key)]
+    if missing:
+        raise InputError(
+            f"{name}.py",
+            "",
+            None,
+            f"has no {' and no '.join(missing)}: models/core/scene_effects.py says what the file of an effect holds",
+        )
+    return Effect(vars(file))
+
+
+def named(scene: Any) -> tuple[str, ...]:
+    """Effects that a scene names; none that it could name by a table alone is imported to know it."""
+    there = [name for name, file in _files(scene.system).items() if name in tables_of(scene) or _names(scene, file)]
+    there += [name for name, entry in _table(scene.system).items() if entry.named(scene)]
+    return tuple(sorted(there))
+
+
+def _names(scene: Any, file: Path) -> bool:
+    """Whether a scene names the effect of a file by its system's own tables."""
+    return _placed(file) and module_of(scene.system, file.stem).named(scene)
+
+
+def absent(scene: Any) -> tuple[str, ...]:
+    """Effects of its system that a scene does not name."""
+    there = named(scene)
+    return tuple(name for name in names_of(scene.system) if name not in there)
+
+
+def tables_of(scene: Any) -> Mapping[str, Any]:
+    """The scene's tables [effects.NAME]."""
+    own = getattr(scene, "effects", None)
+    return own if isinstance(own, Mapping) else {}
+
+
+@cache
+def _placed(file: Path) -> bool:
+    """Whether an effect is named by its system's own tables, as its file says, read and not imported."""
+    return re.search(r"^def named\(", file.read_text(), re.MULTILINE) is not None
+
+
+def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
+    """Parameters of every table [effects.NAME]; raises InputError for what is no effect or has another place."""
+    return {name: _read(name, values, system, file) for name, values in tables.items()}
+
+
+def with_own(scene: Any) -> Any:
+    """The scene with its tables [effects.NAME] read; refuses what is no effect, and what cannot be together."""
+    found = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
+    if found.effects:
+        check(found)
+    return found
+
+
+def extended(built: Any, scene: Any) -> Any:
+    """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
+    for name, own in tables_of(scene).items():
+        built = _extend(name, module_of(scene.system, name), built, own)
+    return built
+
+
+def _extend(name: str, module: Any, built: Any, own: Any) -> Any:
+    try:
+        found = module.extend(built, own)
+    except (InputError, RunFailed):
+        raise
+    except Exception as error:
+        lines = [one.lineno for one in traceback.extract_tb(error.__traceback__) if one.filename == module.__file__]
+        allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
+        raise InputError(f"{name}.py", "extend", None, allowed) from error
+    if found is None:
+        raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
+    return found
+
+
+def _read(name: str, values: Any, system: str, file: str) -> Any:
+    if name not in names_of(system):
+        raise InputError(file, f"effects.{name}", None, "no such effect", names_of(system))
+    module = module_of(system, name)
+    if not hasattr(module, "Parameters"):
+        raise InputError(file, f"effects.{name}", None, f"has another place in a scene: {module.PLACE}")
+    return read(module.Parameters, values, file, f"effects.{name}")
+
+
+def check(scene: Any) -> None:
+    """Refuse effects that cannot be together, with the remedy."""
+    legal(named(scene), scene)
+
+
+def legal(there: Iterable[str], scene: Any) -> None:
+    """The same of effects that are known to be there."""
+    there = tuple(there)
+    for name in there:
+        module = module_of(scene.system, name)
+        why = f", {module.WHY}" if module.WHY else ""
+        for other in module.NEEDS:
+            if other not in there:
+                raise InputError(
+                    scene.file,
+                    _place(module, name),
+                    None,
+                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, there)}{_at(scene, other)}",
+                )
+        for other in module.EXCLUDES:
+            if other in there:
+                raise InputError(
+                    scene.file,
+                    _place(module, name),
+                    None,
+                    f"cannot stand beside {other!r}{why}: drop one of them{_at(scene, other)}",
+                )
+
+
+def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
+    """What must be dropped for an effect's sake."""
+    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in there]
+    return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
+
+
+def _place(module: Any, name: str) -> str:
+    """The key that names an effect."""
+    return str(module.PLACE) if hasattr(module, "named") else f"effects.{name}"
+
+
+def _at(scene: Any, name: str) -> str:
+    """Where an effect is named that has no table of its name."""
+    place = _place(module_of(scene.system, name), name).removeprefix("effects.")
+    return "" if place == name else f"; {name!r} is named by {place}"
+
+
+def own_table(scene: Any) -> Table:
+    """What the scene's file says, as nested tables that may be edited; no defaults."""
+    table: Table = deepcopy(scene.model_dump(exclude_unset=True))
+    return {key: value for key, value in table.items() if key not in ("file", "folder")}
+
+
+def without(scene: Any, *left_out: str) -> Any:
+    """The scene less these effects; raises InputError where one cannot be left out, or others need it."""
+    table = own_table(scene)
+    for name in sorted(left_out, key=lambda name: _depth(name, scene.system), reverse=True):
+        if name in tables_of(scene):
+            del table["effects"][name]
+        else:
+            module_of(scene.system, name).leave_out(table, scene)
+    found = _confirmed(rebuilt(table, scene), left_out, False)
+    needy = [name for name in named(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
+    gone = [name for name in needy if name not in (*left_out, *named(found))]
+    if gone:
+        need = "it needs" if len(gone) == 1 else "they need"
+        raise InputError(
+            scene.file,
+            "",
+            None,
+            f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
+        )
+    return found
+
+
+def _depth(name: str, system: str) -> int:
+    """How long the longest chain of needs is; who needs another one leaves before it."""
+    return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
+
+
+def beside(scene: Any, *more: str) -> Any:
+    """The scene with these effects at their usual values; raises InputError where one cannot be, or not so."""
+    table = own_table(scene)
+    for name in more:
+        _put_in(table, name, scene)
+    return _confirmed(rebuilt(table, scene), more, True)
+
+
+def _confirmed(scene: Any, effects: Iterable[str], wanted: bool) -> Any:
+    """The scene, once it is known that it names each of these, or none of them."""
+    there = named(scene)
+    for name in effects:
+        if (name in there) is not wanted:
+            said = "cannot be in this scene: nothing of it takes part" if wanted else "is still there: leave it in"
+            raise InputError(scene.file, _place(module_of(scene.system, name), name), None, f"{name!r} {said}")
+    return scene
+
+
+def _put_in(table: Table, name: str, scene: Any) -> None:
+    module = module_of(scene.system, name)
+    if "file" in getattr(module, "EXAMPLE", ()):
+        raise InputError(scene.file, f"effects.{name}.file", None, "has no usual value: name a file of yours")
+    if hasattr(module, "EXAMPLE"):
+        table.setdefault("effects", {})[name] = deepcopy(module.EXAMPLE)
+    elif hasattr(module, "put_in"):
+        module.put_in(table, scene)
+    else:
+        raise InputError(scene.file, _place(module, name), None, "there are no usual values: name it in the scene")
+
+
+def rebuilt(table: Table, scene: Any) -> Any:
+    """The scene of an edited table, checked."""
+    found = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
+    check(found)
+    return found
+
+
+def lines(scene: Any, width: int = 10) -> list[str]:
+    """What ``twinrig show`` says: a line per effect of the scene with what it takes, and one of all that are absent."""
+    said = {name: module_of(scene.system, name).COST for name in named(scene)}
+    there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
+    return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]

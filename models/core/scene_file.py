@@ -1,0 +1,184 @@
+"""A scene file of any system: a TOML table read strictly, before anything is imported that a run would need."""
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar
+
+from pydantic import Field, field_validator
+
+from models.core.errors import InputError, similar_file
+from models.core.strict import Strict, read
+
+
+class SceneFile(Strict):
+    """What the scenes of all systems have in common; ``options`` is checked by the study that owns it."""
+
+    CHOOSING: ClassVar[str] = "choice"
+    """The study that chooses among the effects of a scene of this system."""
+
+    title: str = Field(description="what the scene shows")
+    system: str
+    study: str = Field(description="the study that runs the scene")
+    options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
+    quantities: list[str] = Field(default_factory=list, description="what a choice of effects must hold")
+    tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
+    file: str = Field(default="", exclude=True)
+    folder: str = Field(default=".", exclude=True)
+
+    @field_validator("quantities")
+    @classmethod
+    def _once(cls, names: list[str]) -> list[str]:
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"names {name!r} twice")
+        return names
+
+    def table(self) -> dict[str, Any]:
+        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        return self.model_dump(exclude_none=True)
+
+    def check_choice(self) -> None:
+        """Quantities and a tolerance belong to a choice of effects, and to nothing else."""
+        given = {"quantities": self.quantities or None, "tolerance": self.tolerance}
+        for key, value in given.items():
+            if self.study == self.CHOOSING and value is None:
+                asks = "which quantities must stay right" if key == "quantities" else "how wrong they may be, as 0.02"
+                raise InputError(self.file, key, None, f"is missing: a choice of effects asks {asks}")
+            if self.study != self.CHOOSING and value is not None:
+                allowed = f'is read by effects = "auto", of the study {self.CHOOSING!r}, only'
+                raise InputError(self.file, key, value, allowed)
+
+    def path(self, name: str, place: str = "") -> Path:
+        """A file that the scene names at ``place``: beside the scene, or else in the folder of the command."""
+        return existing(name, Path(self.folder), self.file, place)
+
+
+Model = TypeVar("Model", bound=SceneFile)
+
+
+def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Path) -> Model:
+    """The scene of one system from nested tables; raises InputError for anything that is not understood."""
+    if "effects" in table and "effects" not in model.model_fields:
+        allowed = (
+            "has no place in a scene of this system, which only shows or compares what others compute: put it "
+            "into a scene of theirs, such as contact, wheelset or ride"
+        )
+        raise InputError(file, "effects", None, allowed)
+    for key in ("file", "folder"):
+        if key in table:
+            raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
+    found = read(model, {**_automatic(model, table, file), "file": file, "folder": str(folder)}, file)
+    found.check_choice()
+    return found
+
+
+AUTO = "auto"
+"""What a scene says in place of effects to have them chosen."""
+
+
+def _automatic(model: type[SceneFile], table: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """The table with ``effects = "auto"`` as the study that makes the choice."""
+    plain = dict(table)
+    if plain.get("effects") == AUTO:
+        del plain["effects"]
+        if plain.setdefault("study", model.CHOOSING) != model.CHOOSING:
+            raise InputError(file, "study", plain["study"], f'with effects = "auto" the study is {model.CHOOSING}')
+    return plain
+
+
+def existing(name: str, folder: Path, file: str, place: str) -> Path:
+    """The file ``name`` within ``folder``, or else in the folder in which the command runs.
+
+    Raises InputError that names the place of the scene that wanted it.
+    """
+    path = folder / name
+    try:
+        if path.is_file():
+            return path
+        if not path.exists() and Path(name).is_file():
+            return Path(name)
+        if path.is_dir():
+            raise InputError(file, place, name, "is a folder: name a file")
+    except OSError:  # such as a name that is too long
+        pass
+    raise InputError(file, place, name, f"no such file, looked for as {str(path)!r}{similar_file(path)}")
+
+
+def changed(path: Path, changes: Iterable[str]) -> dict[str, Any]:
+    """A TOML file as nested tables, with changes of the form KEY.KEY=VALUE applied on top."""
+    table = parse(path)
+    for change in changes:
+        _apply(table, change)
+    return table
+
+
+def parse(path: Path) -> dict[str, Any]:
+    """A TOML file as nested tables; raises InputError where it cannot be read."""
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(path, "", None, f"no such file{similar_file(path)}") from None
+    except OSError as error:
+        raise InputError(path, "", None, f"cannot be read as a file: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+    except (ValueError, RecursionError) as error:  # tomllib's own, too long numbers, too deep nesting
+        raise _not_toml(path, error) from None
+
+
+def _not_toml(path: Path, error: Exception) -> InputError:
+    """Message with the line at which reading stopped."""
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        reason = "nested too deeply" if isinstance(error, RecursionError) else "a number has too many digits"
+        return InputError(path, "", None, f"not valid TOML: {reason}")
+    what, line, column = _WHERE.fullmatch(str(error)).groups()  # type: ignore[union-attr]
+    if line is None:
+        return InputError(path, "", None, f"not valid TOML: {what}")
+    text = path.read_bytes().decode("utf-8-sig").splitlines()[int(line) - 1].strip()
+    return InputError(path, f"line {line}, column {column}", text, f"not valid TOML: {what}")
+
+
+_WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
+
+
+def _apply(table: dict[str, Any], change: str) -> None:
+    """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
+    key, equals, text = (part.strip() for part in change.partition("="))
+    *parents, last = key.split(".")
+    if not equals or not all((*parents, last)):
+        raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
+    at: Any = table
+    for i, parent in enumerate(parents):
+        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_entry(at, parent, key, text)]
+        if not isinstance(at, dict | list):
+            raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    at[last if isinstance(at, dict) else _entry(at, last, key, text)] = _value(text)
+
+
+def _entry(listed: list[Any], number: str, key: str, text: str) -> int:
+    """Place in a list, counted from 0 as in messages."""
+    if not (number.isdecimal() and int(number) < len(listed)):
+        raise InputError("--set", key, text, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
+    return int(number)
+
+
+def _value(text: str) -> Any:
+    """A value as in a scene file; text needs no quotes."""
+    for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
+        try:
+            found = tomllib.loads(f"x = {written}")
+        except (ValueError, RecursionError):
+            continue
+        return found["x"] if len(found) == 1 else text
+    return text
+
+
+BARE_POINT = re.compile(r"(?<![\w.])(?=\.?\d)(\d*)\.(\d*)(?=[eE][-+]?\d|(?![\w.]))")
+"""A number that may lack digits before or behind its point, which TOML does not take: 20. or .5"""
+
+
+def _with_digits(number: re.Match) -> str:
+    """The same number with both."""
+    return f"{number[1] or '0'}.{number[2] or '0'}"

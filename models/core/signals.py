@@ -1,0 +1,239 @@
+"""Inputs over time: sampled data held, linear or smooth, on uniform grids or at any instant.
+
+Every signal has ``channels`` columns and three readings: ``sample`` on a uniform grid (the tables
+that engines step through), ``at`` one instant (adaptive solvers), and ``knots``, the times at which it
+is not smooth, where an accurate solver must restart.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from models.core.errors import InputError
+
+Interpolation = Literal["held", "linear", "smooth"]
+SNAP = 1e-6
+"""Part of a period within which a time is taken for that of a sample."""
+
+
+class Signal(Protocol):
+    """What an engine may ask of an input."""
+
+    @property
+    def channels(self) -> int:
+        """Number of columns."""
+        ...
+
+    @property
+    def period(self) -> float | None:
+        """Sampling period (s), None for a signal that is not made of samples."""
+        ...
+
+    @property
+    def held(self) -> bool:
+        """True if it is constant over each period."""
+        ...
+
+    @property
+    def resolution(self) -> float:
+        """Longest step (s) that an adaptive solver may take without stepping over something."""
+        ...
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step, shape (count, channels)."""
+        ...
+
+    def at(self, time: float) -> np.ndarray:
+        """Values at one time (s), shape (channels,)."""
+        ...
+
+    def knots(self, duration: float) -> np.ndarray:
+        """Times inside (0, duration) at which the signal is not smooth."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Uniformly sampled data, held over each period or linear in between.
+
+    values : shape (n, channels), the first one at t = 0; period : s.
+    The nearest sample is found by rounding, never by truncating an accumulated time.
+    """
+
+    values: np.ndarray
+    period: float
+    held: bool
+
+    @property
+    def channels(self) -> int:
+        """Number of columns."""
+        return self.values.shape[1]
+
+    @property
+    def end(self) -> float:
+        """Last time (s) at which the signal is defined."""
+        return (len(self.values) - (0 if self.held else 1)) * self.period
+
+    @property
+    def resolution(self) -> float:
+        """The sampling period (s)."""
+        return self.period
+
+    def polynomials(self) -> np.ndarray:
+        """Coefficients (powers, periods, channels), lowest power first, in the time since each sample."""
+        if self.held:
+            return self.values[None]
+        return np.stack([self.values[:-1], np.diff(self.values, axis=0) / self.period])
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values at start + i step, shape (count, channels)."""
+        index, part = _placed(start, step, count, self.period, len(self.values))
+        if self.held:
+            return self.values[index]
+        from models.core.piecewise import interpolate
+
+        return interpolate(self.values, index, part)
+
+    def at(self, time: float) -> np.ndarray:
+        """Values at one time (s), shape (channels,): the bits of ``sample``, by scalars, as solvers ask one by one."""
+        position, last = time / self.period, len(self.values) - 1
+        nearest = round(position)
+        snapped = nearest if abs(position - nearest) < SNAP else position
+        row = min(max(math.floor(snapped), 0), last)
+        before = self.values[row]
+        return before.copy() if self.held else before + (snapped - row) * (self.values[min(row + 1, last)] - before)
+
+    def knots(self, duration: float) -> np.ndarray:
+        """All sample times inside (0, duration)."""
+        return self.period * np.arange(1, math.ceil(duration / self.period - 1e-9))
+
+
+@lru_cache(maxsize=2)
+def _placed(start: float, step: float, count: int, period: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """Index of the sample at or before each time start + i step, and the part of the period after it; the same for
+    every path of an ensemble.
+    """
+    position = (start + step * np.arange(count)) / period
+    nearest = np.rint(position)
+    snapped = np.where(np.abs(position - nearest) < SNAP, nearest, position)
+    index = np.clip(np.floor(snapped), 0, samples - 1).astype(np.int64)
+    part = snapped - index
+    index.flags.writeable = part.flags.writeable = False
+    return index, part
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A spline through uniformly sampled data, with ``derivatives`` derivatives as further channels.
+
+    values : shape (n, columns); channels are ordered value columns, first derivatives, second ones.
+    A cubic spline is C2; a quintic one is C4 and used where second derivatives are read.
+    """
+
+    values: np.ndarray
+    period: float
+    derivatives: int = 0
+    held: bool = False
+    degree: int = 3
+    _pieces: np.ndarray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        times = self.period * np.arange(len(self.values))
+        spline = make_interp_spline(times, self.values, k=self.degree)
+        powers = [spline.derivative(i)(times[:-1]) if i else self.values[:-1] for i in range(self.degree + 1)]
+        pieces = np.stack([values / math.factorial(i) for i, values in enumerate(powers)])
+        object.__setattr__(self, "_pieces", np.ascontiguousarray(pieces))
+
+    @property
+    def channels(self) -> int:
+        """Number of columns, derivatives included."""
+        return self.values.shape[1] * (self.derivatives + 1)
+
+    @property
+    def end(self) -> float:
+        """Last time (s) at which the signal is defined."""
+        return (len(self.values) - 1) * self.period
+
+    @property
+    def resolution(self) -> float:
+        """The sampling period (s)."""
+        return self.period
+
+    def polynomials(self) -> np.ndarray:
+        """Coefficients (powers, periods, value columns), lowest power first, in the time since each sample."""
+        return self._pieces
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values and derivatives at start + i step, shape (count, channels)."""
+        from models.core.piecewise import evaluate
+
+        return evaluate(self._pieces, self.period, start, step, count, self.derivatives)
+
+    def at(self, time: float) -> np.ndarray:
+        """Values and derivatives at one time (s), shape (channels,)."""
+        return self.sample(time, self.period, 1)[0]
+
+    def knots(self, duration: float) -> np.ndarray:
+        """None that a solver of moderate order must stop at."""
+        return np.empty(0)
+
+
+def sampled(values: np.ndarray, period: float, interpolation: Interpolation) -> Sampled | Smooth:
+    """Signal from uniform samples, shape (n, channels), by the rule that a scene declares.
+
+    Raises InputError for a period or a rule that is none, and for fewer samples than the rule needs: 4, or 1 if held
+    or linear.
+    """
+    least = 4 if interpolation == "smooth" else 1
+    if interpolation not in get_args(Interpolation):
+        raise InputError("", "interpolation", interpolation, "is not known", get_args(Interpolation))
+    if not 0.0 < period < math.inf:
+        raise InputError("", "period", period, "must be above 0, in s")
+    if len(values) < least:
+        raise InputError("", "samples", len(values), f"{least} or more are needed for {interpolation!r}")
+    if interpolation == "smooth":
+        return Smooth(values, period)
+    return Sampled(values, period, held=interpolation == "held")
+
+
+@dataclass(frozen=True)
+class Stacked:
+    """Signals side by side, as one."""
+
+    parts: tuple[Signal, ...]
+
+    @property
+    def channels(self) -> int:
+        """Number of columns of all parts."""
+        return sum(part.channels for part in self.parts)
+
+    @property
+    def period(self) -> float | None:
+        """Period of the first sampled part."""
+        return next((part.period for part in self.parts if part.period is not None), None)
+
+    @property
+    def held(self) -> bool:
+        """True if any part is constant over each step."""
+        return any(part.held for part in self.parts)
+
+    @property
+    def resolution(self) -> float:
+        """The finest one of all parts (s)."""
+        return min(part.resolution for part in self.parts)
+
+    def sample(self, start: float, step: float, count: int) -> np.ndarray:
+        """Values of all parts at start + i step, shape (count, channels)."""
+        return np.hstack([part.sample(start, step, count) for part in self.parts])
+
+    def at(self, time: float) -> np.ndarray:
+        """Values of all parts at one time (s), shape (channels,)."""
+        return np.concatenate([part.at(time) for part in self.parts])
+
+    def knots(self, duration: float) -> np.ndarray:
+        """Times at which any part is not smooth."""
+        return np.unique(np.concatenate([part.knots(duration) for part in self.parts]))

@@ -1,0 +1,138 @@
+"""Reading a user's values strictly: unknown or non-physical ones become one clear message."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
+
+from models.core.errors import InputError, nearest, suggestion
+
+
+class Strict(BaseModel):
+    """Base of everything a user may write: frozen, finite, no unknown key, no silent conversion."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+
+Query = Literal["mass", "size", "inertia", "strut", "load", "stiffness", "frequency", "damping"]
+"""Checks of what a usual vehicle has (``models.vehicles.plausible``)."""
+
+
+def accepted() -> Any:
+    """Field of the queries about a vehicle that its user has seen, and means so."""
+    return Field(default=[], description="queries about the vehicle that are meant so: they are not told again")
+
+
+LARGEST = 1e15
+"""No quantity of a vehicle is larger in SI units; products of two such values are still finite."""
+
+
+def quantity(unit: str, meaning: str, *, default: Any = ..., zero: bool = False, signed: bool = False) -> Any:
+    """Field of a physical quantity in SI: positive, or from zero on, or of either sign, and not beyond all measure."""
+    above, least = (None, -LARGEST) if signed else (None, 0) if zero else (0, None)
+    return Field(default, description=meaning, json_schema_extra={"unit": unit}, gt=above, ge=least, le=LARGEST)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read(model: type[Model], values: Mapping[str, Any], file: object, place: str = "") -> Model:
+    """Build ``model`` from a user's table; raises InputError that names file, place, value and what is allowed.
+
+    Of several errors the first is told in full, an unknown key before all others, and the rest are named.
+    """
+    if not isinstance(values, Mapping):
+        raise InputError(file, place, values, WORDS["dict_type"])
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        raise message(error, model, file, place) from None
+
+
+def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
+    """One message for all that was found."""
+    first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+    keys = _keys(first)
+    value = None if first["type"] == "missing" else first["input"]
+    said = _phrase(first, keys, _owner(model, keys))
+    rest = [_dotted(place, _keys(found)) for found in others if f"mean {_keys(found)[-1]!r}" not in said]
+    more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
+    return InputError(file, _dotted(place, keys), value, said + more)
+
+
+def _keys(found: Any) -> tuple[str, ...]:
+    return tuple(str(part) for part in found["loc"])
+
+
+def _dotted(place: str, keys: tuple[str, ...]) -> str:
+    return ".".join((*((place,) if place else ()), *keys))
+
+
+def _owner(model: type[BaseModel], keys: tuple[str, ...]) -> type[BaseModel] | None:
+    """The table that holds the last key, None where no table of ours does."""
+    parents = iter(keys[:-1])
+    for key in parents:
+        field = model.model_fields.get(key)
+        inner = None if field is None else _inner(field.annotation)
+        if field is None or inner is None:
+            return None
+        if get_origin(field.annotation) in (dict, list):
+            next(parents, None)  # a name that the user chose, or a place in a list
+        model = inner
+    return model
+
+
+def _inner(annotation: Any) -> type[BaseModel] | None:
+    options = (annotation, *getattr(annotation, "__args__", ()))
+    return next((o for o in options if isinstance(o, type) and issubclass(o, BaseModel)), None)
+
+
+def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
+    """What would have been accepted, in plain words."""
+    fields = {} if owner is None else owner.model_fields
+    key = keys[-1] if keys else ""
+    kind, facts = first["type"], _facts(fields.get(key))
+    if kind == "extra_forbidden":
+        known = tuple(name for name, field in fields.items() if not field.exclude)
+        return "unknown key" + (nearest(key, known) or ": this table takes none")
+    if kind == "missing":
+        return f"is missing{facts}"
+    if kind == "literal_error":
+        names = tuple(part.strip().strip("'") for part in first["ctx"]["expected"].replace(" or ", ", ").split(","))
+        return f"must be {' or '.join(names)}{facts}{suggestion(first['input'], names)}"
+    if kind == "value_error":
+        return f"{first['ctx']['error']}{facts}"
+    return WORDS.get(kind, "is not accepted here").format(**first.get("ctx", {})) + facts
+
+
+WORDS = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "finite_number": "must be a finite number",
+    "string_type": "must be text in quotes",
+    "bool_type": "must be true or false",
+    "list_type": "must be a list in [ ]",
+    "too_short": "must hold at least {min_length} value(s)",
+    "too_long": "must hold at most {max_length} value(s)",
+    "string_too_short": "must not be empty",
+    "tuple_type": "must be a list in [ ]",
+    "dict_type": "must be a table of keys and values",
+    "model_type": "must be a table of keys and values",
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than": "must be below {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+}
+"""What each kind of error of the library means to a person who writes a file."""
+
+
+def _facts(field: FieldInfo | None) -> str:
+    """Unit and meaning of a key, in brackets."""
+    if field is None:
+        return ""
+    extra = field.json_schema_extra
+    unit = f"in {extra['unit']}" if isinstance(extra, dict) and extra.get("unit") else ""
+    told = ", ".join(part for part in (field.description or "", unit) if part)
+    return f" ({told})" if told else ""

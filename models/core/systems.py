@@ -1,0 +1,74 @@
+"""The systems that a scene can be of: the folders of ``models/systems``, found by listing.
+
+A system's folder is a package with
+
+- ``ENGINES`` in its ``__init__``: the implementations among which ``--engine`` chooses, none if no engine computes it;
+- ``scene``: ``build(table, file, folder)``, the checked scene of nested tables;
+- ``plan``: ``check(scene, engines)``, which refuses what cannot be run, and ``describe(scene)``, the plan as text;
+- ``effects``: a package that holds effects, where scenes of the system may name any.
+
+Its name in scenes is that of its folder, with a hyphen for each underscore.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from models.core.errors import InputError
+
+DEFAULT = "pitch-plane"
+"""System of a scene that names none."""
+
+
+@dataclass(frozen=True)
+class System:
+    """One system, by the name of its package and its folder."""
+
+    package: str
+    folder: Path
+
+    @property
+    def scene(self) -> str:
+        """Module of its scenes."""
+        return f"{self.package}.scene"
+
+    @property
+    def plan(self) -> str:
+        """Module that checks and describes its scenes."""
+        return f"{self.package}.plan"
+
+    @property
+    def effects(self) -> str:
+        """Package of its effects, "" if its scenes have none."""
+        return f"{self.package}.effects" if (self.folder / "effects").is_dir() else ""
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """Implementations among which ``--engine`` chooses."""
+        engines: tuple[str, ...] = import_module(self.package).ENGINES
+        return engines
+
+
+def listed(folder: Path, package: str) -> dict[str, System]:
+    """Systems by their names: all packages within ``folder`` (the package ``package``) that have scenes."""
+    places = sorted(path.parent for path in folder.glob("*/scene.py"))
+    systems = {place.name.replace("_", "-"): System(f"{package}.{place.name}", place) for place in places}
+    return dict(sorted(systems.items(), key=lambda entry: entry[0] != DEFAULT))
+
+
+SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
+
+
+def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:
+    """Read a scene file of any system, with ``--set`` changes of the form KEY.KEY=VALUE applied on top."""
+    from models.core.scene_file import changed
+
+    changes = list(changes)
+    table = changed(path, changes)
+    file = path.name + (" with --set" if changes else "")
+    name = table.get("system", DEFAULT)
+    if not isinstance(name, str) or name not in systems:
+        raise InputError(file, "system", name, "no such system", tuple(systems))
+    return import_module(systems[name].scene).build(table, file, path.parent)

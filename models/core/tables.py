@@ -1,0 +1,234 @@
+"""Tables of measured values: CSV with the unit of every column in its header, read strictly.
+
+The accepted text, in full: UTF-8, or UTF-16 with its mark; lines that start with ``#`` and empty lines are
+skipped; the first other line is the header, ``name [unit], name [unit], ...`` in any order; every further
+line holds one finite number per column (or none, or ``nan``, where the reader allows gaps), comma between
+columns, point as decimal sign. A last line without a line end is taken as it is if its last number goes on
+from those before it, and ``ended`` says so; one that was cut off in a number is refused. What spreadsheets
+and loggers make of such a table (semicolons and decimal commas, tabs, quotes, titles above, units in a row
+beneath the headings, a line ``sep=``) is turned into that form first, by ``models.core.csv_plain``, where it has
+one meaning.
+"""
+
+import io
+import itertools
+import math
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.whole_files import write_whole
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+DISTANCES = {"m": 1.0, "km": 1e3}
+SECONDS = {"s": 1.0, "ms": 1e-3}
+NEWTONS = {"N": 1.0, "kN": 1e3}
+PASCALS = {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9}
+PER_METRE = {"1/m": 1.0, "rad/m": 1.0, "1/mm": 1e3, "rad/mm": 1e3}
+SHARES = {"-": 1.0, "%": 1e-2}
+RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
+ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665}
+RADIANS_PER_SECOND = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
+
+GAPS = ("", "nan")
+"""Cells that say that nothing was measured, where that is allowed."""
+
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+"""Marks that text in UTF-16 begins with."""
+HEAD = 100_000
+"""Characters among which the headings of a plain table are."""
+KEPT = 4
+"""Texts whose numbers are kept: every engine and every method of a comparison reads the same few files."""
+
+NUMBER = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
+"""A number, its digits before the point, after it and in its exponent."""
+RUN, LEAP = 8, 3.0
+"""Rows before a last one without a line end, and how much further than they it may go on."""
+
+Columns = Mapping[str, Mapping[str, float]]
+Lines = list[tuple[int, str]]
+
+_HEADING = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
+
+
+def read_table(
+    path: str | Path, columns: Columns, *, increasing: str | None = None, least: int = 1, gaps: bool = False
+) -> dict[str, np.ndarray]:
+    """Read a CSV table whose header names the unit of every column.
+
+    Parameters
+    ----------
+    path : the file
+    columns : name of each wanted column -> its accepted units, each with its factor to SI, for example
+        ``{"time": SECONDS, "front": NEWTONS}``; the file has these columns and no others
+    increasing : column whose values must rise from every row to the next one (time, arc length)
+    least : smallest accepted number of rows
+    gaps : whether a cell may be empty or ``nan``, which is then NaN; never one of the increasing column
+
+    Returns
+    -------
+    name -> float array of shape (rows,), in SI units; signs and frames are as in the file
+
+    Raises
+    ------
+    InputError : naming file, line (counted from 1), column, value, what is allowed and the nearest match
+    """
+    text = whole_text(path)
+    if not _is_plain(text, columns):
+        from models.core.csv_plain import plain_text
+
+        text = plain_text(path, text, tuple(columns))
+    header, rows = _header_and_rows(path, text)
+    names, factors = headings(path, header, columns)
+    raw = _numbers(path, text, tuple(gaps and name != increasing for name in names))
+    if len(rows) < least:
+        raise InputError(path, "rows", len(rows), f"at least {least} rows of numbers are needed")
+    table = {name: raw[:, i] * factors[i] for i, name in enumerate(names)}
+    if increasing is not None:
+        _check_increasing(path, rows, increasing, raw[:, names.index(increasing)])
+    return {name: table[name] for name in columns}
+
+
+def write_table(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]]) -> None:
+    """Write columns name -> (unit, values) with every digit, so that reading gives back the same numbers."""
+    names = [f"{name} [{unit}]" for name, (unit, _) in columns.items()]
+    line = ",".join(["%.17g"] * len(names)) + "\n"
+    rows = zip(*(np.asarray(values).tolist() for _, values in columns.values()), strict=True)
+    write_whole(Path(path), ",".join(names) + "\n" + "".join([line % row for row in rows]))
+
+
+def whole_text(path: str | Path) -> str:
+    """Whole text of a file; whatever prevents reading it is the user's to repair."""
+    try:
+        data = Path(path).read_bytes()
+        return data.decode("utf-16" if data.startswith(UTF_16) else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", None, "the file must be text in UTF-8") from None
+    except OSError as error:
+        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+
+
+def _is_plain(text: str, columns: Columns) -> bool:
+    """Whether the first line of a text is one of headings with units, and no cell is in quotes."""
+    first = next((line for line in text[:HEAD].split("\n") if line.strip() and not line.startswith("#")), "")
+    names = [cell.partition("[")[0].strip() for cell in first.split(",")]
+    strange = '"' in text or ";" in first or "\t" in first or "[" not in first or names[-1] == ""
+    return not strange and any(name in columns for name in names)
+
+
+@lru_cache(KEPT)
+def _header_and_rows(path: str | Path, text: str) -> tuple[tuple[int, str], Lines]:
+    """Numbered header line and numbered rows, without comments and empty lines."""
+    lines = [(i, line.strip()) for i, line in enumerate(text.split("\n"), start=1)]
+    used = [(i, line) for i, line in lines if line and not line.startswith("#")]
+    if not used:
+        raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
+    if not text.endswith("\n") and _cut_off([line for _, line in used]):
+        place = f"line {len(lines)}"
+        raise InputError(
+            path, place, lines[-1][1], "the last line has no line end and was cut off: add one, or delete the line"
+        )
+    return used[0], used[1:]
+
+
+def ended(path: str | Path) -> bool:
+    """Whether the last line of a file has a line end; where not, its last number may lack digits."""
+    with Path(path).open("rb") as file:
+        size = file.seek(0, io.SEEK_END)
+        file.seek(max(size - 1, 0))
+        return file.read() in (b"\n", b"")
+
+
+def _cut_off(lines: list[str]) -> bool:
+    """Whether a last line without a line end lacks a cell or digits, or leaps further than any of the last rows.
+
+    A whole number has no fewer digits before the point, after it and in its exponent than all other rows have.
+    """
+    *before, last = [line.rpartition(",") for line in lines]
+    if last[0].count(",") != lines[0].rpartition(",")[0].count(",") or len(before) < 3:
+        return True
+    numbers = [NUMBER.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
+    if None in numbers:
+        return True
+    *others, own = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
+    fewest = [min(counts) for counts in zip(*others, strict=True)]
+    whole = own[1] >= fewest[1] and own[2] >= fewest[2] and (fewest[1] > 0 or own[0] >= fewest[0])
+    value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
+    leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
+    leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
+    return not whole or leaping
+
+
+def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
+    """Column names and factors to SI, in the order of the file."""
+    place = f"line {header[0]} (header)"
+    found = [_heading(path, place, cell, columns) for cell in header[1].split(",")]
+    names = [name for name, _ in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(path, place, name, "this column appears twice")
+    missing = [name for name in columns if name not in names]
+    if missing:
+        raise InputError(path, place, header[1], f"column {missing[0]!r} is missing; wanted: {_wanted(columns)}")
+    return names, [factor for _, factor in found]
+
+
+def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
+    """Name and factor to SI of one heading such as ``left [mm]``."""
+    match = _HEADING.fullmatch(cell.strip().strip('"'))
+    name, unit = match.groups() if match else (cell.strip(), None)
+    if name not in columns:
+        allowed = f"this column is not known; wanted, separated by commas: {_wanted(columns)}"
+        raise InputError(path, place, name, allowed, tuple(columns))
+    units = tuple(columns[name])
+    if unit is None:
+        raise InputError(path, place, cell.strip(), f"the unit is missing: write {name} [{units[0]}]", units)
+    if unit not in columns[name]:
+        raise InputError(path, f"{place}, column {name!r}, unit", unit, "this unit is not known here", units)
+    return name, columns[name][unit]
+
+
+def _wanted(columns: Columns) -> str:
+    """Return the wanted header, with the first unit of each column."""
+    return ", ".join(f"{name} [{next(iter(units))}]" for name, units in columns.items())
+
+
+@lru_cache(KEPT)
+def _numbers(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
+    """All cells as an array of shape (rows, columns), in the units of the file; NaN for gaps in ``free`` columns."""
+    header, rows = _header_and_rows(path, text)
+    headings = header[1].split(",")
+    values = np.empty((len(rows), len(headings)))
+    for i, (line, row) in enumerate(rows):
+        cells = row.split(",")
+        if len(cells) != len(headings):
+            raise InputError(path, f"line {line}", row, f"{len(headings)} values are needed, found {len(cells)}")
+        for j, cell in enumerate(cells):
+            gap = free[j] and cell.strip().lower() in GAPS
+            values[i, j] = math.nan if gap else number(path, line, headings[j], cell)
+    return values
+
+
+def number(path: str | Path, line: int, heading: str, cell: str) -> float:
+    """One finite number; Python's own extras (1_000, non-Latin digits) are text here."""
+    try:
+        value = float(cell) if cell.isascii() and "_" not in cell else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        place = f"line {line}, column {heading.strip()!r}"
+        raise InputError(path, place, cell.strip(), "a finite number such as 0.5 or -1.2e-3 is needed")
+    return value
+
+
+def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarray) -> None:
+    """Refuse rows that are out of order or repeat a station."""
+    wrong = np.flatnonzero(np.diff(values) <= 0.0)
+    if wrong.size:
+        i = int(wrong[0]) + 1
+        place = f"line {rows[i][0]}, column {name!r}"
+        raise InputError(path, place, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it")

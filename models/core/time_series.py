@@ -1,0 +1,92 @@
+"""Uniformly sampled time series from CSV, with the unit of every column in its header."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.tables import SECONDS, read_table, write_table
+
+MARK = 1e28
+"""SI: what is beyond this nobody measured; exporters write 9.9E+34 and the like, in any unit."""
+
+SHORT = 100.0
+"""Part of the time that is needed below which a file's times may be of another unit."""
+MANY, WHEEL, CHASSIS = 1000, 0.02, 0.2
+"""Samples of a record, and s between them, from which on times may be of another unit: a wheel moves with up to 25 Hz,
+a chassis with up to 2.5 Hz on its springs, and shows nothing of it in fewer."""
+
+
+def read_time_series(
+    path: str | Path, columns: Mapping[str, Mapping[str, float]], *, gaps: bool = False
+) -> tuple[np.ndarray, float]:
+    """Values (n, columns) in SI and the sampling period (s) of a CSV file with a column ``time``.
+
+    The first sample must lie at t = 0 and the period must be constant to 1e-6 of itself: a clock that
+    jitters has to be repaired by someone who knows why. Where ``gaps`` are allowed, an empty cell or ``nan`` is NaN.
+    """
+    table = read_table(path, {"time": SECONDS, **columns}, increasing="time", least=8, gaps=gaps)
+    time = table["time"]
+    period = (time[-1] - time[0]) / (len(time) - 1)
+    if abs(time[0]) > 1e-6 * period:
+        raise InputError(path, "first row, column 'time'", float(time[0]), "the first sample must lie at time 0")
+    _check_even(path, time, period)
+    for name in columns:
+        _check_marks(path, name, table[name], time)
+    return np.column_stack([table[name] for name in columns]), float(f"{period:.12g}")
+
+
+def other_unit(lasts: float, needed: float) -> str:
+    """What to say of a file that lasts for so little (s) of what is needed that its times may be of another unit."""
+    wrong = lasts < needed / SHORT
+    return "; if its times are in seconds, not in milliseconds, correct the unit that heads them" if wrong else ""
+
+
+def sparse(count: int, period: float, needed: float, apart: float = WHEEL) -> str:
+    """What to say of so many samples, ``period`` (s) apart, of which next to none are needed (s), and that are too far
+    ``apart`` (s) for what moves: their times may be of another unit; "" of others."""
+    lasts = period * (count - 1)
+    if count < MANY or lasts < SHORT * needed or period < apart:
+        return ""
+    return (
+        f"The samples lie {period:.4g} s apart and last for {lasts:.4g} s, of which the run takes {needed:.4g} s; "
+        f"{'a wheel' if apart == WHEEL else 'a chassis'} moves with up to {0.5 / apart:g} Hz. If their times are in "
+        "milliseconds, head the column time [ms]."
+    )
+
+
+def _check_marks(path: str | Path, name: str, values: np.ndarray, time: np.ndarray) -> None:
+    """Refuse what exporters write where they have no value."""
+    marks = np.flatnonzero(np.abs(values) > MARK)
+    if len(marks):
+        raise InputError(
+            path,
+            f"column {name!r} at {time[marks[0]]:g} s",
+            float(values[marks[0]]),
+            "is an exporter's "
+            f"mark for no value ({len(marks)} of {len(values)} samples are): mend the file, or leave "
+            "such times out",
+        )
+
+
+def _check_even(path: str | Path, time: np.ndarray, period: float) -> None:
+    """Refuse a clock that jitters or leaves something out, at the first row where it shows."""
+    slack = 1e-6 * period + 1e-12 * time[-1]
+    if np.abs(time - period * np.arange(len(time))).max() <= slack:
+        return
+    usual = float(np.median(np.diff(time)))  # one gap moves the mean period, and with it every row
+    row = 1 + int(np.argmax(np.abs(np.diff(time) - usual) > slack))
+    raise InputError(
+        path,
+        f"row {row + 1} of the numbers, column 'time' (s)",
+        float(f"{time[row]:.12g}"),
+        f"the samples must be equally spaced: {time[row - 1] + usual:.9g} is expected here, {usual:.9g} "
+        "after the row before it",
+    )
+
+
+def write_time_series(path: str | Path, columns: Mapping[str, tuple[str, np.ndarray]], period: float) -> None:
+    """Write columns name -> (unit, values), shape (n,) each, beside their times."""
+    count = len(next(iter(columns.values()))[1])
+    write_table(path, {"time": ("s", period * np.arange(count)), **columns})

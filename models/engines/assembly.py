@@ -1,0 +1,64 @@
+"""What engines build and run of the pitch-plane vehicle: bodies, struts, input, initial state."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from models.core.signals import Signal
+from models.vehicles import pitch_plane
+from models.vehicles.description import Vehicle
+
+Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
+GUIDED: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
+"""Coordinates that a mode's input prescribes, by their place in the state. The input is then the two wheel forces,
+these coordinates, their rates and their second derivatives."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What a run computes. Effects extend it; engines read it.
+
+    Attributes
+    ----------
+    vehicle : bodies and struts that take part (no tyres where wheel forces are prescribed)
+    parameters : the paper's symbols, for the equations and the outputs
+    mode : which equations hold; "free" is the vehicle on its tyres over a flat road
+    input : signal of that mode (see ``pitch_plane_equations``), None if nothing drives the vehicle
+    initial : state at t = 0, shape (8,)
+    moment : added pitch moment on the chassis of a force-excited vehicle, one channel in N m, nose up, read at
+        each stage's time (never held); None if there is none
+    outputs : functions of the run that add channels to its result, one per effect that asks for any
+    sensors : the same, of the run and of the model that made it, for effects that read accelerations
+    doubts : sentences on what contradicts the scene, with size and remedy: told before the run and saved with it
+    """
+
+    scene: Any
+    vehicle: Vehicle
+    parameters: pitch_plane.Parameters
+    mode: Mode
+    input: Signal | None
+    initial: np.ndarray
+    outputs: tuple[Any, ...] = ()
+    moment: Signal | None = None
+    sensors: tuple[Any, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def guided(self) -> tuple[int, ...]:
+        """Coordinates that the input prescribes; empty for most modes."""
+        return GUIDED.get(self.mode, ())
+
+    def with_input(self, mode: Mode, signal: Signal) -> "Assembly":
+        """The same, driven by ``signal``."""
+        return replace(self, mode=mode, input=signal)
+
+    def with_moment(self, signal: Signal) -> "Assembly":
+        """The same, with a pitch moment added on the chassis; it stands beside any forces, held ones too."""
+        assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
+        return replace(self, moment=signal)
+
+    def without_tyres(self) -> "Assembly":
+        """The same, cut off the road."""
+        struts = tuple(strut for strut in self.vehicle.struts if strut.lower.body is not None)
+        return replace(self, vehicle=replace(self.vehicle, struts=struts))

@@ -1,0 +1,1 @@
+"""Damage: rainflow cycles, pseudo-damage by Miner's rule, level crossings, range pairs."""

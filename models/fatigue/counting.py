@@ -1,0 +1,76 @@
+"""What a fatigue group counts of a section force: pseudo-damage, level crossings, range pairs.
+
+Conventions: rainflow after ASTM E1049-85 with the residue as half cycles (``models.fatigue.damage``). Level
+crossings: how often the load rises through a level, from below it to it or beyond. Range pairs: how many rainflow
+cycles, open ones as half, have at least a range.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.fatigue.damage import checked, summed, turning_points
+from models.fatigue.rainflow_cycles import cycles
+
+LEVELS, RANGES = 64, 64
+"""Of a figure: equal parts of the way from the smallest to the largest load."""
+
+
+@dataclass(frozen=True)
+class Counted:
+    """One load, counted.
+
+    damage : by slope, in the load's unit to the slope; levels (l,), crossings (l,); ranges (r,), pairs (r,) with at
+    least that range; least, greatest : the load's extremes; mean.
+    """
+
+    damage: dict[float, float]
+    levels: np.ndarray
+    crossings: np.ndarray
+    ranges: np.ndarray
+    pairs: np.ndarray
+    least: float
+    greatest: float
+    mean: float
+
+
+def count(load: np.ndarray, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)) -> Counted:
+    """Count a load (n,); raises InputError for one without a sample, or with one that is not finite."""
+    load = checked(load)
+    turns = turning_points(load)
+    spans, _, counts = cycles(turns)
+    least, greatest = float(load.min()), float(load.max())
+    levels = np.linspace(least, greatest, LEVELS + 1)
+    ranges = np.linspace(0.0, greatest - least, RANGES + 1)[1:]
+    return Counted(
+        {slope: summed(spans, counts, slope) for slope in slopes},
+        levels,
+        level_crossings(turns, levels),
+        ranges,
+        range_pairs(spans, counts, ranges),
+        least,
+        greatest,
+        float(load.mean()),
+    )
+
+
+def level_crossings(load: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """How often a load (n,), or its turning points, rises through each level (l,), in any order; raises InputError for
+    a load as ``count`` does, and for a level that is no number."""
+    load, given = checked(load), np.asarray(levels, float)
+    if np.isnan(given).any():
+        raise InputError("", "levels", None, "must be numbers")
+    levels, places = np.unique(given, return_inverse=True)
+    rising = load[1:] > load[:-1]
+    begun = np.searchsorted(levels, load[:-1][rising], side="right")  # the first level above the start
+    ended = np.searchsorted(levels, load[1:][rising], side="right")  # one beyond the last level reached
+    change = np.bincount(begun, minlength=len(levels) + 1) - np.bincount(ended, minlength=len(levels) + 1)
+    return np.cumsum(change)[: len(levels)][places]
+
+
+def range_pairs(spans: np.ndarray, counts: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """How many cycles of these spans and counts (c,) have at least each range (r,)."""
+    order = np.argsort(spans)
+    above = np.concatenate((np.cumsum(counts[order][::-1])[::-1], [0.0]))
+    return above[np.searchsorted(spans[order], ranges * (1 - 1e-12), side="left")]

@@ -1,0 +1,110 @@
+"""Compiling with numba, its machine code kept on disk and never loaded where it does not belong.
+
+numba numbers the files of a function's signatures from its index. Two processes that compile two signatures at once
+then write the same file, and each later loads the other's machine code. Nor does numba see a change in a function
+that another file gives to a kernel. Both are wrong answers without a word. So here every file has a name of its own
+(if an entry of the index is lost, the function is compiled again), and machine code is as old as the newest of its
+folder, of the vehicles' equations, of the marches, of the contact's kernels, and of the kernels that its file imports
+from elsewhere.
+"""
+
+import re
+import zlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numba
+
+ROOT = Path(__file__).parents[2]
+COMMON = tuple(ROOT / "models" / name for name in ("vehicles", "engines", "contact", "machine"))
+"""Folders whose functions are compiled into kernels of other folders."""
+IMPORT = re.compile(r"^from ((?:models|validation)[.\w]*) import (?:\(([^)]*)\)|(.*))", re.MULTILINE)
+
+
+def njit(**options: Any) -> Callable[[Callable], Any]:
+    """``numba.njit`` with these options; with ``cache=True`` its files are safe from other processes.
+
+    What may make arrays says so (``_nrt``), or it would be compiled like whoever calls it first, who may be ``lean``.
+    """
+    return lambda function: _kept_apart(numba.njit(**{"_nrt": True, **options})(function))
+
+
+def lean(function: Callable) -> Any:
+    """``njit`` for a function that makes no array: it counts no references to those it gets, and is kept on disk.
+
+    Counting costs functions of a microsecond as much as their work. An array made in one is an error as it compiles;
+    what it calls may make some.
+    """
+    return njit(cache=True, error_model="numpy", _nrt=False)(function)
+
+
+def inlined(function: Callable) -> Any:
+    """``lean``, and written out in whatever calls it: an array given as an argument costs as much as ten numbers."""
+    return njit(cache=True, error_model="numpy", _nrt=False, inline="always")(function)
+
+
+def _kept_apart(compiled: Any) -> Any:
+    """The compiled function, the files of its signatures named after nobody's count and stamped with their sources."""
+    file = getattr(compiled._cache, "_cache_file", None)  # there is none where nothing is kept
+    if file is not None:
+        stem = file._index_name.removesuffix(".nbi")
+        file._data_name = lambda number: f"{stem}.{uuid4().hex[:12]}.nbc"
+        file._source_stamp = stamp(*_files(compiled.py_func))
+    return compiled
+
+
+def named(function: Any, *parts: Any) -> Any:
+    """A closure under a name that no other one of its factory has, made of ``parts``; compile it after that."""
+    function.__qualname__ = function.__name__ = "_".join([function.__name__, *(str(part) for part in parts)])
+    return function
+
+
+@cache
+def checksum(folder: Path) -> int:
+    """Of the sources that a kernel of this folder may be made of."""
+    sources = (path for place in sorted({folder, *COMMON}) for path in sorted(place.glob("*.py")))
+    return zlib.crc32(b"".join(path.read_bytes() for path in sources))
+
+
+def _files(function: Any) -> list[Path]:
+    """A function's file, and those of compiled functions that are its globals."""
+    called = [function.__globals__.get(name) for name in function.__code__.co_names]
+    own = [function, *(one.py_func for one in called if hasattr(one, "py_func"))]
+    return [Path(one.__code__.co_filename) for one in own]
+
+
+def stamp(file: Path, *others: Path) -> int:
+    """Of the sources that a kernel of this file may be made of: its folder's, and kernels of those others and of what
+    all of them import."""
+    made_of = {*others, *(path for one in (file, *others) for path in _imported(one))}
+    elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
+    return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))
+
+
+def _imported(file: Path) -> set[Path]:
+    """Files with kernels that a file imports, and those that they import."""
+    found, left = set[Path](), [file]
+    while left:
+        new = _kernels(left.pop()) - found
+        found |= new
+        left += new
+    return found
+
+
+@cache
+def _kernels(file: Path) -> frozenset[Path]:
+    """Files with kernels that a file names in its imports, be it they or what is in them; read and not imported."""
+    if not file.is_file():
+        return frozenset()
+    places = [
+        ROOT.joinpath(*module.split("."), *name)
+        for module, *names in IMPORT.findall(file.read_text())
+        for name in ((), *((one.split()[0],) for one in "".join(names).split(",") if one.strip()))
+    ]
+    files = {place.with_suffix(".py") for place in places}
+    return frozenset(
+        path for path in files if path.is_file() and "from models.machine.compiled import" in path.read_text()
+    )

@@ -1,0 +1,284 @@
+"""Forces of a vehicle cut at its wheels as forces of its joints, compiled: the one callback of both engines.
+
+Springs, mounts and bars inside; at every hub the six measured components, or, in the virtual measurement, the tyre on
+its road; and what stabilises roll and pitch. All numbers lie in one table, see ``table``: a head, joints, bodies,
+elements, hubs, then the inputs of every half step.
+"""
+
+import numpy as np
+
+from models.machine.compiled import lean, njit
+from models.machine.stack import array, at, beyond, doubles, start
+from models.multibody.cut_mechanics import (
+    PARENT,
+    PER_BODY,
+    PER_JOINT,
+    PER_MOTION,
+    TURNED,
+    TURNS,
+    add_wrench,
+    column,
+    inertia,
+    locate,
+    move,
+    solve,
+    turned,
+)
+from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
+
+(
+    JOINTS,
+    BODIES,
+    ELEMENTS,
+    HUBS,
+    ROAD,
+    FRAME,
+    GUIDE,
+    PER_TIME,
+    ROWS,
+    COLUMNS,
+    GRAVITY,
+    CHASSIS,
+    SPEED,
+    ROLL_STIFFNESS,
+    ROLL_DAMPING,
+    PITCH_STIFFNESS,
+    PITCH_DAMPING,
+    HOLDING,
+    ALL,
+    HEADER,
+) = range(20)
+"""Head: counts; whether tyres on a road act; frame of the hub forces; what stabilises; rows of inputs per second, rows,
+columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s of the held motion; count of all."""
+FRAMES = ("hub", "body", "inertial")
+NONE, PULLED, HELD = range(3)
+"""Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
+ONE, POINT_ONE, TWO, POINT_TWO, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING, PER_ELEMENT = 0, 1, 4, 5, 8, 11, 12, 13, 14, 15
+LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
+WRENCH, GUIDING = 6, 6
+"""Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
+
+
+@lean
+def _element(e, joints, m, chassis, v, row, axis, end, by):
+    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis. Room: three vectors."""
+    turned(m[chassis + 1], e, AXIS, axis, 0)
+    row[:] = 0.0
+    travel, rate = -e[DESIGN], 0.0
+    for side in range(2):
+        sign, j, first = 2.0 * side - 1.0, int(e[TWO * side]), TWO * side + 1
+        locate(m[j + 1], e, first, end, 0)
+        for k in range(3):
+            travel += sign * axis[k] * end[k]
+        while j > chassis:
+            column(joints[j, TURNS] != 0.0, m[j + 1], end, 0, by, 0)
+            along = axis[0] * by[0] + axis[1] * by[1] + axis[2] * by[2]
+            row[j] += sign * along
+            rate += sign * along * v[j]
+            j = int(joints[j, PARENT])
+    return e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
+
+
+@lean
+def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
+    """Write force and moment (space) at the hub by a tyre on a road of this height and rate under it.
+
+    The side force of a tyre that only pushes goes with its load: in the air it has none.
+    """
+    by, down, point = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(6), (6,))
+    down[0], down[1], down[2] = 0.0, 0.0, -hub[HEIGHT]
+    turned(m[ROLL + 1], down, 0, point, 0)
+    for k in range(3):
+        point[3 + k] = place[k] + point[k]
+    j, risen, sideways = int(hub[LAST]), 0.0, 0.0
+    while j >= 0:
+        turns = joints[j, TURNS] != 0.0
+        column(turns, m[j + 1], place, 0, by, 0)
+        risen += by[2] * v[j]
+        column(turns, m[j + 1], point, 3, by, 0)
+        sideways += by[1] * v[j]
+        j = int(joints[j, PARENT])
+    elastic, grip = hub[LOAD] + hub[TYRE] * (height - place[2] + hub[HEIGHT]), 1.0
+    wrench[2] = elastic + hub[TYRE_DAMPING] * (rate - risen)
+    if hub[ONE_SIDED] != 0.0:
+        wrench[2] = max(min(wrench[2], 2.0 * elastic), 0.0)
+        grip = wrench[2] / hub[LOAD]
+    wrench[0] = -wrench[2] * rate / speed
+    wrench[1] = grip * hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
+    wrench[3], wrench[4], wrench[5] = -point[2] * wrench[1], 0.0, point[0] * wrench[1]
+
+
+@lean
+def frame(head, hub):
+    """Row of ``m`` in whose axes a hub's wrench is given."""
+    return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
+
+
+@lean
+def into(own, vector, i, out, o):
+    """Write a vector of space in the axes of a row of ``m``."""
+    for k in range(3):
+        r = TURNED + k
+        out[o + k] = own[r] * vector[i] + own[r + 3] * vector[i + 1] + own[r + 6] * vector[i + 2]
+
+
+@lean
+def _enforce(head, wanted, joints, bodies, m, q, v, out, moments):
+    """Write the moments (roll, pitch), N m, that give both the accelerations that are wanted."""
+    n, w = len(joints), head[HOLDING]
+    mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
+    sides[:] = 0.0
+    for j in range(n):
+        sides[0, j] = out[j]
+    sides[1, ROLL] = sides[2, PITCH] = 1.0
+    inertia(joints, bodies, m, head[GRAVITY], mass, sides[0])
+    solve(mass, sides)
+    roll = wanted[4] + 2.0 * w * (wanted[2] - v[ROLL]) + w * w * (wanted[0] - q[ROLL]) - sides[0, ROLL]
+    pitch = wanted[5] + 2.0 * w * (wanted[3] - v[PITCH]) + w * w * (wanted[1] - q[PITCH]) - sides[0, PITCH]
+    a, b, c, d = sides[1, ROLL], sides[2, ROLL], sides[1, PITCH], sides[2, PITCH]
+    moments[0] = (d * roll - b * pitch) / (a * d - b * c)
+    moments[1] = (a * pitch - c * roll) / (a * d - b * c)
+
+
+@njit(cache=True, error_model="numpy")
+def parts(numbers):
+    """Views of the table: head, joints, bodies, elements, hubs, inputs."""
+    head = numbers[:HEADER]
+    n, b, e, h = int(head[JOINTS]), int(head[BODIES]), int(head[ELEMENTS]), int(head[HUBS])
+    one = HEADER + PER_JOINT * n
+    two = one + PER_BODY * b
+    three = two + PER_ELEMENT * e
+    four = three + PER_HUB * h
+    return (
+        head,
+        numbers[HEADER:one].reshape(n, PER_JOINT),
+        numbers[one:two].reshape(b, PER_BODY),
+        numbers[two:three].reshape(e, PER_ELEMENT),
+        numbers[three:four].reshape(h, PER_HUB),
+        numbers[four:].reshape(int(head[ROWS]), int(head[COLUMNS])),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
+    """Add all joint forces to ``out`` (n,) at a time (s), coordinates and rates (n,).
+
+    Also fills ``m``, the elements' forces ``inside`` (N, N m), the hubs' ``wrenches`` (hubs, 6) in the declared frame,
+    and the stabiliser's ``moments`` (2,), roll and pitch.
+    """
+    head, joints, bodies, elements, hubs, inputs = parts(numbers)
+    row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
+    chassis, count = int(head[CHASSIS]), len(hubs)
+    place, wrench, axis, by = (
+        array(doubles(3), (3,)),
+        array(doubles(6), (6,)),
+        array(doubles(3), (3,)),
+        array(doubles(3), (3,)),
+    )
+    travel = array(doubles(len(joints)), (len(joints),))
+    move(joints, q, v, m)
+    for i in range(len(elements)):
+        inside[i] = _element(elements[i], joints, m, chassis, v, travel, axis, place, by)
+        for j in range(chassis + 1, len(joints)):
+            out[j] -= inside[i] * travel[j]
+    for i in range(count):
+        hub, known = hubs[i], wrenches[i]
+        last, own = int(hub[LAST]), m[frame(head, hub)]
+        locate(m[last + 1], hub, ARM, place, 0)
+        if head[ROAD] != 0.0:
+            _tyre(hub, joints, m, q, v, row[i], row[count + i], head[SPEED], place, wrench)
+            into(own, wrench, 0, known, 0)
+            into(own, wrench, 3, known, 3)
+        else:
+            for k in range(WRENCH):
+                known[k] = row[WRENCH * i + k]
+            turned(own, known, 0, wrench, 0)
+            turned(own, known, 3, wrench, 3)
+        add_wrench(joints, m, last, place, wrench, out)
+    moments[0] = moments[1] = 0.0
+    wanted = row[len(row) - GUIDING :]
+    if head[GUIDE] == PULLED:
+        moments[0] = head[ROLL_STIFFNESS] * (wanted[0] - q[ROLL]) + head[ROLL_DAMPING] * (wanted[2] - v[ROLL])
+        moments[1] = head[PITCH_STIFFNESS] * (wanted[1] - q[PITCH]) + head[PITCH_DAMPING] * (wanted[3] - v[PITCH])
+    elif head[GUIDE] == HELD:
+        _enforce(head, wanted, joints, bodies, m, q, v, out, moments)
+    out[ROLL] += moments[0]
+    out[PITCH] += moments[1]
+
+
+@njit(cache=True, error_model="numpy")
+def report(numbers, times, states, inside, wrenches, moments):
+    """Fill what ``forces`` tells of states (m, 2 n) at times (m,): a row of each for every one."""
+    n = states.shape[1] // 2
+    m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
+    out[:] = 0.0
+    for i in range(len(times)):
+        forces(numbers, times[i], states[i, :n], states[i, n:], m, out, inside[i], wrenches[i], moments[i])
+
+
+@njit(cache=True, error_model="numpy")
+def accelerate(numbers, t, q, v, out):
+    """Write the accelerations (n,) of the written-out equations at a time (s), coordinates and rates (n,)."""
+    head, joints, bodies, elements, hubs, _ = parts(numbers)
+    n, e, h = len(joints), len(elements), len(hubs)
+    m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
+    out[:] = 0.0
+    forces(
+        numbers,
+        t,
+        q,
+        v,
+        m,
+        out,
+        array(doubles(e), (e,)),
+        array(doubles(WRENCH * h), (h, WRENCH)),
+        array(doubles(2), (2,)),
+    )
+    inertia(joints, bodies, m, head[GRAVITY], mass, out)
+    solve(mass, array(start(out), (1, n)))
+
+
+@njit(cache=True, error_model="numpy")
+def march(numbers, states, step):
+    """The classical Runge-Kutta method by steps (s) from the first of states (m, 2 n), which fills the others."""
+    size = states.shape[1]
+    n = size // 2
+    rate, total, here = array(doubles(size), (size,)), array(doubles(size), (size,)), array(doubles(size), (size,))
+    for i in range(len(states) - 1):
+        total[:] = 0.0
+        for stage in range(4):
+            ahead = 0.0 if stage == 0 else step if stage == 3 else 0.5 * step
+            for k in range(size):
+                here[k] = states[i, k] + (ahead * rate[k] if stage > 0 else 0.0)
+            rate[:n] = here[n:]
+            accelerate(numbers, i * step + ahead, here[:n], here[n:], rate[n:])
+            for k in range(size):
+                total[k] += rate[k] if stage in (0, 3) else 2.0 * rate[k]
+        for k in range(size):
+            states[i + 1, k] = states[i, k] + step / 6.0 * total[k]
+
+
+@njit(cache=True, error_model="numpy")
+def joint_forces(numbers, t, q, v, f):
+    """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    head = array(numbers, (HEADER,))
+    n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
+    forces(
+        array(numbers, (int(head[ALL]),)),
+        t,
+        array(q, (n,)),
+        array(v, (n,)),
+        array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)),
+        array(f, (n,)),
+        array(doubles(e), (e,)),
+        array(doubles(WRENCH * h), (h, WRENCH)),
+        array(doubles(2), (2,)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def set_joint_forces(block, t, n):
+    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    f = at(block)
+    array(f, (n,))[:] = 0.0
+    joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

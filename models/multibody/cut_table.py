@@ -1,0 +1,107 @@
+"""The table that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over time."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from models.multibody import cut_kernel as kernel
+from models.vehicles.cut_vehicle import ROLL, CutVehicle
+from models.vehicles.spatial import FREEDOMS
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives and steadies a cut vehicle, at half steps: rows i at the time i step / 2.
+
+    hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
+        (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)
+    guide : (m, 6), roll, pitch, rates and accelerations to hold, rad; None leaves the vehicle free
+    pull : stiffness and damping (N m/rad, N m s/rad) of roll, then pitch, towards them; None enforces them
+    holding : 1/s, how fast an enforced angle comes back to its file, critically damped
+    """
+
+    hubs: np.ndarray
+    frame: str = "hub"
+    speed: float = 0.0
+    guide: np.ndarray | None = None
+    pull: tuple[float, float, float, float] | None = None
+    holding: float = 20.0
+
+    @property
+    def road(self) -> bool:
+        """Whether tyres on a road act instead of measured forces."""
+        return self.speed > 0.0
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Where the bodies of a cut vehicle are joined, as numbers; ``last`` joint and its place (m) of every body."""
+
+    rows: np.ndarray
+    last: dict[str, int] = field(default_factory=dict)
+    origin: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def joints(vehicle: CutVehicle) -> Joints:
+    """Joints in the order of the coordinates; one that follows another of its own body lies where that one does."""
+    found, rows = Joints(np.empty(0)), []
+    for body in vehicle.tree.bodies:
+        last = found.last[body.parent] if body.parent else -1
+        origin = found.origin[body.parent] if body.parent else np.zeros(3)
+        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
+            k = FREEDOMS.index(freedom)
+            rows.append([last, k >= 3, k % 3, *np.subtract(body.position, origin)])
+            last, origin = len(rows) - 1, np.array(body.position)
+        found.last[body.name], found.origin[body.name] = last, origin
+    return Joints(np.array(rows, float), found.last, found.origin)
+
+
+def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
+    """All numbers for a run at a step (s)."""
+    joined = joints(vehicle)
+    heavy = [body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
+    bodies = [
+        [
+            joined.last[body.name],
+            body.mass,
+            *np.subtract(body.position, joined.origin[body.name]),
+            *np.ravel(body.inertia),
+        ]
+        for body in heavy
+    ]
+    elements = [_element(vehicle, joined, i) for i in range(len(vehicle.elements))]
+    hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
+    inputs = drive.hubs if drive.guide is None else np.hstack([drive.hubs, drive.guide])
+    head = np.zeros(kernel.HEADER)
+    head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = (
+        len(joined.rows),
+        len(bodies),
+        len(elements),
+        len(hubs),
+    )
+    head[[kernel.ROAD, kernel.FRAME, kernel.SPEED]] = drive.road, kernel.FRAMES.index(drive.frame), drive.speed
+    head[[kernel.PER_TIME, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
+    head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, drive.holding
+    if drive.guide is not None:
+        head[kernel.GUIDE] = kernel.PULLED if drive.pull else kernel.HELD
+    head[kernel.ROLL_STIFFNESS : kernel.PITCH_DAMPING + 1] = drive.pull or 0.0
+    parts = (head, joined.rows, np.array(bodies, float), np.array(elements), np.array(hubs), inputs)
+    whole = np.concatenate([np.ravel(part) for part in parts])
+    whole[kernel.ALL] = len(whole)
+    return whole
+
+
+def _element(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
+    e = vehicle.elements[i]
+    one, two = e.point_one - joined.origin[e.one], e.point_two - joined.origin[e.two]
+    design = float(e.axis @ (e.point_two - e.point_one))
+    return [joined.last[e.one], *one, joined.last[e.two], *two, *e.axis, design, e.held, e.stiffness, e.damping]
+
+
+def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
+    """A hub, with the tyre that was there."""
+    tyre = vehicle.whole.tyres[i]
+    side = next((force for force in vehicle.whole.side_forces if force.name == tyre.name), None)
+    law = (tyre.stiffness, tyre.damping, side.stiffness if side else 0.0, side.roll_steer if side else 0.0)
+    arm = np.subtract(tyre.point, joined.origin[tyre.body])
+    return [joined.last[tyre.body], *arm, tyre.point[2], vehicle.loads[i], *law, tyre.pushes_only]

@@ -1,0 +1,287 @@
+"""A free vehicle, its tyres, its controls and the road as the one table of doubles that ``kernel`` reads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.multibody import forces as at
+from models.multibody import tree
+from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART
+from models.tyre.bristles import net, shape_factor
+from models.vehicles.curve import Curve
+from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
+from models.vehicles.spatial import SpatialVehicle, Vector
+from models.vehicles.spatial_linear import Preloads, preloads
+
+Control = tuple[tuple[float, float], ...]
+"""Knots (s, value); a control rests at each and goes from one to the next by the smoothest step of degree 5."""
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Tyres:
+    """What the tyres and wheels have beside the vehicle file's stiffness, damping and cornering stiffness.
+
+    friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
+    axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
+    axle (kg m^2), chosen; fixed : tyres whose wheels do not spin; brake_rate : spin beside the chassis (rad/s) at which
+    a brake's torque is whole (within 24 %, by tanh).
+    """
+
+    friction: float = 0.9
+    half_width: float = 0.09
+    inclination: float = 0.0
+    cells: int = 21
+    spin_inertia: float = 1.7
+    fixed: tuple[str, ...] = ()
+    brake_rate: float = 1.0
+
+
+@dataclass(frozen=True)
+class Controls:
+    """steer : angle of the front wheels (rad); brake, drive : torque on all wheels together (N m), both 0 or more.
+
+    front_brake : share of the front axle in braking; front_drive : in driving. The wheels of an axle share evenly.
+    """
+
+    steer: Control = ((0.0, 0.0),)
+    brake: Control = ((0.0, 0.0),)
+    drive: Control = ((0.0, 0.0),)
+    front_brake: float = 0.65
+    front_drive: float = 0.0
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force from outside, as of wind: ``size`` (N, over time) along ``axis``, x ahead, y to the left and z up as the
+    vehicle heads, however it leans; at ``point`` (m) of a body, in the design position."""
+
+    body: str
+    point: Vector
+    axis: Vector
+    size: Control
+
+
+@dataclass(frozen=True, eq=False)
+class Handling:
+    """A vehicle on the road: what every implementation marches.
+
+    given : the vehicle of the ride; waves (m, 4) : the road as ``road`` makes it; slope : of the whole road, uphill
+    along x (rad); pushes : forces from outside. ``vehicle`` is the free one, ``numbers`` its table, ``gravity`` (3,) in
+    m/s^2.
+    """
+
+    given: SpatialVehicle
+    tyres: Tyres = Tyres()
+    controls: Controls = Controls()
+    waves: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    slope: float = 0.0
+    pushes: tuple[Push, ...] = ()
+    vehicle: SpatialVehicle = field(init=False)
+    held: Preloads = field(init=False)
+    numbers: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        own = self.tyres
+        names = tuple(tyre.name for tyre in self.given.tyres)
+        for name in set(own.fixed) - set(names):
+            raise InputError(self.given.name, "fixed", name, "no such tyre", names)
+        free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), own.spin_inertia, own.fixed)
+        object.__setattr__(self, "vehicle", free)
+        object.__setattr__(self, "held", preloads(free))
+        object.__setattr__(self, "numbers", _table(self))
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """(3,) m/s^2 in the axes of the road."""
+        return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
+
+    def changed(self, **changes: object) -> "Handling":
+        """The same with other fields."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and rates (n,) of rolling straight ahead at a speed (m/s) at rest in all else."""
+        places = self.vehicle.coordinates()
+        v = np.zeros(len(places))
+        v[0] = speed
+        for tyre in self.vehicle.tyres:
+            if (rotor(tyre.name), "ry") in places:
+                v[places.index((rotor(tyre.name), "ry"))] = speed / tyre.point[2]
+        return np.zeros(len(places)), v
+
+
+def _table(own: Handling) -> np.ndarray:
+    """All numbers, in the order that ``forces`` names."""
+    free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
+    parts = [*_springs(own, points), *_bars(own, points)]
+    tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls, own.pushes)
+    pushes = _pushes(own)
+    held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
+    sections = [
+        _joints(free, held),
+        np.ravel(points.rows),
+        np.ravel([row for row, _ in parts]),
+        np.ravel(tyres),
+        pushes,
+        knots.ravel(),
+        own.waves.ravel(),
+        of.cells.ravel(),
+        of.strips.ravel(),
+    ]
+    begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
+    curves = _put_curves(parts, sections[2], int(begins[-1]))
+    joint, place = _place(free, chassis.name, chassis.position)
+    drag = own.given.drags[0].coefficient / 2.0 if own.given.drags else 0.0
+    counts = [
+        begins[-1] + curves.size,
+        len(free.coordinates()),
+        len(points.rows),
+        len(parts),
+        len(free.tyres),
+        knots.shape[2],
+        len(own.waves),
+    ]
+    places = [*begins[1:4], *begins[5:-1]]  # pushes are found from the controls
+    head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *places]
+    return np.concatenate([np.array(head, float), *sections, curves])
+
+
+class _Points:
+    """Points where something acts, each once: rows of ``tree``."""
+
+    def __init__(self, vehicle: SpatialVehicle) -> None:
+        self.vehicle, self.rows = vehicle, list[tuple[float, ...]]()
+
+    def number(self, body: str, point: Vector) -> int:
+        """Of a point on a body, in the design position."""
+        joint, place = _place(self.vehicle, body, point)
+        row = (float(joint), *place.tolist())
+        if row not in self.rows:
+            self.rows.append(row)
+        return self.rows.index(row)
+
+
+def _joints(vehicle: SpatialVehicle, held: set[float]) -> np.ndarray:
+    """Rows of all coordinates, with their counts in a body; those that turn what nothing else is on are loose.
+
+    held : coordinates that are the last to move a point where something acts.
+    """
+    rows, counts = joints(vehicle), [len(body.freedoms) for body in vehicle.bodies for _ in body.freedoms]
+    bears = {*rows[:, tree.BELOW], *held}
+    loose = [counts[j] == 1 and row[tree.KIND] >= 3.0 and j not in bears for j, row in enumerate(rows)]
+    rows[loose, tree.KIND] = tree.LOOSE
+    return np.column_stack([rows, counts]).ravel()
+
+
+def _place(vehicle: SpatialVehicle, body: str, point: Vector) -> tuple[int, np.ndarray]:
+    """The coordinate that moves a point last, and where the point is from its joint."""
+    joint, origin = anchor(vehicle, body)
+    return joint, np.subtract(point, origin)
+
+
+_Part = tuple[list[float], tuple[Curve | None, ...]]
+"""A row of ``parts`` and its curves."""
+
+
+def _springs(own: Handling, points: _Points) -> Iterator[_Part]:
+    for s in own.vehicle.springs:
+        if s.two is None:
+            raise InputError(
+                own.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
+            )
+        ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
+        rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
+        law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate, rest]
+        yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0], (s.travel_force, s.rate_force)
+
+
+def _bars(own: Handling, points: _Points) -> Iterator[_Part]:
+    for bar in own.vehicle.bars:
+        ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
+        rest, rolls = (bar.point_right[2] - bar.point_left[2]) / bar.track, (bar.body, "rx")
+        law = [bar.stiffness, bar.damping, own.held.parts[bar.name], 0.0, 1.0, rest]
+        turns = [float(own.vehicle.coordinates().index(rolls)), 1.0]
+        yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0], (None, None)
+
+
+def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
+    """Numbers of all curves, and into the rows of their parts where they are, of which the first is at ``first``."""
+    found = np.empty(0)
+    for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
+        for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
+            if curve is not None:
+                row[column] = first + found.size
+                found = np.concatenate((found, _hinges(curve)))
+    return found
+
+
+def _hinges(curve: Curve) -> np.ndarray:
+    offset, slope, corners, bends = curve.hinges()
+    pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
+    return np.array([3 + len(pairs), offset, slope, *pairs])
+
+
+def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
+    """One tyre; its bristles are those with which it has the ride vehicle's cornering stiffness at its static load."""
+    free, of = own.vehicle, own.tyres
+    tyre, places = free.tyres[i], free.coordinates()
+    joint, _ = _place(free, tyre.body, tyre.point)
+    load = own.held.tyres[tyre.name]
+    if not load > 0.0:
+        raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
+    sunk = load / tyre.stiffness
+    radius = tyre.point[2] + sunk
+    cornering = next(force.stiffness for force in own.given.side_forces if force.name == tyre.name)
+    bristles = cornering / (shape_factor(of.cells) * radius * sunk * of.half_width)
+    spins = (rotor(tyre.name), "ry")
+    axle = [t for t in free.tyres if t.axle == tyre.axle]
+    share, front, c = 1.0 / len(axle), tyre.axle == 0, own.controls
+    rear = max(t.axle for t in free.tyres) or 1  # all axles behind the first share evenly
+    brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
+    drive = share * (c.front_drive if front else (1.0 - c.front_drive) / rear)
+    side = np.sign(tyre.point[1])
+    return [
+        joint,
+        places.index(spins) if spins in places else -1,
+        points.number(tyre.body, tyre.point),
+        tyre.point[2],
+        load,
+        tyre.stiffness,
+        tyre.damping,
+        radius,
+        of.half_width,
+        bristles,
+        of.friction,
+        float(front),
+        brake,
+        drive,
+        side * of.inclination,
+        of.brake_rate,
+    ]
+
+
+def _pushes(own: Handling) -> np.ndarray:
+    """A row of each push, and how many there are."""
+    names = tuple(body.name for body in own.vehicle.bodies)
+    for push in own.pushes:
+        if push.body not in names:
+            raise InputError(own.given.name, "pushes", push.body, "no such body", names)
+    rows = [
+        [joint, *place, *push.axis]
+        for push in own.pushes
+        for joint, place in [_place(own.vehicle, push.body, push.point)]
+    ]
+    return np.array([*np.ravel(rows), len(rows)])
+
+
+def _knots(controls: Controls, pushes: tuple[Push, ...]) -> np.ndarray:
+    """(3 + pushes, 2, k): times and values of steer, brake, drive and pushes, filled up with the last knot."""
+    all_knots = (controls.steer, controls.brake, controls.drive, *(push.size for push in pushes))
+    most = max(map(len, all_knots))
+    filled = [
+        (*knots, *[(knots[-1][0] + 1.0 + i, knots[-1][1]) for i in range(most - len(knots))]) for knots in all_knots
+    ]
+    return np.array(filled, float).transpose(0, 2, 1)

@@ -1,0 +1,72 @@
+"""Compiled forces of springs, dampers and anti-roll bars between points of a free vehicle.
+
+A part's travel is how far its second point lies beyond its first along an axis that the carrier has, and for a bar a
+share of a coordinate, less what it is at rest; its force draws both together.
+"""
+
+import math
+
+from models.machine.compiled import lean
+from models.machine.stack import beyond, row
+from models.multibody.tree import PER_SPOT, PUSH, RATE, WHERE, add, dot, plus, three, times
+
+(
+    STIFFNESS,
+    DAMPING,
+    HELD,
+    FRICTION,
+    FRICTION_RATE,
+    REST,
+    OWN,
+    OWN_GAIN,
+    ONE,
+    TWO,
+    AXIS,
+    ON_TRAVEL,
+    ON_RATE,
+    PER_PART,
+) = (*range(11), 13, 14, 15)
+"""Numbers of a part, as ``SpringDamper`` has them; its travel at rest; a coordinate that adds to it (-1: none), and by
+how much; its points; its axis; where the table has its curves (0: nowhere), count, offset, slope, corners and bends."""
+
+
+@lean
+def press(numbers, first, count, spots, q, v, f):
+    """Forces of all parts into spots and into ``f`` of their own coordinates; their energy (J) and power (W).
+
+    numbers : pointer to the table; first, count : of the parts there.
+    """
+    energy = power = 0.0
+    for i in range(count):
+        e = row(beyond(numbers, first), PER_PART, i)
+        one, two, axis = row(spots, PER_SPOT, int(e[ONE])), row(spots, PER_SPOT, int(e[TWO])), three(e, AXIS)
+        travel = dot(axis, plus(three(two, WHERE), times(three(one, WHERE), -1.0))) - e[REST]
+        rate = dot(axis, plus(three(two, RATE), times(three(one, RATE), -1.0)))
+        own = int(e[OWN])
+        if own >= 0:
+            travel, rate = travel + e[OWN_GAIN] * q[own], rate + e[OWN_GAIN] * v[own]
+        spring, other = e[HELD] + e[STIFFNESS] * travel, e[DAMPING] * rate
+        if e[FRICTION] != 0.0:
+            other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
+        if e[ON_TRAVEL] != 0.0:
+            other += _curve(beyond(numbers, int(e[ON_TRAVEL])), travel)
+        if e[ON_RATE] != 0.0:
+            other += _curve(beyond(numbers, int(e[ON_RATE])), rate)
+        energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
+        power -= other * rate
+        if own >= 0:
+            f[own] -= (spring + other) * e[OWN_GAIN]
+        force = times(axis, spring + other)
+        add(one, PUSH, force)
+        add(two, PUSH, times(force, -1.0))
+    return energy, power
+
+
+@lean
+def _curve(numbers, argument):
+    """Force on a curve at a pointer."""
+    head = row(numbers, 3, 0)
+    hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
+    for i in range(3, len(hinges), 2):
+        force += hinges[i + 1] * max(argument - hinges[i], 0.0)
+    return force

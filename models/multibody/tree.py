@@ -1,0 +1,189 @@
+"""The tree of a free vehicle's bodies, walked outwards for places and velocities and inwards for forces, compiled.
+
+All is in the axes of the carrier (see ``models.vehicles.free_vehicle``), the first three coordinates. A link is a row
+of numbers for each coordinate, whole for the last one of a body only: others have no more than their axis. A spot is
+one for each point where something acts. Both lie in a room that the caller has on its stack, together with what pushes
+the carrier from outside. Nothing here makes an array.
+"""
+
+import math
+
+from models.machine.compiled import lean
+from models.machine.stack import row
+
+KIND, BELOW, ARM, COUNT, PER_JOINT = 0, 1, 2, 5, 6
+"""Of a coordinate in the table, as ``joints`` has it, and how many its body has; ``LOOSE``: a kind that turns, alone
+on a body that carries no point."""
+LOOSE = 6.0
+JOINT, LOCAL, PER_POINT = 0, 1, 4
+"""Of a point in the table: the coordinate that moves it last, its place from there (m)."""
+TURNED, PLACE, AXIS, SPEED, TURNING, PUSHED, TWISTED, PER_LINK = 0, 9, 12, 15, 18, 21, 24, 27
+"""Of a link: rotation, by axes; joint; its axis; velocity of the body behind it where that would pass the carrier's
+origin, beside the carrier, and its turning; force that was gathered there, and its moment about the carrier's origin.
+"""
+WHERE, RATE, PUSH, PER_SPOT = 0, 3, 6, 9
+"""Of a spot: its place, its velocity beside the carrier, the force there."""
+AHEAD, ASIDE, TURN, GROUND = 0, 1, 2, 3
+"""Forces and moment on the carrier."""
+
+
+@lean
+def three(numbers, first):
+    """Three of an array, as a tuple."""
+    return numbers[first], numbers[first + 1], numbers[first + 2]
+
+
+@lean
+def dot(a, b):
+    """a . b of tuples."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@lean
+def cross(a, b):
+    """a x b of tuples."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@lean
+def times(a, factor):
+    """A tuple by a number."""
+    return a[0] * factor, a[1] * factor, a[2] * factor
+
+
+@lean
+def plus(a, b):
+    """Sum of tuples."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@lean
+def put(numbers, first, a):
+    """Write a tuple into an array."""
+    numbers[first], numbers[first + 1], numbers[first + 2] = a
+
+
+@lean
+def add(numbers, first, a):
+    """Add a tuple to three of an array."""
+    numbers[first] += a[0]
+    numbers[first + 1] += a[1]
+    numbers[first + 2] += a[2]
+
+
+@lean
+def outwards(joints, n, q, v, links):
+    """Fill the links of ``joints``, the table's rows at a pointer, body by body; no forces yet."""
+    carrier = row(links, PER_LINK, 2)
+    for k in range(PER_LINK):
+        carrier[k] = 0.0
+    carrier[TURNED] = carrier[TURNED + 4] = carrier[TURNED + 8] = 1.0
+    j = 3
+    while j < n:
+        of = row(joints, PER_JOINT, j)
+        count = int(of[COUNT])
+        if of[KIND] != LOOSE:
+            _follow(joints, j, j + count, row(links, PER_LINK, int(of[BELOW])), q, v, links)
+        j += count
+
+
+@lean
+def _follow(joints, first, end, below, q, v, links):
+    """A body's link, from that below it, and the axes of its coordinates, of which slides come first."""
+    x, y, z = three(below, TURNED), three(below, TURNED + 3), three(below, TURNED + 6)
+    place, speed = plus(three(below, PLACE), out(below, row(joints, PER_JOINT, first), ARM)), three(below, SPEED)
+    turning = three(below, TURNING)
+    for j in range(first, end):
+        kind = row(joints, PER_JOINT, j)[KIND]
+        along = kind if kind < 3.0 else kind - 3.0
+        axis = x if along == 0.0 else (y if along == 1.0 else z)
+        put(row(links, PER_LINK, j), AXIS, axis)
+        if kind < 3.0:
+            place, speed = plus(place, times(axis, q[j])), plus(speed, times(axis, v[j]))
+        else:
+            turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
+            x, y, z = _turned(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
+    own = row(links, PER_LINK, end - 1)
+    put(own, TURNED, x)
+    put(own, TURNED + 3, y)
+    put(own, TURNED + 6, z)
+    put(own, PLACE, place)
+    put(own, SPEED, speed)
+    put(own, TURNING, turning)
+    put(own, PUSHED, (0.0, 0.0, 0.0))
+    put(own, TWISTED, (0.0, 0.0, 0.0))
+
+
+@lean
+def _turned(along, x, y, z, cosine, sine):
+    """Three axes, turned about one of them."""
+    if along == 0.0:
+        return x, plus(times(y, cosine), times(z, sine)), plus(times(z, cosine), times(y, -sine))
+    if along == 1.0:
+        return plus(times(x, cosine), times(z, -sine)), y, plus(times(z, cosine), times(x, sine))
+    return plus(times(x, cosine), times(y, sine)), plus(times(y, cosine), times(x, -sine)), z
+
+
+@lean
+def out(own, local, first):
+    """Three numbers along a link's axes as a vector of the carrier's."""
+    return plus(
+        plus(times(three(own, TURNED), local[first]), times(three(own, TURNED + 3), local[first + 1])),
+        times(three(own, TURNED + 6), local[first + 2]),
+    )
+
+
+@lean
+def locate(points, count, links, spots):
+    """Fill all spots of ``points``, the table's rows at a pointer; no forces yet."""
+    for i in range(count):
+        of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
+        own = row(links, PER_LINK, int(of[JOINT]))
+        place = plus(three(own, PLACE), out(own, of, LOCAL))
+        put(spot, WHERE, place)
+        put(spot, RATE, plus(three(own, SPEED), cross(three(own, TURNING), place)))
+        put(spot, PUSH, (0.0, 0.0, 0.0))
+
+
+@lean
+def push(own, ground, force, place):
+    """A force from outside at a place on the body behind a link."""
+    twist(own, ground, cross(place, force))
+    add(own, PUSHED, force)
+    ground[AHEAD] += force[0]
+    ground[ASIDE] += force[1]
+
+
+@lean
+def twist(own, ground, moment):
+    """A moment from outside on the body behind a link."""
+    add(own, TWISTED, moment)
+    ground[TURN] += moment[2]
+
+
+@lean
+def inwards(joints, n, points, count, tree, f):
+    """Forces at spots and on links, from the leaves to the carrier: each coordinate adds its share to ``f``.
+
+    What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
+    """
+    links, spots, _ = tree
+    for i in range(count):
+        spot, own = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(points, PER_POINT, i)[JOINT]))
+        force = three(spot, PUSH)
+        add(own, PUSHED, force)
+        add(own, TWISTED, cross(three(spot, WHERE), force))
+    j = n - 1
+    while j > 2:
+        of, own = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
+        first = j + 1 - int(of[COUNT])
+        if of[KIND] != LOOSE:
+            pushed, twisted = three(own, PUSHED), three(own, TWISTED)
+            moment = plus(twisted, cross(pushed, three(own, PLACE)))
+            for k in range(first, j + 1):
+                turns = row(joints, PER_JOINT, k)[KIND] >= 3.0
+                f[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)
+            below = row(links, PER_LINK, int(row(joints, PER_JOINT, first)[BELOW]))
+            add(below, PUSHED, pushed)
+            add(below, TWISTED, twisted)
+        j = first - 1

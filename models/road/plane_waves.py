@@ -1,0 +1,29 @@
+"""A rough road under a vehicle that may leave its lane: an isotropic Gaussian surface as a sum of plane waves."""
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.noise import ROAD, normal
+
+LONGEST, SHORTEST = 60.0, 0.5
+"""Wavelengths (m); shorter ones are swallowed by the tyre's patch."""
+GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+def plane_waves(level: float, count: int = 48, seed: int = 0) -> np.ndarray:
+    """(count, 4) numbers of the waves: wave numbers along x and y (rad/m), amplitudes of cosine and sine (m).
+
+    level : every track has the two-sided density level / Omega^2 (S0 in m), whatever its direction; count : of waves,
+    1 or more, evenly over the logarithm of their length and over directions. A density level / Omega^2 of tracks is
+    that of a surface whose variance by wave number k is pi level / k^2. Raises InputError.
+    """
+    if not (np.isfinite(level) and level >= 0.0):
+        raise InputError("", "level", level, "must be 0 or more, in m")
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10_000:
+        raise InputError("", "waves", count, "must be a whole number from 1 to 10000")
+    edges = np.geomspace(2.0 * np.pi / LONGEST, 2.0 * np.pi / SHORTEST, count + 1)
+    number = np.sqrt(edges[:-1] * edges[1:])
+    direction = 2.0 * np.pi * np.modf(GOLDEN * np.arange(count))[0]
+    deviation = np.sqrt(np.pi * level * (1.0 / edges[:-1] - 1.0 / edges[1:]))
+    amplitudes = deviation[:, None] * normal(seed, 0, count, 2, source=ROAD)
+    return np.column_stack([number * np.cos(direction), number * np.sin(direction), amplitudes])

@@ -1,0 +1,19 @@
+"""The systems that a scene can be of: a folder each, found by listing (``models.core.systems``).
+
+``run(scene, engine)`` is the way from a scene of any system to its result.
+"""
+
+from importlib import import_module
+from typing import Any
+
+from models.core.result import Result
+from models.core.systems import SYSTEMS
+
+
+def run(scene: Any, engine: str = "", **how: Any) -> Result:
+    """Run a scene in one engine; ``how`` is what the system's own ``run`` takes, such as one of its manoeuvres.
+
+    Raises InputError, Refused or RunFailed, never returns a partial run.
+    """
+    found: Result = import_module(f"{SYSTEMS[scene.system].package}.run").run(scene, engine, **how)
+    return found

@@ -1,0 +1,192 @@
+"""Adhesion utilisation measured as test engineers do it: first k of each axle braked alone, then z with the system on.
+
+The procedure of UN R13, Annex 13, appendix 2, in a simulation that repeats exactly; not checked against the text of the
+regulation.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from models.brake.controller import Command, Sample
+from models.brake.figures_of_merit import (
+    KMH,
+    Axles,
+    adhesion_front,
+    adhesion_of_vehicle,
+    adhesion_rear,
+    adhesion_trailer,
+    braking_rate,
+    crossing,
+    mean_of_fastest,
+    split_rate,
+)
+from models.brake.plane_step import LOCKED
+from models.brake.plane_vehicle import GRAVITY
+from models.core.errors import RunFailed
+from models.systems.braking.of_scene import braked, vehicle_of
+from models.systems.braking.procedures import looped
+from models.systems.braking.run import Braked, Path
+from models.systems.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
+from models.systems.braking.stop_report import Stop
+
+AXLES = ("front axle", "rear axle", "trailer's front axle", "trailer's rear axle")
+HALVINGS = 9
+"""Of the interval in which the pressure lies at which an axle locks: 1/500 of the supply pressure."""
+LONGEST = 120.0
+"""s: for which a run that measures adhesion may last, however long those of the scene are."""
+BELOW_LOCK = (1.0, 0.98, 0.96)
+"""Pressures of the three runs, by the largest that does not lock."""
+
+
+class NoAdhesion(RunFailed):
+    """The procedure does not give a figure for this vehicle on this surface."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("adhesion utilisation", f"not found: {reason}")
+
+
+@dataclass(frozen=True)
+class Adhesion:
+    """k of the front and of the rear axle on one surface, and of both axles of the trailer if there is one."""
+
+    front: float
+    rear: float
+    trailer: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Utilised:
+    """Braking rate z with the system on, k_M of the vehicle, and how much of it is used, epsilon = z / k_M.
+
+    With a trailer all three are those of the train.
+    """
+
+    z: float
+    k: Adhesion
+    k_vehicle: float
+
+    @property
+    def epsilon(self) -> float:
+        """At least 0.75 of a category 1 system; above 1 calls for k to be measured again."""
+        return self.z / self.k_vehicle
+
+
+@dataclass(frozen=True)
+class Held:
+    """Pressures (W,) in bar that stay, as on a test without anti-lock system."""
+
+    pressures: np.ndarray
+
+    def sample(self, given: Sample) -> Command:
+        """Always the same."""
+        return Command(pressures=self.pressures)
+
+
+def axles(scene: BrakingScene) -> Axles:
+    """Loads and lengths of the scene's vehicle."""
+    own = vehicle_of(scene)
+    weight = own.mass * GRAVITY
+    front = weight * -own.rear.x / own.wheelbase
+    return Axles(front, weight - front, own.wheelbase, own.height)
+
+
+def behind(vehicle: Braked, z: float) -> np.ndarray:
+    """Loads (2,) in N of the trailer's axles at a deceleration z g; (0,) without one."""
+    loads = vehicle.plane.static - vehicle.plane.by_x * z * GRAVITY
+    return loads[4:].reshape(-1, 2).sum(axis=1)
+
+
+def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
+    """The scene's vehicle with its trailer, if no change takes that away, on one surface everywhere."""
+    road = RoadTable(stretches=[Stretch(left=surface)])
+    return braked(scene.model_copy(update={"road": road, **changes}), Procedure())
+
+
+def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
+    """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
+    vehicle, own = on_one(scene, surface, trailer=None), axles(scene)
+    found = Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
+    if scene.trailer is None:
+        return found
+    train = on_one(scene, surface)
+    rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
+    return replace(
+        found, trailer=tuple(adhesion_trailer(z, weight, float(behind(train, z)[i])) for i, z in enumerate(rates))
+    )
+
+
+def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:
+    """A run from a speed (km/h) with the scene's controller, or what stands behind its port, which logs nothing."""
+    port = None if scene.port is None else scene.port.model_copy(update={"log": None})
+    lasting = scene.run.model_copy(update={"duration": LONGEST})
+    return looped(scene.model_copy(update={"port": port, "run": lasting}), name, vehicle, vehicle.rolling(speed * KMH))
+
+
+def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
+    """z of the fastest runs with one axle braked, from 40 to 20 km/h."""
+    wheels = np.arange(vehicle.plane.wheels) // 2 == axle
+
+    def run(pressure: float) -> Path:
+        return vehicle.run(Held(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
+
+    low, high = 0.0, scene.brakes.supply
+    if not _locks(run(high)):
+        raise NoAdhesion(f"the {AXLES[axle]} does not lock at the supply's {high:g} bar")
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _locks(run(middle)) else (middle, high)
+    times = [_between(run(share * low), 40.0, 20.0) for share in BELOW_LOCK]
+    if not np.isfinite(times).any():
+        raise NoAdhesion(f"the {AXLES[axle]} alone does not slow the vehicle down to 20 km/h")
+    return braking_rate(40.0 * KMH, 20.0 * KMH, mean_of_fastest(np.array(times)))
+
+
+def _locks(path: Path) -> bool:
+    """Whether a wheel locks above 20 km/h."""
+    fast = Stop(path).speed[:-1] > 20.0 * KMH
+    return bool((path.reports[fast][:, :, LOCKED] > 0.0).any())
+
+
+def _between(path: Path, high: float, low: float) -> float:
+    """Time (s) from one speed to another, in km/h; not a number if the vehicle does not get there."""
+    stop = Stop(path)
+    return crossing(stop.times, stop.speed, low * KMH) - crossing(stop.times, stop.speed, high * KMH)
+
+
+def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
+    """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
+    its name."""
+    own, found = axles(scene), k or adhesion(scene, surface)
+    train = on_one(scene, surface)
+    path = _held_by_system(scene, name, train, 55.0)
+    z = braking_rate(45.0 * KMH, 15.0 * KMH, _between(path, 45.0, 15.0))
+    loads = np.concatenate(([own.weight], behind(train, z)))
+    each = np.array([adhesion_of_vehicle(z, found.front, found.rear, own), *found.trailer])
+    return Utilised(z, found, float(each @ loads / loads.sum()))
+
+
+@dataclass(frozen=True)
+class Split:
+    """Braking rate z on split friction and what is asked of it: at least the larger of 0.75 (4 k_L + k_H)/5 and k_L."""
+
+    z: float
+    k_low: float
+    k_high: float
+
+    @property
+    def asked(self) -> float:
+        """Least z."""
+        return split_rate(self.k_low, self.k_high)
+
+
+def split(scene: BrakingScene, name: str) -> Split:
+    """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
+    own, first = scene.procedures[name], scene.road.stretches[0]
+    alone = scene.model_copy(update={"trailer": None})
+    both = [adhesion(alone, surface) for surface in (first.left, own.right or first.right or first.left)]
+    path = _held_by_system(alone, name, braked(alone, own), 50.0)
+    z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
+    k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)
+    return Split(z, k[0], k[1])

@@ -1,0 +1,104 @@
+"""Measured chamber pressures that drive the vehicle open loop, and the measured wheel speeds to lay over its own.
+
+A table has ``time``, and of every wheel ``pressure_NAME``; beside them it may have ``speed_NAME`` of every wheel. The
+names are those of ``wheel_names``. It begins at time 0, as the brake is applied; between its rows pressures are linear.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.brake.controller import LARGEST_PRESSURE, SAMPLE, Command, Sample
+from models.core.errors import InputError
+from models.core.tables import SECONDS, read_table, write_table
+
+BARS = {"bar": 1.0, "Pa": 1e-5, "kPa": 1e-2, "MPa": 10.0}
+SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+FASTEST = 150.0
+"""m/s; no wheel of a road vehicle turns faster."""
+
+
+def wheel_names(wheels: int) -> tuple[str, ...]:
+    """fl, fr, rl, rr of a truck; of more axles 1l, 1r, 2l ... in their order."""
+    axles = ("f", "r") if wheels == 4 else tuple(str(axle + 1) for axle in range((wheels + 1) // 2))
+    return tuple(axles[i // 2] + "lr"[i % 2] for i in range(wheels))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPressures:
+    """A controller that takes no notice of its wheels: pressures by time, each the mean over its sample.
+
+    times (n,) : s, rising from 0; pressures (n, W) : bar; speeds (n, W) : m/s of the wheels' rims, None if they were
+    not measured. After the last row the last pressures stay.
+    """
+
+    times: np.ndarray
+    pressures: np.ndarray
+    speeds: np.ndarray | None = None
+    period: float = SAMPLE
+
+    def sample(self, given: Sample) -> Command:
+        """Pressures (W,) whose impulse over the sample is the measured one."""
+        start, end = given.time * 1e-9, given.time * 1e-9 + self.period
+        inside = self.times[(self.times > start) & (self.times < end)]
+        at = np.concatenate(([start], inside, [end]))
+        rows = np.column_stack([np.interp(at, self.times, column) for column in self.pressures.T])
+        return Command(pressures=np.trapezoid(rows, at, axis=0) / self.period)
+
+    def rms(self, times: np.ndarray, rims: np.ndarray) -> np.ndarray:
+        """Root mean square (W,) of rims (m, W) at times (m,) less the measured speeds, as long as these last.
+
+        In m/s; not a number where none were measured.
+        """
+        if self.speeds is None:
+            return np.full(rims.shape[1], np.nan)
+        shared = times <= self.times[-1]
+        measured = np.column_stack([np.interp(times[shared], self.times, column) for column in self.speeds.T])
+        return np.sqrt(((rims[shared] - measured) ** 2).mean(axis=0))
+
+
+def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> MeasuredPressures:
+    """Measured pressures from a CSV with units; raises InputError for a file that cannot be used."""
+    names, header = wheel_names(wheels), _header(path)
+    columns = {"time": SECONDS, **{f"pressure_{name}": BARS for name in names}}
+    measured = "speed" in header
+    if measured:
+        columns |= {f"speed_{name}": SPEEDS for name in names}
+    table = read_table(path, columns, increasing="time", least=2)
+    if table["time"][0] != 0.0:
+        raise InputError(path, "time", float(table["time"][0]), "must begin at 0, when the brake is applied")
+    pressures = _within(path, table, "pressure", names, LARGEST_PRESSURE, "bar above the air's")
+    speeds = _within(path, table, "speed", names, FASTEST, "m/s") if measured else None
+    return MeasuredPressures(table["time"], pressures, speeds, period)
+
+
+def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, rims: np.ndarray) -> None:
+    """What ``read_pressures`` reads, of a run: times (n,) in s, pressures and speeds of rims (n, W) in bar, m/s."""
+    names, later = wheel_names(pressures.shape[1]), np.diff(times, prepend=-1.0) > 0.0
+    columns = {"time": ("s", times[later])}
+    for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", rims)):
+        columns |= {f"{head}_{name}": (unit, values[later, i]) for i, name in enumerate(names)}
+    write_table(path, columns)
+
+
+def _within(
+    path: str | Path, table: dict[str, np.ndarray], head: str, names: tuple[str, ...], largest: float, unit: str
+) -> np.ndarray:
+    """Columns (n, W) of one quantity, from 0 to the largest value that it can have."""
+    for name in names:
+        column = table[f"{head}_{name}"]
+        wrong = np.flatnonzero((column < 0.0) | (column > largest))
+        if wrong.size:
+            place = f"{head}_{name} at {table['time'][wrong[0]]:g} s"
+            raise InputError(path, place, float(column[wrong[0]]), f"must be from 0 to {largest:g} {unit}")
+    return np.column_stack([table[f"{head}_{name}"] for name in names])
+
+
+def _header(path: str | Path) -> str:
+    """First line that is no remark, "" if the file cannot be read: what is wrong with it ``read_table`` tells."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return ""
+    return next((line for line in lines if line.strip() and not line.startswith("#")), "")

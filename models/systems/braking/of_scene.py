@@ -1,0 +1,229 @@
+"""From a scene of braking to a vehicle on its road, ready to run."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from models.brake.brake import Brake, of_wheels
+from models.brake.controller import Controller
+from models.brake.controllers import CONTROLLERS
+from models.brake.plane_vehicle import PAPER, Plane, Truck, truck
+from models.brake.pressure import Chambers
+from models.brake.surfaces import Road, road
+from models.brake.surfaces import Stretch as Numbered
+from models.brake.trailer import train
+from models.core.errors import InputError
+from models.core.scene_effects import extended
+from models.core.scene_file import parse
+from models.core.strict import read
+from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
+from models.systems.braking.run import Braked
+from models.systems.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
+from models.tyre.tyre_source import NAMES, SCALES, from_file, named
+from models.tyre.tyre_table import TyreTable, stacked
+
+SPRUNG_ENGINE = "mujoco"
+"""Marches a vehicle on its suspension where no engine is asked for."""
+
+
+def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
+    """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
+    plane = plane_of(scene)
+    for name, scale in scene.tyres.scale.items():
+        if name not in (*NAMES, *scene.tyres.files):
+            known = (*NAMES, *scene.tyres.files)
+            raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
+    names = surfaces_of(scene, procedure)
+    tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
+    front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
+    own = None if scene.vehicle.file is None else sprung_of(scene)
+    engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
+    if engine is not None:
+        engine.check_step(scene.run.sample / scene.run.substeps)
+    return extended(
+        Braked(
+            plane=plane,
+            kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1),
+            tables=stacked(tyres),
+            slope=max(table.cornering for table in tyres),
+            road=road_of(scene, procedure, names),
+            brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
+            chambers=chambers_of(scene, plane.wheels),
+            steer=np.zeros(plane.wheels),
+            substeps=scene.run.substeps,
+            sample=scene.run.sample,
+            speed_given=scene.controller.true_speed,
+            relaxation=lags_of(scene, plane.wheels),
+            sprung=own,
+            engine=engine,
+        ),
+        scene,
+    )
+
+
+def plane_of(scene: BrakingScene) -> Plane:
+    """Numbers of the truck, or of the truck and its trailer."""
+    own, transfer = vehicle_of(scene), scene.load_transfer is not None
+    try:
+        return truck(own, transfer) if scene.trailer is None else train(own, scene.trailer, transfer)
+    except InputError as error:
+        raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
+
+
+def sprung_of(scene: BrakingScene) -> Any:
+    """The scene's vehicle on its suspension, a ``models.brake.sprung.Sprung``; InputError."""
+    from models.brake.sprung import sprung
+    from models.vehicles.vehicle_file import load_vehicle
+
+    own = scene.vehicle
+    return sprung(load_vehicle(str(own.file), scene.folder, scene.file, "vehicle.file"), float(own.spin_inertia or 0.0))
+
+
+def on_springs(engine: str, own: Any) -> Any:
+    """A vehicle on its suspension in an engine."""
+    from models.engines.braking_sprung import OnSprings
+
+    return OnSprings(engine, own)
+
+
+def vehicle_of(scene: BrakingScene) -> Truck:
+    """Parameters of the scene's vehicle with what the scene overrides; of one on its suspension, those in the plane."""
+    if scene.vehicle.file is not None:
+        plane: Truck = sprung_of(scene).plane
+        return plane
+    name, file = scene.vehicle.parameters, scene.file
+    if name.endswith(".toml"):
+        path = scene.path(name, "vehicle.parameters")
+        table, file = parse(path), path.name
+        vehicle = read(Truck, table, file)
+    elif name == "paper":
+        vehicle = PAPER
+    else:
+        raise InputError(file, "vehicle.parameters", name, "no such set; a file of your own ends in .toml", ("paper",))
+    if scene.vehicle.override:
+        changed = _merged(vehicle.model_dump(), scene.vehicle.override)
+        vehicle = read(Truck, changed, scene.file, "vehicle.override")
+    if scene.load_transfer is not None and "front" in scene.load_transfer.model_fields_set:
+        share = scene.load_transfer.front
+        parts = {"front": {"roll_share": share}, "rear": {"roll_share": 1.0 - share}}
+        vehicle = Truck(**_merged(vehicle.model_dump(), parts))
+    return vehicle
+
+
+def _merged(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables with some of their values changed."""
+    merged = dict(base)
+    for key, value in changes.items():
+        inner = base.get(key)
+        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, Mapping) else value
+    return merged
+
+
+def sides(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
+    """Surfaces left and right of the line on a stretch, as the procedure has them."""
+    return stretch.left, procedure.right or stretch.right or stretch.left
+
+
+def surfaces_of(scene: BrakingScene, procedure: Procedure) -> list[str]:
+    """Names of all surfaces under a procedure, each once."""
+    return list(dict.fromkeys(name for stretch in scene.road.stretches for name in sides(procedure, stretch)))
+
+
+def road_of(scene: BrakingScene, procedure: Procedure, names: list[str]) -> Road:
+    """Road of a procedure, its surfaces by their places in ``names``."""
+    stretches = [Numbered(s.x, *(names.index(name) for name in sides(procedure, s))) for s in scene.road.stretches]
+    try:
+        return road(stretches, scene.road.line, len(kinds_of(scene)))
+    except InputError as error:
+        raise InputError(scene.file, "road.stretches", error.value, error.allowed) from None
+
+
+def kinds_of(scene: BrakingScene) -> tuple[bool, ...]:
+    """Kinds of tyres: whether each is the rear one."""
+    return (False, True) if scene.tyres.own_rear else (False,)
+
+
+def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
+    """Tyre table of a surface, from the scene's file if it has one, its friction scaled as the scene says."""
+    scale = scene.tyres.scale.get(name, 1.0)
+    if not SCALES[0] < scale <= SCALES[1]:
+        raise InputError(scene.file, f"tyres.scale.{name}", scale, "must be above 0 and at most 2")
+    if name in scene.tyres.files:
+        table = from_file(scene.path(scene.tyres.files[name], f"tyres.files.{name}"))
+    elif name in NAMES:
+        table = named(name, rear)
+    else:
+        raise InputError(scene.file, "road.stretches", name, "no such surface", (*NAMES, *scene.tyres.files))
+    return table if scale == 1.0 else table.scaled(scale)
+
+
+def brake_of(scene: BrakingScene, axle: str) -> Brake:
+    """Brake of one axle's wheels."""
+    own: BrakeTable = getattr(scene.brakes, axle)
+    return read(
+        Brake,
+        {
+            "push_out": own.push_out,
+            "release": own.push_out if own.release is None else own.release,
+            "rising": own.gradient,
+            "falling": own.gradient if own.falling is None else own.falling,
+        },
+        scene.file,
+        f"brakes.{axle}",
+    )
+
+
+def lags_of(scene: BrakingScene, wheels: int) -> np.ndarray | None:
+    """Relaxation lengths (W,) in m, None where slip angles do not lag."""
+    own = scene.relaxation
+    return None if own is None else np.where(np.arange(wheels) < 2, own.front, own.rear)
+
+
+def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
+    """Chambers of all wheels; without dynamics their time constants are zero."""
+    own, none = scene.pressure, np.zeros(wheels)
+    if own is None:
+        return Chambers(none, none, scene.brakes.supply)
+    held = Chambers(none + own.fill, none + own.empty, scene.brakes.supply, delay=own.delay)
+    held = held if own.slow is None else held._replace(slow=none + own.slow)
+    return held if own.reservoir is None else held._replace(volumes=none + own.volume, reservoir=own.reservoir)
+
+
+def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
+    """Measured pressures that drive a procedure, None if there are none."""
+    if scene.measured is None:
+        return None
+    name = scene.measured.file.replace("{procedure}", procedure)
+    measured = read_pressures(scene.path(name, "measured.file"), wheels, scene.run.sample)
+    most, supply = float(measured.pressures.max()), scene.brakes.supply
+    if most > supply:
+        allowed = f"must be at least {most:g} bar, the largest pressure in {name}"
+        raise InputError(scene.file, "brakes.supply", supply, allowed)
+    return measured
+
+
+def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controller:
+    """What sets the pressures of a procedure, fresh for one run: measured ones, or the controller of the scene."""
+    measured = measured_of(scene, procedure, wheels)
+    if measured is not None:
+        return measured
+    kind = scene.controller.kind
+    if kind not in CONTROLLERS:
+        raise InputError(scene.file, "controller.kind", kind, "no such controller", tuple(CONTROLLERS))
+    make, given = CONTROLLERS[kind], scene.controller.parameters
+    known = tuple(field.name for field in fields(make) if field.name not in ("wheels", "period"))
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(scene.file, f"controller.parameters.{name}", value, f"no parameter of {kind}", known)
+    if given.get("slow") is True and (scene.pressure is None or scene.pressure.slow is None):
+        allowed = "needs valves that can apply slowly: pressure.slow"
+        raise InputError(scene.file, "controller.parameters.slow", True, allowed)
+    period = {"period": scene.run.sample} if kind != "none" else {}
+    try:
+        return make(wheels, **given, **period)
+    except InputError as error:
+        raise InputError(scene.file, error.place, error.value, error.allowed) from None
+    except TypeError:
+        raise InputError(scene.file, "controller.parameters", given, "must be numbers") from None

@@ -1,0 +1,120 @@
+"""What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.brake.plausible_truck import plausible_truck
+from models.brake.port.setup import BEHIND, check_port
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.scene_effects import lines as effect_lines
+from models.systems.braking.of_scene import braked, controller_of, sprung_of, surfaces_of, vehicle_of
+from models.systems.braking.procedures import check_engine, engines_of, port_of, ready
+from models.systems.braking.scene import BrakingScene
+from models.tyre.tyre_source import NAMES
+from models.vehicles.plausible import plausible
+
+PROCEDURES = {
+    "straight": "straight braking",
+    "split": "straight braking on split friction, wheels straight ahead",
+    "turn": "braking in a turn, steering fixed as on the steady circle before",
+    "j_turn": "J-turn: the steering is turned as the brake is applied, at once or by time",
+}
+
+
+def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    for engine in engines_of(scene, engines):
+        check_engine(scene, engine)
+    _check_parts(scene, engines_of(scene, engines))
+    for name in scene.procedures:
+        ready(scene, name)
+
+
+def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Tyres, brakes, road, controller and port, without a step of the vehicle."""
+    for name, own in scene.procedures.items():
+        known = (*NAMES, *scene.tyres.files)
+        if own.right is not None and own.right not in known:
+            raise InputError(scene.file, f"procedures.{name}.right", own.right, "no such surface", known)
+        vehicle = braked(scene, own)
+        controller_of(scene, vehicle.plane.wheels, name)
+        if scene.port is not None:
+            for engine in engines:
+                check_port(scene.port, port_of(scene, name, vehicle, engine))
+    if scene.port is not None and scene.port.log is not None:
+        _check_log(scene, scene.port.log, len(engines))
+
+
+def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
+    """Each drive writes a log of its own."""
+    drives = {"procedure": len(scene.procedures), "engine": engines}
+    for key, several in drives.items():
+        if several > 1 and f"{{{key}}}" not in log:
+            allowed = f"must have {{{key}}} in it: {several} of them are driven, and each writes a log of its own"
+            raise InputError(scene.file, "port.log", log, allowed)
+
+
+def check_reference(scene: BrakingScene, engines: tuple[str, ...]) -> None:
+    """Refuse an engine on its own where a study computes by the reference, and a log of its many drives."""
+    if engines and "reference" not in engines:
+        allowed = f"the study {scene.study!r} computes by the reference: leave it out"
+        raise InputError("--engine", "", engines[0], allowed)
+    if scene.port is not None and scene.port.log is not None:
+        allowed = f"the study {scene.study!r} drives many times: leave the log out"
+        raise InputError(scene.file, "port.log", scene.port.log, allowed)
+
+
+def findings(scene: BrakingScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle."""
+    if scene.vehicle.file is not None:
+        return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
+    return tuple(query for query in plausible_truck(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
+
+
+def describe(scene: BrakingScene) -> str:
+    """The scene's plan as text: vehicle, road, brakes, controller, procedure, effects and what is not computed.
+
+    Raises InputError for parts that cannot be.
+    """
+    _check_parts(scene, engines_of(scene, ())[:1])
+    vehicle, run = vehicle_of(scene), scene.run
+    axles = (vehicle.front.x, vehicle.rear.x)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    motion = "plane motion" if scene.vehicle.file is None else "suspension, roll and pitch"
+    name = scene.vehicle.file or scene.vehicle.parameters
+    lines += [
+        _line(
+            "vehicle",
+            f"{name}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
+            f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
+            "wheels turn",
+        )
+    ]
+    lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
+    lines += [_line("controller", f"{behind(scene)}, every {1e3 * run.sample:g} ms")]
+    for name, own in scene.procedures.items():
+        names = ", ".join(surfaces_of(scene, own))
+        lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
+    lines += [
+        _line(
+            "step",
+            f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels exact within it",
+        )
+    ]
+    return "\n".join([*lines, *effect_lines(scene)])
+
+
+def user_code(scene: BrakingScene) -> str:
+    """Code of the user's that a run of the scene executes, "" if there is none."""
+    named = [key for key in ("callable", "command", "fmu") if getattr(scene.port, key, None) is not None]
+    return f"{named[0]} {getattr(scene.port, named[0])}" if named else ""
+
+
+def behind(scene: BrakingScene) -> str:
+    """What answers at the port, or sets the pressures without being asked."""
+    if scene.measured is not None:
+        return f"measured pressures {scene.measured.file}"
+    named = [] if scene.port is None else [key for key in BEHIND if getattr(scene.port, key) is not None]
+    return f"{named[0]} {getattr(scene.port, named[0])}" if named else scene.controller.kind
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"

@@ -1,0 +1,283 @@
+"""Scenes of braking: a vehicle, the road under its tyres, brakes, a controller in the loop, and a test procedure."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.brake.controller import LARGEST_PRESSURE, SAMPLE
+from models.brake.port.setup import PortTable
+from models.brake.trailer import Trailer
+from models.core.errors import InputError
+from models.core.scene_effects import check, read_tables
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Query, Strict, accepted, quantity
+
+LARGEST_SPEED = 100.0
+"""m/s; no road vehicle brakes from more."""
+LARGEST_TORQUE = 1e6
+"""N m; no brake of one wheel gives more, by a factor of twenty."""
+LONGEST_STEP = 0.02
+"""s: up to which light braking and braking from rolling were held to their closed forms."""
+Procedures = Literal["straight", "split", "turn", "j_turn"]
+
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class VehicleTable(Strict):
+    """[vehicle]: mass, place of the axles, wheels."""
+
+    parameters: str = Field(default="paper", description="paper, or a TOML file with every parameter")
+    override: dict[str, Any] = Field(default_factory=dict, description="parameters that are changed")
+    file: str | None = Field(
+        default=None,
+        description="in their place a vehicle on its suspension: one that comes "
+        "with twinrig, as r19_free, or a TOML file of your own",
+    )
+    spin_inertia: float | None = quantity("kg m^2", "of a wheel about its axle, which that file lacks", default=None)
+    accept: list[Query] = accepted()
+
+
+class LoadTransfer(Strict):
+    """[load_transfer]: semi-static, from the accelerations of the body; not named, loads stay as they are at rest."""
+
+    front: float = Field(default=0.3, ge=0.0, le=1.0, description="share of the front axle in that of cornering")
+
+
+class Stretch(Strict):
+    """One of [[road.stretches]]: surfaces from x on."""
+
+    x: float = quantity("m", "where it begins; the first also holds before", default=0.0, signed=True)
+    left: str = Field(description="surface left of the line")
+    right: str | None = Field(default=None, description="surface right of it, if it is another one")
+
+
+class RoadTable(Strict):
+    """[road]: stretches along x, each with its surfaces left and right of a line."""
+
+    stretches: list[Stretch] = Field(default=[Stretch(left="ice")], min_length=1, description="along the road")
+    line: float = quantity("m", "y of the line between left and right", default=0.0, signed=True)
+
+
+class TyreTables(Strict):
+    """[tyres]: friction of the surfaces."""
+
+    scale: dict[str, float] = Field(default_factory=dict, description="factor on the friction of a surface")
+    files: dict[str, str] = Field(default_factory=dict, description="CSV or .tir file of the friction on a surface")
+    own_rear: bool = Field(default=False, description="rear tyres by their own figures, where a surface has them")
+
+
+class BrakeTable(Strict):
+    """[brakes.front], [brakes.rear]: torque by pressure, a straight line where no more is said."""
+
+    gradient: float = quantity("N m/bar", "of the torque while pressure rises")
+    push_out: float = quantity("bar", "pressure above which torque rises from none", default=0.0, zero=True)
+    release: float | None = quantity(
+        "bar", "pressure at which a falling torque ends; push_out if not said", default=None, zero=True
+    )
+    falling: float | None = quantity("N m/bar", "gradient while pressure falls; as rising if not said", default=None)
+
+
+class BrakesTable(Strict):
+    """[brakes]: of each axle, of all wheels of a trailer, and the pressure that the pedal lets through."""
+
+    front: BrakeTable = BrakeTable(gradient=1500.0)
+    rear: BrakeTable = BrakeTable(gradient=1200.0)
+    trailer: BrakeTable = BrakeTable(gradient=1200.0)
+    supply: float = quantity("bar", "pressure at the valves", default=6.0)
+
+
+class PressureTable(Strict):
+    """[pressure]: first-order chambers; not named, they follow their valves at once."""
+
+    fill: float = quantity("s", "time constant of filling", default=0.15)
+    empty: float = quantity("s", "time constant of emptying", default=0.1)
+    slow: float | None = quantity(
+        "s",
+        "time constant of filling by valves that can apply slowly, at least fill; not said, no valve can",
+        default=None,
+    )
+    delay: float = quantity("s", "of the valves", default=0.0, zero=True)
+    reservoir: float | None = quantity("l", "of the supply; not said, its pressure stays", default=None)
+    volume: float = quantity("l", "of one chamber, which the reservoir fills", default=1.5)
+
+
+class Relaxation(Strict):
+    """[relaxation]: slip angles lag; not named, tyres answer at once."""
+
+    front: float = quantity("m", "relaxation length across the front wheels")
+    rear: float = quantity("m", "relaxation length across all others")
+
+
+class ControllerTable(Strict):
+    """[controller]: what is in the loop; its parameters are checked by itself."""
+
+    kind: str = Field(default="none", description="none, or the name of a controller")
+    parameters: dict[str, Any] = Field(default_factory=dict, description="of the controller")
+    true_speed: bool = Field(default=True, description="the vehicle's speed is given to it")
+
+
+class Measured(Strict):
+    """[measured]: chamber pressures drive the vehicle open loop, in place of a controller."""
+
+    file: str = Field(description="CSV of them, and of wheel speeds if they were measured; {procedure} is its name")
+
+
+class Procedure(Strict):
+    """[procedures.NAME]: what the driver does. Left is positive."""
+
+    kind: Procedures = Field(default="straight", description="straight, split, turn or j_turn")
+    speed: float = quantity("m/s", "at which the brake is applied", default=11.11)
+    right: str | None = Field(default=None, description="surface right of the line on every stretch (split)")
+    steer: float | None = quantity("rad", "fixed angle of the front wheels (j_turn)", default=None, signed=True)
+    steering: list[Pair] | None = Field(
+        default=None,
+        min_length=1,
+        description="angle of the front wheels by time in place of steer, linear between: [[s, rad], ...] (j_turn)",
+    )
+    radius: float | None = quantity("m", "of the steady circle before braking (turn)", default=None, signed=True)
+
+
+class RunTable(Strict):
+    """[run]."""
+
+    sample: float = quantity("s", "time between two exchanges with the controller", default=SAMPLE)
+    substeps: int = Field(default=4, ge=1, le=1000, description="steps of the vehicle within a sample")
+    duration: float = quantity("s", "after which a run ends that does not stop", default=60.0)
+
+
+class BrakingScene(SceneFile):
+    """One scene of braking; tables that are effects are None where the scene does not name them."""
+
+    system: Literal["braking"] = "braking"
+    study: str = Field(default="braking", description="the study that runs the scene")
+    vehicle: VehicleTable = VehicleTable()
+    trailer: Trailer | None = Field(default=None, description="a drawbar trailer of two axles")
+    load_transfer: LoadTransfer | None = Field(default=None, description="semi-static load transfer")
+    road: RoadTable = RoadTable()
+    tyres: TyreTables = TyreTables()
+    relaxation: Relaxation | None = Field(default=None, description="lag of the slip angles")
+    brakes: BrakesTable = BrakesTable()
+    pressure: PressureTable | None = Field(default=None, description="dynamics of the chambers")
+    controller: ControllerTable = ControllerTable()
+    port: PortTable | None = Field(default=None, description="what stands behind the port, its signals and faults")
+    measured: Measured | None = Field(default=None, description="pressures that were measured, instead of a controller")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+    procedures: dict[str, Procedure] = Field(min_length=1, description="driven one by one, a table each")
+    run: RunTable = RunTable()
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(BrakingScene, table, file, folder)
+    for name, own in scene.procedures.items():
+        _check_procedure(own, scene.file, f"procedures.{name}")
+    _check_vehicle(scene)
+    _check_brakes(scene)
+    _check_run(scene)
+    check(scene)
+    return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
+
+
+READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("steer", "steering")}
+"""Keys that a procedure reads beside its speed; it needs one of them."""
+STEEPEST = 1.0
+"""rad; no wheel is steered further."""
+
+
+def _check_procedure(own: Procedure, file: str, place: str) -> None:
+    if own.speed > LARGEST_SPEED:
+        raise InputError(file, f"{place}.speed", own.speed, f"must be at most {LARGEST_SPEED:g} m/s")
+    read = READ[own.kind]
+    there = [key for key in ("right", "steer", "steering", "radius") if getattr(own, key) is not None]
+    for key in there:
+        if key not in read:
+            raise InputError(file, f"{place}.{key}", getattr(own, key), f"has no meaning for {own.kind}")
+    if read and not there:
+        raise InputError(file, f"{place}.{read[0]}", None, f"is missing: {own.kind} needs {' or '.join(read)}")
+    if len(there) > 1:
+        raise InputError(file, f"{place}.{there[1]}", None, f"has no meaning beside {there[0]}: leave one out")
+    if own.steer is not None and abs(own.steer) > STEEPEST:
+        raise InputError(file, f"{place}.steer", own.steer, f"must be at most {STEEPEST:g} rad, of either sign")
+    if own.steering is not None:
+        _check_steering(own.steering, file, f"{place}.steering")
+    if own.radius is not None and abs(own.radius) < 10.0:
+        raise InputError(file, f"{place}.radius", own.radius, "must be at least 10 m, of either sign")
+
+
+def _check_steering(knots: list[Pair], file: str, place: str) -> None:
+    times, angles = np.array(knots, float).T
+    if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
+        raise InputError(file, place, times.tolist(), "times must rise from knot to knot, from 0 on, in s")
+    if np.abs(angles).max() > STEEPEST:
+        raise InputError(file, place, angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign")
+
+
+def _check_brakes(scene: BrakingScene) -> None:
+    """Refuse a supply that no vehicle has, and torques that no brake gives."""
+    own, file = scene.brakes, scene.file
+    if own.supply > LARGEST_PRESSURE:
+        raise InputError(file, "brakes.supply", own.supply, f"must be at most {LARGEST_PRESSURE:g} bar")
+    for axle in ("front", "rear", "trailer"):
+        table: BrakeTable = getattr(own, axle)
+        for key, value in (("gradient", table.gradient), ("falling", table.falling or 0.0)):
+            if value * own.supply > LARGEST_TORQUE:
+                most = LARGEST_TORQUE / own.supply
+                raise InputError(
+                    file,
+                    f"brakes.{axle}.{key}",
+                    value,
+                    f"must be at most {most:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m",
+                )
+
+
+def _check_vehicle(scene: BrakingScene) -> None:
+    """A vehicle on its suspension has all that its file says."""
+    own, file = scene.vehicle, scene.file
+    if own.file is None:
+        if own.spin_inertia is not None:
+            raise InputError(file, "vehicle.spin_inertia", own.spin_inertia, "has no meaning without vehicle.file")
+        return
+    if own.spin_inertia is None:
+        raise InputError(file, "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it")
+    for place, named in (
+        ("vehicle.parameters", "parameters" in own.model_fields_set),
+        ("vehicle.override", bool(own.override)),
+    ):
+        if named:
+            raise InputError(file, place, None, "has no meaning beside vehicle.file, which says it all")
+
+
+def _check_run(scene: BrakingScene) -> None:
+    if not 1e-4 <= scene.run.sample <= 0.1:
+        raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
+    if scene.run.sample / scene.run.substeps > LONGEST_STEP * (1.0 + 1e-9):
+        least = math.ceil(scene.run.sample / LONGEST_STEP - 1e-9)
+        raise InputError(
+            scene.file,
+            "run.substeps",
+            scene.run.substeps,
+            f"must be at least {least}: steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents",
+        )
+    if scene.pressure is not None and scene.pressure.delay > 1.0:
+        raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
+    if scene.pressure is not None and scene.pressure.slow is not None and scene.pressure.slow < scene.pressure.fill:
+        raise InputError(
+            scene.file,
+            "pressure.slow",
+            scene.pressure.slow,
+            f"must be at least fill, {scene.pressure.fill:g} s: it is that of filling slowly",
+        )
+    if scene.run.duration < 2.0 * scene.run.sample:
+        raise InputError(
+            scene.file,
+            "run.duration",
+            scene.run.duration,
+            f"must be at least {2.0 * scene.run.sample:g} s, two samples",
+        )
+    if scene.run.duration > 1000.0:
+        raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")

@@ -1,0 +1,150 @@
+"""A stop in the paper's terms: distances, turning, decelerations, and of each wheel slips, locks and pressures.
+
+Source: the tables beside Figs 2 and 3 of G. Palmkvist and O. Nordstrom, A hybrid laboratory test method for anti-lock
+systems. Both decelerations are given that may be called mean: v0^2 / 2d and v0 / T differ by a few per cent.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
+from models.brake.plane_step import LOAD, LOCKED, SLIP
+from models.systems.braking.run import Path
+
+WHEELS = (
+    "front left",
+    "front right",
+    "rear left",
+    "rear right",
+    "trailer front left",
+    "trailer front right",
+    "trailer rear left",
+    "trailer rear right",
+)
+SLOWEST = 1.0
+"""m/s: slips and slip angles of a vehicle that hardly moves mean nothing, and are left out below this speed."""
+LIMITS = (0.2, 0.5)
+"""Slips of which it is told how much of the time they are exceeded: chosen, the paper's are not legible."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Quantities over time of a run: of the first unit's centre of mass, along and across its path.
+
+    times, speed, way, side_slip, across (n,): s, m/s, m, rad, m/s^2 to the left; lengths (n - 1,): of the samples (s).
+    """
+
+    path: Path
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of the samples (n,) in s."""
+        return self.path.times
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Of the samples (n - 1,) in s."""
+        return np.diff(self.path.times)
+
+    @property
+    def speed(self) -> np.ndarray:
+        """(n,) m/s."""
+        return np.hypot(self.path.states[:, 1, 0], self.path.states[:, 1, 1])
+
+    @property
+    def way(self) -> np.ndarray:
+        """Length (n,) of the path so far in m."""
+        steps = np.diff(self.path.states[:, 0, :2], axis=0)
+        return np.concatenate(([0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))))
+
+    @property
+    def side_slip(self) -> np.ndarray:
+        """Angle (n,) from the vehicle's x axis to its velocity in rad; 0 where it is slower than SLOWEST."""
+        course = np.arctan2(self.path.states[:, 1, 1], self.path.states[:, 1, 0])
+        angle = np.remainder(course - self.path.states[:, 0, 2] + np.pi, 2.0 * np.pi) - np.pi
+        return np.where(self.speed > SLOWEST, angle, 0.0)
+
+    @property
+    def across(self) -> np.ndarray:
+        """Mean acceleration (n - 1,) across the path in every sample, in m/s^2, to the left."""
+        before, after = self.path.states[:-1, 1, :2], self.path.states[1:, 1, :2]
+        size = np.maximum(self.speed[:-1], 1e-9)
+        change = (after - before) / np.maximum(self.lengths, 1e-12)[:, None]
+        return (before[:, 0] * change[:, 1] - before[:, 1] * change[:, 0]) / size
+
+    def of_vehicle(self) -> dict[str, float]:
+        """What the whole vehicle did, by name and unit."""
+        path, speed, way = self.path, self.speed, self.way
+        slip, lateral = int(np.argmax(np.abs(self.side_slip))), int(np.argmax(np.abs(self.across)))
+        time, distance = float(path.times[-1]), float(way[-1])
+        return {
+            "initial speed [m/s]": float(speed[0]),
+            "stopping distance [m]": distance,
+            "stopping time [s]": time,
+            "x [m]": float(path.states[-1, 0, 0] - path.states[0, 0, 0]),
+            "y [m]": float(path.states[-1, 0, 1] - path.states[0, 0, 1]),
+            "final yaw [deg]": float(np.degrees(path.states[-1, 0, 2] - path.states[0, 0, 2])),
+            "v0^2/2d [m/s^2]": equivalent_deceleration(float(speed[0]), distance) if path.stands else float("nan"),
+            "v0/T [m/s^2]": float(speed[0] - speed[-1]) / time,
+            "MFDD [m/s^2]": mean_fully_developed(path.times, way, speed),
+            "largest side slip [deg]": float(np.degrees(self.side_slip[slip])),
+            "largest side slip at [s]": float(path.times[slip]),
+            "largest lateral acceleration [m/s^2]": float(self.across[lateral]),
+            "largest lateral acceleration at [s]": float(path.times[lateral]),
+        } | self.of_body()
+
+    @property
+    def lean(self) -> np.ndarray | None:
+        """Roll to the right and pitch nose down (n, 2) in rad of a vehicle on its suspension, None of a plane one."""
+        places = [i for i, name in enumerate(self.path.coordinates) if name in ("sway rx", "sway ry")]
+        return self.path.states[:, 0, places] if places else None
+
+    def of_body(self) -> dict[str, float]:
+        """What the body on its suspension did, by name and unit; nothing of a plane one."""
+        if self.lean is None:
+            return {}
+        roll, pitch = np.degrees(self.lean).T
+        return {
+            "largest roll [deg]": float(roll[np.argmax(np.abs(roll))]),
+            "largest pitch [deg]": float(pitch[np.argmax(np.abs(pitch))]),
+            "least wheel load [N]": float(self.path.reports[:, :, LOAD].min()),
+        }
+
+    def of_wheels(self) -> dict[str, np.ndarray]:
+        """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""
+        path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
+        lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
+        pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
+        found = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
+        found |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
+        locks = self.locks()
+        return found | {
+            "locked above 15 km/h [s]": locks.time,
+            "longest lock [s]": locks.longest,
+            "mean pressure [bar]": lengths @ pressures / whole,
+            "final pressure [bar]": path.pressures[-1],
+        }
+
+    def in_turn(self, radius: float, time: float = 1.0) -> dict[str, float]:
+        """What it did ``time`` (s) after the brake was applied on a circle (m, positive to the left), by name and unit.
+
+        Source: ISO 14794 (heavy vehicles), ISO 7975 (cars); not checked against the text of the standard.
+        """
+        speed, yaw_rate, slip = (
+            float(np.interp(time, self.times, values))
+            for values in (self.speed, self.path.states[:, 1, 2], self.side_slip)
+        )
+        place = [np.interp(time, self.times, self.path.states[:, 0, i]) for i in range(2)]
+        vx, vy = self.path.states[0, 1, :2] / self.speed[0]
+        centre = self.path.states[0, 0, :2] + radius * np.array([-vy, vx])
+        return {
+            "yaw rate by that of the circle": yaw_ratio(yaw_rate, speed, radius),
+            "mean deceleration [m/s^2]": float(self.speed[0] - speed) / time,
+            "outside of the circle [m]": float(np.hypot(*(place - centre)) - abs(radius)),
+            "side slip [deg]": float(np.degrees(slip)),
+        }
+
+    def locks(self) -> Locks:
+        """Locks of the wheels above 15 km/h."""
+        return lock_table(self.lengths, self.path.reports[:, :, LOCKED] > 0.0, self.speed[:-1])

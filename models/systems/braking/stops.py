@@ -1,0 +1,111 @@
+"""Many stops of one scene whose initial speeds scatter: anti-lock braking on ice does not repeat run by run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from models.core.errors import RunFailed
+from models.core.noise import SPEED, normal
+from models.ensemble.runner import PathFailed
+from models.systems.braking.procedures import drive
+from models.systems.braking.scene import BrakingScene, build
+from models.systems.braking.stop_report import Stop
+
+KEPT = {
+    "stopping distance [m]": "distance",
+    "stopping time [s]": "time",
+    "v0/T [m/s^2]": "deceleration",
+    "y [m]": "aside",
+    "final yaw [deg]": "yaw",
+}
+"""Quantities of every stop, and their names in the arrays."""
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Job of an ensemble: path i brakes from speed (1 + spread e_i), e_i standard normal and the same for every job of
+    one seed. ``table`` is the scene's."""
+
+    table: Mapping[str, Any]
+    file: str
+    folder: str
+    procedure: str
+    spread: float
+    seed: int
+
+    def __call__(self, paths: range) -> dict[str, np.ndarray]:
+        """Named arrays (len(paths),) of ``KEPT`` and of the initial speed (m/s)."""
+        scene = build(self.table, self.file, Path(self.folder))
+        rows = [self._one(scene, path) for path in paths]
+        return {name: np.array([row[key] for row in rows]) for key, name in KEPT.items()} | {
+            "speed": np.array([row["initial speed [m/s]"] for row in rows])
+        }
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that the result depends on."""
+        return {
+            "scene": str(sorted(self.table.items())),
+            "procedure": self.procedure,
+            "spread": self.spread,
+            "seed": self.seed,
+        }
+
+    def _one(self, scene: BrakingScene, path: int) -> dict[str, float]:
+        own = scene.procedures[self.procedure]
+        drawn = float(normal(self.seed, path, 1, 1, source=SPEED)[0, 0])
+        changed = own.model_copy(update={"speed": own.speed * (1.0 + self.spread * drawn)})
+        scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
+        try:
+            run = drive(scene, self.procedure)
+        except RunFailed as error:
+            raise PathFailed(path, str(error)) from None
+        if not run.stands:
+            raise PathFailed(path, f"does not stand after {scene.run.duration:g} s")
+        return Stop(run).of_vehicle()
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Mean with its standard error, and standard deviation of n values."""
+
+    count: int
+    mean: float
+    deviation: float
+
+    @property
+    def error(self) -> float:
+        """Standard error of the mean."""
+        return self.deviation / sqrt(self.count)
+
+
+def scatter(values: np.ndarray) -> Scatter:
+    """Of values (n,), n at least 2."""
+    return Scatter(values.size, float(values.mean()), float(values.std(ddof=1)))
+
+
+@dataclass(frozen=True)
+class Welch:
+    """Difference of two means (second less first) with its 95 % interval, t, degrees of freedom, two-sided p."""
+
+    difference: float
+    half_width: float
+    t: float
+    freedoms: float
+    p: float
+
+
+def welch(first: Scatter, second: Scatter) -> Welch:
+    """Welch's test of two means whose variances may differ; B. L. Welch, Biometrika 34 (1947)."""
+    a, b = first.error**2, second.error**2
+    gap, error = second.mean - first.mean, sqrt(a + b)
+    if error == 0.0:
+        return Welch(gap, 0.0, 0.0 if gap == 0.0 else np.copysign(np.inf, gap), np.inf, float(gap == 0.0))
+    freedoms = (a + b) ** 2 / (a**2 / (first.count - 1) + b**2 / (second.count - 1))
+    t = gap / error
+    half, p = student.ppf(0.975, freedoms) * error, 2.0 * student.sf(abs(t), freedoms)
+    return Welch(gap, float(half), t, freedoms, float(p))

@@ -1,0 +1,3 @@
+"""One rolling contact, or a table of them."""
+
+ENGINES: tuple[str, ...] = ()

@@ -1,0 +1,84 @@
+"""What a contact scene will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.contact.material import Material
+from models.core.finding import Finding
+from models.core.scene_effects import lines as effect_lines
+from models.systems.contact.scene import ContactScene
+
+THEORIES = {
+    "linear": "Kalker's linear theory: no slip, exact for small creepage",
+    "fastsim": "Kalker's simplified theory on an ellipse (1982)",
+    "simplified": "Kalker's simplified theory for an undeformed distance (1983)",
+    "exact": "half-spaces with Coulomb friction, the theory that the others approximate",
+}
+
+SMALL = 0.3
+"""Of a body's radius, that the semi-axis of the contact may be: half-spaces stand for bodies that are much larger."""
+
+
+def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
+    """Refuse, before any file is written, what reading alone does not find: materials that are too unlike."""
+    _ = scene.pair.G
+
+
+def findings(scene: ContactScene) -> tuple[Finding, ...]:
+    """A doubt about every radius that is not large beside the contact."""
+    if scene.radii is None or scene.contact is None:
+        return ()
+    from models.systems.contact.of_scene import hertz_of
+
+    area = hertz_of(scene)
+    out = list[Finding]()
+    for name, radius in scene.radii:
+        axis = float(area.a if name.endswith("x") else area.b)
+        if radius is not None and axis > SMALL * abs(radius):
+            text = (
+                f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory "
+                f"needs radii of at least {axis / SMALL:.3g} m. Radii are in m, loads in N."
+            )
+            out.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
+    return tuple(out)
+
+
+def describe(scene: ContactScene) -> str:
+    """The scene's plan as text: bodies, geometry, contact, creepage and theory."""
+    wheel, rail = scene.bodies.wheel, scene.bodies.rail
+    lines = [
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
+        _line("wheel", _material(wheel)),
+        _line("rail", _material(rail)),
+    ]
+    lines.append(_line(scene.geometry, _values(getattr(scene, scene.geometry))))
+    if scene.contact is not None:
+        lines.append(_line("contact", _values(scene.contact)))
+    if scene.falling_friction is not None:
+        law = "by the speed of slip s: floor + (1 - floor) exp(-decay s) of it is left"
+        lines.append(_line("friction", f"{law}; {_values(scene.falling_friction)}"))
+    if scene.contact is not None:
+        lines.append(_line("creepage", _values(scene.creepage)))
+    if scene.sweep is not None:
+        lines.append(_line("sweep", _values(scene.sweep)))
+    method = _values(scene.method, {"name", *scene.method.unread()})
+    theory = _line("theory", THEORIES[scene.method.name] + (f"; {method}" if method else ""))
+    return "\n".join([*lines, theory, *effect_lines(scene)])
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _material(body: Material) -> str:
+    return f"E = {body.E / 1e9:g} GPa, nu = {body.nu:g}, G = {body.G / 1e9:.4g} GPa"
+
+
+def _values(table: object, left_out: frozenset[str] | set[str] = frozenset()) -> str:
+    """Keys, values and units of a table, without what is not given."""
+    model = type(table)
+    parts = []
+    for name, value in table:  # type: ignore[attr-defined]
+        extra = model.model_fields[name].json_schema_extra  # type: ignore[attr-defined]
+        unit = f" {extra['unit']}".rstrip() if isinstance(extra, dict) else ""
+        if value is not None and name not in left_out:
+            parts.append(f"{name} = {value:g}{unit}" if isinstance(value, float) else f"{name} = {value}")
+    return ", ".join(parts)

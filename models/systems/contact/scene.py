@@ -1,0 +1,309 @@
+"""Scenes of rolling contact: two bodies, where they touch, how they roll, and by which theory they are computed."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.contact.falling_friction import Falling
+from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
+from models.contact.material import STEEL, Material, Pair
+from models.core.errors import InputError
+from models.core.scene_effects import check, with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Strict, quantity
+
+GEOMETRIES = ("ellipse", "curvatures", "radii", "profiles", "cases")
+"""Tables that say where the bodies touch; a scene has one of them."""
+
+
+class Bodies(Strict):
+    """[bodies]: elastic constants, steel where nothing else is said."""
+
+    wheel: Material = Field(default=STEEL, description="E in Pa and nu of body 1")
+    rail: Material = Field(default=STEEL, description="E in Pa and nu of body 2")
+
+
+class Ellipse(Strict):
+    """[ellipse]: the contact area itself."""
+
+    a: float = quantity("m", "semi-axis along x, the direction of rolling")
+    b: float = quantity("m", "semi-axis along y")
+
+
+class Curvatures(Strict):
+    """[curvatures]: undeformed distance A x^2 + B y^2."""
+
+    A: float = quantity("1/m", "curvature along x, half the sum of both bodies' curvatures")
+    B: float = quantity("1/m", "curvature along y, half the sum of both bodies' curvatures")
+
+
+class Radii(Strict):
+    """[radii]: of both bodies, positive where convex; a radius that is left out is a flat direction."""
+
+    wheel_x: float | None = quantity("m", "rolling radius of the wheel", default=None, signed=True)
+    wheel_y: float | None = quantity("m", "radius of the wheel's profile", default=None, signed=True)
+    rail_x: float | None = quantity("m", "radius of the rail along x", default=None, signed=True)
+    rail_y: float | None = quantity("m", "radius of the rail's profile", default=None, signed=True)
+
+    def curvatures(self, file: str) -> tuple[float, float]:
+        """A and B (1/m); raises InputError for a radius of zero or bodies that do not touch on an ellipse."""
+        for name, radius in self:
+            if radius == 0:
+                raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
+        found = []
+        for axis in ("x", "y"):
+            value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
+            if value <= 0:
+                raise InputError(
+                    file,
+                    f"radii.wheel_{axis}, rail_{axis}",
+                    None,
+                    f"are flat or conform along {axis}: "
+                    f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0",
+                )
+            found.append(value)
+        return found[0], found[1]
+
+
+class Profiles(Strict):
+    """[profiles]: cross-sections of wheel and rail, and how they stand to each other."""
+
+    wheel: str = Field(default="S1002", description="S1002, or a file of a profile")
+    rail: str = Field(default="UIC60", description="UIC60, or a file of a profile")
+    inclination: float = quantity("rad", "of the rail towards the track's centre", default=0.025, signed=True)
+    lateral_shift: float = quantity("m", "of the wheel towards the rail's gauge corner", default=0.0, signed=True)
+    yaw: float = quantity("rad", "of the wheelset", default=0.0, signed=True)
+    radius: float = quantity("m", "of the wheel at its taping line", default=0.46)
+    back_to_back: float = quantity("m", "between the backs of the wheels' flanges", default=1.360)
+    gauge: float = quantity("m", "of the track", default=1.435)
+    gauge_depth: float = quantity("m", "below the rails' tops where the gauge is measured", default=0.014)
+    smoothing: float = quantity("m", "wavelength of which half is left in profiles from files", default=0.0, zero=True)
+
+
+class Cases(Strict):
+    """[cases]: a table with a contact, its load, friction and creepages in every row."""
+
+    file: str = Field(description="CSV file, beside the scene or in the folder in which the command runs")
+
+
+class Contact(Strict):
+    """[contact]: how hard the bodies press, and what friction there is."""
+
+    load: float | None = quantity("N", "normal load, on profiles the vertical one", default=None)
+    approach: float | None = quantity("m", "approach of the bodies instead of a load", default=None)
+    friction: float = quantity("", "coefficient of friction")
+
+
+class Creepage(Strict):
+    """[creepage]: velocity of the wheel relative to the rail by the rolling speed."""
+
+    xi_x: float = quantity("", "longitudinal creepage", default=0.0, signed=True)
+    xi_y: float = quantity("", "lateral creepage", default=0.0, signed=True)
+    spin: float = quantity("1/m", "spin by the rolling speed", default=0.0, signed=True)
+
+
+class Sweep(Strict):
+    """[sweep]: one creepage through a range, the others as [creepage] has them."""
+
+    of: Literal["xi_x", "xi_y", "spin"] = Field(description="the creepage that is swept")
+    start: float = quantity("1 or 1/m", "first value", signed=True)
+    stop: float = quantity("1 or 1/m", "last value", signed=True)
+    count: int = Field(default=25, ge=2, le=10_000, description="number of values")
+    spacing: Literal["linear", "logarithmic"] = Field(default="linear", description="of the values")
+
+    def values(self) -> np.ndarray:
+        """All values, from start to stop."""
+        spaced = np.linspace if self.spacing == "linear" else np.geomspace
+        return spaced(self.start, self.stop, self.count)
+
+
+class Method(Strict):
+    """[method]: the theory, and how finely it is evaluated. Cells are counted along each axis of the contact."""
+
+    name: Literal["fastsim", "simplified", "exact", "linear"] = Field(default="fastsim", description="theory")
+    cells: int = Field(default=21, ge=5, le=400, description="cells along each axis")
+    march: Literal["second-order", "plain"] = Field(default="second-order", description="of FASTSIM")
+    bound: Literal["intermediate", "parabolic", "elliptic"] = Field(default="intermediate", description="of tractions")
+    flexibilities: Literal["blended", "one", "three"] = Field(default="blended", description="of FASTSIM")
+
+    @property
+    def order(self) -> float:
+        """Power of the size of a cell with which the error of the forces falls."""
+        return 2.0 if self.name == "fastsim" and self.march == "second-order" and self.bound != "elliptic" else 1.0
+
+    @property
+    def band(self) -> str:
+        """Name of the theory's band of error in ``models.contact.accuracy``."""
+        return f"{self.flexibilities} {self.bound}" if self.name == "fastsim" else self.name
+
+    def unread(self) -> frozenset[str]:
+        """Keys that have no meaning for this theory."""
+        fastsim = {"march", "bound", "flexibilities"}
+        return frozenset({"fastsim": set(), "linear": {"cells", *fastsim}}.get(self.name, fastsim))
+
+
+class ContactScene(SceneFile):
+    """One scene of rolling contact. Exactly one of the tables ``GEOMETRIES`` is there."""
+
+    system: Literal["contact"] = "contact"
+    study: str = Field(default="contact", description="the study that runs the scene")
+    bodies: Bodies = Bodies()
+    ellipse: Ellipse | None = Field(default=None, description="semi-axes of the contact area")
+    curvatures: Curvatures | None = Field(default=None, description="of the undeformed distance")
+    radii: Radii | None = Field(default=None, description="of both bodies")
+    profiles: Profiles | None = Field(default=None, description="cross-sections of wheel and rail")
+    cases: Cases | None = Field(default=None, description="a contact in every row of a file")
+    contact: Contact | None = Field(default=None, description="table with load or approach, and friction")
+    falling_friction: Falling | None = Field(default=None, description="friction that falls with the speed of slip")
+    creepage: Creepage = Creepage()
+    sweep: Sweep | None = Field(default=None, description="one creepage through a range")
+    method: Method = Method()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    @property
+    def geometry(self) -> str:
+        """Name of the one table that says where the bodies touch."""
+        return next(name for name in GEOMETRIES if getattr(self, name) is not None)
+
+    def cases_file(self) -> Path:
+        """The file of cases."""
+        assert self.cases is not None
+        return self.path(self.cases.file, "cases.file")
+
+    @property
+    def pair(self) -> Pair:
+        """Both materials."""
+        return Pair(self.bodies.wheel, self.bodies.rail)
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(ContactScene, table, file, folder)
+    _check_geometry(scene)
+    _check_size(scene)
+    _check_sweep(scene)
+    _check_method(scene)
+    check(found := with_own(scene))
+    _check_friction(scene)
+    return found
+
+
+def _check_geometry(scene: ContactScene) -> None:
+    given = [name for name in GEOMETRIES if getattr(scene, name) is not None]
+    if len(given) != 1:
+        found = f"found {', '.join(given)}" if given else "found none"
+        allowed = f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; {found}"
+        raise InputError(scene.file, "", None, allowed)
+    if scene.radii is not None:
+        scene.radii.curvatures(scene.file)
+    if scene.profiles is not None:
+        _check_profiles(scene.profiles, scene.file)
+    _check_contact(scene)
+
+
+def _check_profiles(profiles: Profiles, file: str) -> None:
+    """A turned or mirrored rail, and a wheel in mm, are told as what they are."""
+    for key, least, most in (
+        ("inclination", -0.5, 0.5),
+        ("radius", 0.02, 5.0),
+        ("gauge", 0.1, 3.0),
+        ("back_to_back", 0.1, 3.0),
+        ("gauge_depth", 0.0, 0.1),
+    ):
+        value = getattr(profiles, key)
+        if not least <= value <= most:
+            unit = "rad" if key == "inclination" else "m"
+            raise InputError(file, f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}")
+    if profiles.smoothing and "." not in profiles.wheel + profiles.rail:
+        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+
+
+OF_CASES = ("contact", "creepage", "sweep")
+"""Tables whose content every row of a table of cases has itself."""
+
+
+LARGEST = {
+    "contact.load": LARGEST_LOAD,
+    "contact.approach": LARGEST_APPROACH,
+    "contact.friction": 10.0,
+    "creepage.xi_x": LARGEST_CREEPAGE,
+    "creepage.xi_y": LARGEST_CREEPAGE,
+    "creepage.spin": LARGEST_SPIN,
+}
+"""What the theories take, of either sign."""
+
+
+def _check_size(scene: ContactScene) -> None:
+    """The theories refuse what is larger, but know neither the file nor the key."""
+    for place, most in LARGEST.items():
+        table, key = place.split(".")
+        found = {place: getattr(getattr(scene, table), key, None)}
+        if scene.sweep is not None and scene.sweep.of == key:
+            found = {f"sweep.{end}": getattr(scene.sweep, end) for end in ("start", "stop")}
+        for where, value in found.items():
+            if value is not None and abs(value) > most:
+                unit = {"load": " N", "approach": " m", "spin": " 1/m"}.get(key, "")
+                raise InputError(scene.file, where, value, f"must be at most {most:g}{unit}, of either sign")
+
+
+def _check_contact(scene: ContactScene) -> None:
+    given = sorted(scene.model_fields_set & {*OF_CASES})
+    if scene.cases is not None:
+        if given:
+            raise InputError(scene.file, given[0], None, "is in the file of cases: drop this table")
+        return
+    if scene.contact is None:
+        raise InputError(scene.file, "contact", None, "is missing: a table with load or approach, and friction")
+    if (scene.contact.load is None) == (scene.contact.approach is None):
+        allowed = "give either the load in N or contact.approach in m"
+        raise InputError(scene.file, "contact.load", scene.contact.load, allowed)
+
+
+def _check_sweep(scene: ContactScene) -> None:
+    sweep = scene.sweep
+    if sweep is None:
+        return
+    if sweep.start == sweep.stop:
+        raise InputError(scene.file, "sweep.stop", sweep.stop, "must differ from sweep.start")
+    if sweep.spacing == "logarithmic" and sweep.start * sweep.stop <= 0:
+        allowed = "start and stop must then both be above 0, or both below"
+        raise InputError(scene.file, "sweep.spacing", sweep.spacing, allowed)
+    if sweep.of in scene.creepage.model_fields_set:
+        value = getattr(scene.creepage, sweep.of)
+        raise InputError(
+            scene.file,
+            f"creepage.{sweep.of}",
+            value,
+            "is swept: drop this key; on the command line give the whole table, as in --set creepage={xi_x=1e-3}",
+        )
+
+
+ON_PROFILES = ("simplified", "exact")
+"""Theories that need no ellipse."""
+
+
+def _check_method(scene: ContactScene) -> None:
+    """No key that the theory would not read, and no theory that the geometry does not fit."""
+    method = scene.method
+    for key in sorted(method.model_fields_set & method.unread()):
+        raise InputError(scene.file, f"method.{key}", getattr(method, key), f"has no meaning for {method.name}")
+    if scene.cases is not None and method.name != "fastsim":
+        raise InputError(scene.file, "method.name", method.name, "a table of cases is computed by fastsim")
+    if scene.profiles is not None and method.name not in ON_PROFILES:
+        raise InputError(
+            scene.file, "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
+        )
+
+
+def _check_friction(scene: ContactScene) -> None:
+    """Friction falls in FASTSIM marched to second order, and not in a table of cases."""
+    method = scene.method
+    if scene.falling_friction is None:
+        return
+    if scene.cases is not None:
+        raise InputError(scene.file, "falling_friction", None, "a table of cases has constant friction")
+    if method.march != "second-order":
+        raise InputError(scene.file, "method.march", method.march, "must be second-order where friction falls")

@@ -1,0 +1,254 @@
+"""What accuracy costs in rolling contact: every theory on many contacts, its error beside its time and its cells.
+
+The contacts are an ellipse each, rolled in nine ways and by sizes of creepage from a twentieth to ten times what the
+linear theory takes to reach mu N.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from models.contact.fastsim import Ellipse
+from models.contact.hertz import by_axes
+from models.contact.linear_theory import coefficients
+from models.contact.material import Pair
+from models.contact.theories import Contact, ExactOnEllipse, Linear, Motion, Simplified
+from models.core.errors import RunFailed
+from models.machine.seconds import cost
+from models.systems.contact.of_scene import interpenetrating
+
+Parts = tuple[float, float, float]
+KINDS: dict[str, Parts] = {
+    "x": (1, 0, 0),
+    "y": (0, 1, 0),
+    "spin": (0, 0, 1),
+    "x+y": (1, 1, 0),
+    "x+spin": (1, 0, 1),
+    "y+spin": (0, 1, 1),
+    "y-spin": (0, 1, -1),
+    "x+y+spin": (1, 1, 1),
+    "x-y+spin": (1, -1, 1),
+}
+"""Parts of the three creepages, each in units of its linear scale."""
+FINEST, ENOUGH = (40, 80), 0.005
+"""Cells along each axis of the exact theory, halved once for the forces and twice for their error; the finer grid is
+taken where that error, by mu N, is larger."""
+Roll = Callable[[Motion], Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One contact of semi-axes a and b (m). fx, fy by mu N; mz by mu N sqrt(ab); error: of the exact grid, by mu N.
+
+    parts : of xi_x, xi_y and spin, each in units of its linear scale; only their ratios count. level : their size.
+    """
+
+    a: float
+    b: float
+    load: float
+    friction: float
+    pair: Pair
+    kind: str
+    parts: Parts
+    level: float
+    fx: float = np.nan
+    fy: float = np.nan
+    mz: float = np.nan
+    error: float = np.nan
+
+    @property
+    def limit(self) -> float:
+        """mu N (N)."""
+        return self.friction * self.load
+
+    @property
+    def motion(self) -> Motion:
+        """xi_x, xi_y and spin (1/m): ``level`` 1 is where a single creepage reaches mu N by the linear theory."""
+        c, size = coefficients(self.a / self.b, self.pair.nu), np.sqrt(self.a * self.b)
+        parts = np.array(self.parts)
+        unit = self.limit / (self.pair.G * size**2) * np.array([1 / c.c11, 1 / c.c22, 1 / (size * c.c23)])
+        return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
+
+    @property
+    def force(self) -> np.ndarray:
+        """Exact force by mu N, (2,)."""
+        return np.array([self.fx, self.fy])
+
+    def contact(self, theory: type[ExactOnEllipse] | type[Linear]) -> Contact:
+        """The contact by a theory of the ellipse."""
+        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair)
+
+
+def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
+    """The case with its forces: the error of the grid is taken out, and what is left of it stated.
+
+    Raises RunFailed where the exact theory is not solved even on the coarsest grids.
+    """
+    contact = case.contact(ExactOnEllipse)
+    scale = case.limit * np.array([1.0, 1.0, np.sqrt(case.a * case.b)])
+    found, error = np.full(3, np.nan), np.inf
+    for fine in finest:
+        try:
+            rolled = [contact.roll(case.motion, cells) for cells in (fine // 4, fine // 2, fine)]
+        except RunFailed:
+            if fine == finest[0]:
+                raise
+            break
+        found, error = without_grid([np.array([one.fx, one.fy, one.mz]) / scale for one in rolled])
+        if error < ENOUGH:
+            break
+    return replace(case, fx=float(found[0]), fy=float(found[1]), mz=float(found[2]), error=error)
+
+
+def without_grid(grids: list[np.ndarray]) -> tuple[np.ndarray, float]:
+    """Answers (fx, fy, mz) of three grids, each with cells half as long, led on to none, and the error of fx and fy.
+
+    The error of the cells is of first order where much sticks and of second where all slips: taken is the order by
+    which the two coarser grids foretell the same as the two finer ones, and the difference is the error.
+    """
+    coarse, middle, fine = grids
+    told = [(fine + (fine - middle) / part, middle + (middle - coarse) / part) for part in (1.0, 3.0)]
+    found, before = min(told, key=lambda two: float(np.hypot(*(two[0] - two[1])[:2])))
+    return found, float(np.hypot(*(found - before)[:2]))
+
+
+@dataclass(frozen=True)
+class Way:
+    """A theory with its choices: ``rolled(case, cells)`` gives a function of the motion, all else computed before."""
+
+    name: str
+    cells: tuple[int, ...]
+    rolled: Callable[[Case, int], Roll]
+
+
+def _fastsim(**choices: Any) -> Callable[[Case, int], Roll]:
+    def rolled(case: Case, cells: int) -> Roll:
+        ellipse = Ellipse(case.a / case.b, case.pair, cells=cells, **choices)
+        return lambda motion: ellipse(case.a, case.load, case.friction, *motion)
+
+    return rolled
+
+
+def _simplified(case: Case, cells: int) -> Roll:
+    pressed = interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair)
+    contact = Simplified(pressed, case.friction)
+    return lambda motion: contact.roll(motion, cells)
+
+
+def _of(theory: type[ExactOnEllipse] | type[Linear]) -> Callable[[Case, int], Roll]:
+    def rolled(case: Case, cells: int) -> Roll:
+        contact = case.contact(theory)
+        return lambda motion: contact.roll(motion, cells)
+
+    return rolled
+
+
+FAST, FINE, NET, GRID = (7, 11, 15, 21, 41), (7, 11, 21, 41, 81), (11, 21, 45), (10, 20, 40)
+"""Cells along each axis: of the second-order march, of the plain one, of the theory of 1983, of the exact theory."""
+WAYS = (
+    Way("linear theory", (1,), _of(Linear)),
+    Way("FASTSIM 1982", FINE, _fastsim(march="plain", flexibilities="one", bound="parabolic")),
+    Way("FASTSIM, plain march", FINE, _fastsim(march="plain")),
+    Way("FASTSIM", FAST, _fastsim()),
+    Way("FASTSIM, three flexibilities", FAST, _fastsim(flexibilities="three")),
+    Way("FASTSIM, parabolic", FAST, _fastsim(bound="parabolic")),
+    Way("theory of 1983", NET, _simplified),
+    Way("exact theory", GRID, _of(ExactOnEllipse)),
+)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way on one number of cells. errors : (cases,) by mu N. seconds : of one evaluation, median over the cases;
+    range : the least and the most of them."""
+
+    name: str
+    cells: int
+    errors: tuple[float, ...]
+    seconds: float
+    range: tuple[float, float]
+
+    @property
+    def mean(self) -> float:
+        """Mean error by mu N."""
+        return float(np.mean(self.errors))
+
+    @property
+    def most(self) -> float:
+        """Error by mu N that 95 of 100 cases keep to."""
+        return float(np.quantile(self.errors, 0.95))
+
+
+def measure(way: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
+    """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
+    errors, seconds = [], []
+    for case in cases:
+        roll, motion = way.rolled(case, cells), case.motion
+        found = _timed(roll, motion, repeats)
+        force = np.array(found[0][:2]) if isinstance(found[0], tuple) else found[0].force
+        errors.append(float(np.linalg.norm(force / case.limit - case.force)))
+        seconds.append(found[1])
+    return Point(way.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
+
+
+LEAST = 2e-5
+"""Seconds that a timing lasts at least."""
+
+
+def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
+    start = time.perf_counter()
+    found = roll(motion)
+    count = max(1, int(LEAST / max(time.perf_counter() - start, 1e-7)))
+    taken = []
+    for _ in range(repeats if count > 1 else 1):
+        start = time.perf_counter()
+        for _ in range(count):
+            found = roll(motion)
+        taken.append((time.perf_counter() - start) / count)
+    return found, float(np.median(taken))
+
+
+def cheapest(points: list[Point], target: float, error: Callable[[Point], float]) -> Point | None:
+    """The fastest of all whose error is at most ``target``; None if there is none."""
+    meets = [one for one in points if error(one) <= target]
+    return min(meets, key=lambda one: one.seconds, default=None)
+
+
+def ellipse_cases(
+    a: float,
+    b: float,
+    load: float,
+    friction: float,
+    pair: Pair,
+    levels: tuple[float, ...],
+    kinds: dict[str, Parts] = KINDS,
+) -> list[Case]:
+    """All kinds and levels on one ellipse, without their forces."""
+    return [
+        Case(a, b, load, friction, pair, kind, parts, level) for (kind, parts), level in product(kinds.items(), levels)
+    ]
+
+
+TARGETS = (0.05, 0.02, 0.01, 0.005)
+"""Errors by mu N that are asked for."""
+
+
+def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
+    """For every target: the cheapest that meets it in the mean, and the one that does in 95 of 100 cases."""
+    return [
+        (
+            f"{100 * target:g} %",
+            *(_told(cheapest(points, target, error), error) for error in (lambda one: one.mean, lambda one: one.most)),
+        )
+        for target in TARGETS
+    ]
+
+
+def _told(one: Point | None, error: Callable[[Point], float]) -> str:
+    if one is None:
+        return "none"
+    return f"{one.name}, {one.cells} cells: {cost((one.seconds, *one.range))} ({100 * error(one):.2g} %)"

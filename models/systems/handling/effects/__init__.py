@@ -1,0 +1,49 @@
+"""Effects of scenes of handling: see ``models.core.scene_effects``.
+
+Counts are those of all manoeuvres: waves of the road, wheels that lean, controls that act, pushes from outside.
+"""
+
+from typing import Any
+
+from models.core.scene_effects import Entry
+
+
+def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual: Any) -> Entry:
+    """An effect that a key of the manoeuvres names: left out of all of them, put into all of them."""
+
+    def there(scene: Any) -> bool:
+        values = [getattr(own, key) for own in scene.manoeuvres.values()]
+        return any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
+
+    def leave_out(table: dict[str, Any], scene: Any) -> None:
+        for own in table["manoeuvres"].values():
+            own.pop(key, None)
+
+    def put_in(table: dict[str, Any], scene: Any) -> None:
+        for own in table["manoeuvres"].values():
+            own[key] = usual
+
+    place = f"manoeuvres.NAME.{key}"
+    return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in)
+
+
+LOOK = "a look into a table of times per call"
+TABLE = {
+    "braking": _of_manoeuvres("brake", "Torque of the brakes", LOOK, {"controls": 1}, [[1.0, 0.0], [1.2, 1000.0]]),
+    "driving": _of_manoeuvres(
+        "drive", "Torque of the driven wheels", LOOK, {"controls": 1}, [[1.0, 0.0], [1.2, 300.0]]
+    ),
+    "steering": _of_manoeuvres(
+        "steer", "Front wheels that the driver turns", LOOK, {"controls": 1}, [[0.5, 0.0], [0.8, 0.02]]
+    ),
+    "rough_road": _of_manoeuvres(
+        "rough", "A rough road under all tyres, of plane waves", "a cosine per wave, tyre and call", {"waves": 48}, True
+    ),
+    "inclined_wheels": Entry(
+        "Wheels that lean, left and right ones mirrored",
+        "tyres.inclination",
+        "nothing: the same forces at an angle, with spin",
+        {"leaning wheels": 4},
+        usual=0.02,
+    ),
+}

@@ -1,0 +1,53 @@
+"""What a scene of handling will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.core.finding import Finding
+from models.core.scene_effects import lines as effect_lines
+from models.systems.handling.scene import HandlingScene
+from models.vehicles.plausible import plausible
+
+
+def check(scene: HandlingScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    for name in scene.manoeuvres:
+        scene.handling(name)
+
+
+def findings(scene: HandlingScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle."""
+    return plausible(scene.handling(next(iter(scene.manoeuvres))).given, scene.vehicle.accept)
+
+
+def describe(scene: HandlingScene) -> str:
+    """The scene's plan as text."""
+    first = scene.handling(next(iter(scene.manoeuvres)))
+    own, free = scene.tyres, first.vehicle
+    loads = ", ".join(f"{name} {load:.0f} N" for name, load in first.held.tyres.items())
+    mass = sum(body.mass for body in free.bodies)
+    lines = [
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
+        _line(
+            "vehicle",
+            f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
+        ),
+        _line("tyres", f"brushes of {own.cells} cells per strip, mu = {own.friction:g}; static loads {loads}"),
+        _line(
+            "road",
+            f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
+            "rough, else flat",
+        ),
+        *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
+        _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
+    ]
+    never = "compliance of the carcass, roll and pitch of wheels, steering system"
+    return "\n".join([*lines, *effect_lines(scene, 18), _line("never", never)])
+
+
+def _manoeuvre(scene: HandlingScene, name: str) -> str:
+    own = scene.manoeuvres[name]
+    acts = [control for control in ("steer", "brake", "drive") if any(value for _, value in getattr(own, control))]
+    return f"{own.speed:g} m/s, {own.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<18} {text}"

@@ -1,0 +1,156 @@
+"""Scenes of handling: a vehicle, its tyres, the road, and manoeuvres that are driven one by one."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import extended, with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.strict import Query, Strict, accepted, quantity
+from models.multibody.numbers import Control, Controls, Handling, Tyres
+from models.road.iso8608 import level_of_class
+from models.road.plane_waves import SHORTEST, plane_waves
+from models.vehicles.vehicle_file import load_vehicle
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Knots = Annotated[list[Pair], Field(min_length=1)]
+AT_REST = [[0.0, 0.0]]
+
+
+class HandlingVehicle(Strict):
+    """[vehicle]: a vehicle file with a chassis of six freedoms and a cornering stiffness of every tyre."""
+
+    file: str = Field(default="r19_free", description="a vehicle that comes with twinrig, or a TOML file of your own")
+    accept: list[Query] = accepted()
+
+
+class TyreTable(Strict):
+    """[tyres]: what the vehicle file does not say of wheels and tyres."""
+
+    friction: float = quantity("", "coefficient between tyre and road", default=0.9)
+    half_width: float = Field(default=0.09, gt=0.0, le=0.5, description="m, of the patch, across")
+    inclination: float = Field(
+        default=0.0,
+        ge=-0.5,
+        le=0.5,
+        description="rad, of the left wheels about their forward axis; the right ones mirrored",
+    )
+    cells: int = Field(default=21, ge=3, le=200, description="of the patch's net, per strip")
+    spin_inertia: float = quantity("kg m^2", "of a wheel about its axle, chosen", default=1.7)
+    brake_rate: float = quantity("rad/s", "spin from which a brake's torque is whole", default=1.0)
+
+
+class RoadTable(Strict):
+    """[road]: rough, where a manoeuvre says so; one surface for all manoeuvres."""
+
+    iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="A", description="class, its mean level")
+    waves: int = Field(default=48, ge=1, le=10_000, description="plane waves that make up the surface")
+    seed: int = Field(default=1, ge=0, le=2**62, description="of the waves")
+
+
+class RunTable(Strict):
+    """[run]."""
+
+    step: float = quantity("s", "of Runge-Kutta 4 in both engines", default=1e-3)
+
+
+class Manoeuvre(Strict):
+    """[manoeuvres.NAME]: begins with rolling straight ahead; controls go smoothly from knot to knot [time, value]."""
+
+    speed: float = quantity("m/s", "at the start")
+    duration: float = quantity("s", "of the manoeuvre", default=4.0)
+    steer: Knots = Field(default=AT_REST, description="angle of the front wheels, left positive: [[s, rad], ...]")
+    brake: Knots = Field(default=AT_REST, description="torque of all brakes together: [[s, N m], ...]")
+    drive: Knots = Field(default=AT_REST, description="torque of all driven wheels together: [[s, N m], ...]")
+    front_brake: float = Field(default=0.65, ge=0, le=1, description="share of the front axle in braking")
+    front_drive: float = Field(default=0.0, ge=0, le=1, description="share of the front axle in driving")
+    rough: bool = Field(default=False, description="on the rough road of [road], else on a flat one")
+
+    def controls(self) -> Controls:
+        """What the driver does."""
+        steer, brake, drive = (_control(knots) for knots in (self.steer, self.brake, self.drive))
+        return Controls(steer, brake, drive, self.front_brake, self.front_drive)
+
+
+class HandlingScene(SceneFile):
+    """One scene of handling."""
+
+    system: str = Field(default="handling", pattern="^handling$")
+    study: str = Field(default="handling", description="the study that runs the scene")
+    vehicle: HandlingVehicle = HandlingVehicle()
+    tyres: TyreTable = TyreTable()
+    road: RoadTable = RoadTable()
+    run: RunTable = RunTable()
+    manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    def handling(self, name: str) -> Handling:
+        """Vehicle, tyres, road and controls of one manoeuvre."""
+        own, road = self.manoeuvres[name], self.road
+        waves = plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if own.rough else np.empty((0, 4))
+        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), own.controls(), waves)
+        return extended(built, self)
+
+
+def _control(knots: list[Pair]) -> Control:
+    return tuple((float(time), float(value)) for time, value in knots)
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(HandlingScene, table, file, folder)
+    for name, own in scene.manoeuvres.items():
+        place = f"manoeuvres.{name}"
+        _check_times(scene, place, own)
+        for control in ("steer", "brake", "drive"):
+            _check_knots(file, f"{place}.{control}", getattr(own, control), 1.2 if control == "steer" else None)
+            _check_pace(file, f"{place}.{control}", getattr(own, control), scene.run.step)
+        _check_way(scene, place, own)
+    return with_own(scene)
+
+
+def _check_times(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
+    step = scene.run.step
+    if own.duration / step > MOST_STEPS:
+        allowed = f"needs {own.duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
+        raise InputError(scene.file, f"{place}.duration", own.duration, allowed)
+    if not divides(step, own.duration):
+        allowed = f"must divide {place}.duration = {own.duration:g} s; use for example {fitting(step, own.duration)}"
+        raise InputError(scene.file, "run.step", step, allowed)
+
+
+def _check_knots(file: str, place: str, knots: list[Pair], most: float | None) -> None:
+    """Times that rise; angles that wheels have; torques that are not negative."""
+    times, values = np.array(knots, float).T
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")
+    low, high = (-most, most) if most is not None else (0.0, 1e5)
+    if not ((values >= low) & (values <= high)).all():
+        unit = "rad" if most is not None else "N m"
+        raise InputError(file, place, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
+
+
+def _check_pace(file: str, place: str, knots: list[Pair], step: float) -> None:
+    """Refuse a control that goes to another value in less than a step."""
+    times, values = np.array(knots, float).T
+    shortest = float(np.diff(times)[np.diff(values) != 0.0].min(initial=np.inf))
+    if shortest < step * (1.0 - 1e-9):
+        allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"
+        raise InputError(file, place, None, allowed)
+
+
+def _check_way(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
+    """Refuse steps within which a rough road has whole waves."""
+    way, fastest = own.speed * scene.run.step, SHORTEST / scene.run.step
+    if own.rough and way > SHORTEST:
+        allowed = (
+            f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at "
+            f"most {fastest:.4g} m/s, or a smaller run.step"
+        )
+        raise InputError(scene.file, f"{place}.speed", own.speed, allowed)

@@ -1,0 +1,1 @@
+"""Effects of scenes of hub forces, one file each: see ``models.core.scene_effects``."""

@@ -1,0 +1,21 @@
+"""Tyres of the virtual measurement that only push: a wheel may leave the road, and its hub then feels nothing of it."""
+
+from typing import Any
+
+from models.core.strict import Strict
+from models.vehicles.spatial import SpatialVehicle
+
+NEEDS = ("virtual_measurement",)
+WHY = "for no tyre is below measured forces"
+COST = "two comparisons per tyre and call, and side forces that go with the load"
+EXAMPLE: dict[str, float] = {}
+COUNTS = {"all": {"tyres that lift": 4}}
+
+
+class Parameters(Strict):
+    """[effects.lift_off]: no settings."""
+
+
+def extend(vehicle: SpatialVehicle, p: Any) -> SpatialVehicle:
+    """The vehicle on tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
+    return vehicle.with_tyres(pushes_only=True)

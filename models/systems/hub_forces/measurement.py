@@ -1,0 +1,97 @@
+"""The virtual measurement: a vehicle on its tyres over a rough road, and what transducers at its hubs would record."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.noise import FORCES, PITCH_SENSOR, normal
+from models.core.signals import Interpolation, sampled
+from models.engines.cut_vehicle import HubModel, HubRun, build
+from models.engines.protocol import WAVE
+from models.multibody.cut_table import Drive
+from models.road.profile import Profile
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
+
+
+@dataclass(frozen=True)
+class HubForces:
+    """Measured hub forces: samples (m, 6 h), N and N m hub by hub, the first at t = 0, ``period`` (s) apart.
+
+    frame : "hub", axes of what carries the wheel; "body", of the chassis; "inertial", of the space. x forward, y
+    left, z up; the force acts on the hub from outside, the moment about the hub.
+    """
+
+    samples: np.ndarray
+    period: float
+    frame: str
+
+    def drive(self, step: float, steps: int, interpolation: Interpolation = "linear") -> Drive:
+        """What drives the cut vehicle at half steps."""
+        signal = sampled(self.samples, self.period, interpolation)
+        return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame)
+
+    def noisy(self, deviation: np.ndarray, seed: int, path: int = 0) -> "HubForces":
+        """With white noise of standard deviations (6 h,), N and N m, on every sample."""
+        noise = normal(seed, path, len(self.samples), self.samples.shape[1], source=FORCES)
+        return replace(self, samples=self.samples + noise * deviation)
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Measured roll, pitch and their rates (m, 4), rad and rad/s, every ``period`` (s) from t = 0 on."""
+
+    samples: np.ndarray
+    period: float
+
+    def noisy(self, deviations: tuple[float, float], seed: int, path: int = 0) -> "Angles":
+        """With white noise of these standard deviations of angle (rad) and rate (rad/s)."""
+        noise = normal(seed, path, len(self.samples), 4, source=PITCH_SENSOR)
+        return replace(self, samples=self.samples + noise * np.repeat(deviations, 2))
+
+
+def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> Drive:
+    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later.
+
+    Raises InputError for a speed at which a step passes whole waves of the road.
+    """
+    shortest = WAVE * min(left.finest, right.finest)
+    if speed * step > shortest * (1 + 1e-9):
+        allowed = (
+            f"goes {speed * step:.3g} m in a step of {step:g} s, over whole waves of the road, the shortest of "
+            f"{shortest:.3g} m: at most {shortest / step:.4g} m/s, or a smaller step"
+        )
+        raise InputError("", "road.speed", speed, allowed)
+    times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.whole.axles)
+    heights, rates = [], []
+    for tyre in vehicle.whole.tyres:
+        road = left if tyre.point[1] > 0 else right
+        height, slope = road.height_and_slope(speed * times - (front - tyre.point[0]))
+        heights.append(-height)  # roads count downwards
+        rates.append(-speed * slope)
+    return Drive(np.column_stack([*heights, *rates]), speed=speed)
+
+
+def truth(engine: str, vehicle: CutVehicle, road: Drive, frame: str, step: float, duration: float) -> HubRun:
+    """The vehicle on its tyres, its hub forces in a frame."""
+    return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
+
+
+def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
+    """What is recorded of a run at every so many of its steps, without noise."""
+    n, period = run.states.shape[1] // 2, float(run.times[1]) * every
+    angles = run.states[::every, [ROLL, PITCH, n + ROLL, n + PITCH]]
+    wrenches = run.wrenches[::every]
+    return HubForces(wrenches.reshape(len(wrenches), -1), period, frame), Angles(angles, period)
+
+
+def model(
+    engine: str,
+    vehicle: CutVehicle,
+    forces: HubForces,
+    step: float,
+    duration: float,
+    interpolation: Interpolation = "linear",
+) -> HubModel:
+    """The cut vehicle on measured hub forces, free."""
+    return build(engine, vehicle, forces.drive(step, round(duration / step), interpolation), step, duration)

@@ -1,0 +1,176 @@
+"""Scenes of hub forces: a vehicle cut at its wheels, what was measured there or the road that gives it, stabilisers."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import extended, with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.steps import divides, fitting
+from models.core.strict import Query, Strict, accepted, quantity
+from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
+from models.core.time_series import CHASSIS, other_unit, read_time_series
+from models.systems.hub_forces.measurement import Angles, HubForces
+from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.vehicle_file import load_vehicle
+
+Frame = Literal["hub", "body", "inertial"]
+Noise = Literal["white", "none"]
+Method = Literal["none", "kalman", "prescribed"]
+MOMENTS = {"N m": 1.0, "kN m": 1e3}
+COMPONENTS = {"fx": NEWTONS, "fy": NEWTONS, "fz": NEWTONS, "mx": MOMENTS, "my": MOMENTS, "mz": MOMENTS}
+"""Columns of a hub, each after the hub's name and an underscore, with the factors of their units."""
+ANGLES = {"roll": RADIANS, "pitch": RADIANS, "roll_rate": RADIANS_PER_SECOND, "pitch_rate": RADIANS_PER_SECOND}
+"""Columns of the measured angles; roll to the right and nose down are positive, as turns about x and y are."""
+
+
+class Vehicle(Strict):
+    """[vehicle]: a vehicle file, and the body that the others ride on."""
+
+    file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    chassis: str = Field(default="body", description="the body with all six freedoms")
+    accept: list[Query] = accepted()
+
+
+class Run(Strict):
+    """[run]."""
+
+    duration: float = quantity("s", "of the measurement and of every run", default=15.0)
+    step: float = quantity("s", "of Runge-Kutta 4 in every engine", default=1e-3)
+
+
+class Road(Strict):
+    """[road]: two tracks of a random road for the virtual measurement."""
+
+    iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] = Field(default="C", description="class, its mean")
+    seed: int = Field(default=1, ge=0, le=2**62, description="of the left track; the right one takes the next")
+    speed: float = quantity("m/s", "of travel", default=20.0)
+
+
+class Forces(Strict):
+    """[forces]: the frame, and either a file or the road's; the noise that is added, or that the file has."""
+
+    file: str | None = Field(default=None, description="CSV: time [s], then HUB_fx [N] ... HUB_mz [N m] of every hub")
+    frame: Frame = Field(default="hub", description="axes of what carries the wheel, of the chassis, or of the space")
+    interpolation: Literal["linear", "smooth"] = Field(default="linear", description="between samples")
+    accept: list[str] = Field(default=[], description="findings of the checks of a file, by name, that are meant so")
+    sampling_rate: float = quantity("Hz", "of the virtual measurement", default=500.0)
+    noise: Noise = Field(default="white", description="of the virtual measurement; what is stated stays")
+    force_deviation: float = quantity("N", "white noise of every force sample", default=8.0)
+    moment_deviation: float = quantity("N m", "white noise of every moment sample", default=1.0)
+
+
+class Measured(Strict):
+    """[angles]: roll and pitch with their rates."""
+
+    file: str | None = Field(default=None, description="CSV: time [s], roll, pitch [rad]; roll_rate, pitch_rate")
+    noise: Noise = Field(default="white", description="of the virtual measurement; what the filter is told stays")
+    angle_deviation: float = quantity("rad", "white noise of every angle", default=1.75e-3)
+    rate_deviation: float = quantity("rad/s", "white noise of every rate", default=5e-3)
+
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """Standard deviations of every angle (rad) and of every rate (rad/s)."""
+        return self.angle_deviation, self.rate_deviation
+
+
+class Stabilise(Strict):
+    """[stabilise]: how roll and pitch are held."""
+
+    method: Method = Field(default="none", description="what holds roll and pitch")
+    bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
+    model: float = quantity("rad/s^2", "deviation of what springs add to a rigid vehicle, to the filter", default=10.0)
+    smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
+
+
+class HubScene(SceneFile):
+    """One scene of hub forces."""
+
+    system: Literal["hub-forces"] = "hub-forces"
+    study: str = Field(default="hub_forces", description="the study that runs the scene")
+    vehicle: Vehicle
+    run: Run = Run()
+    road: Road | None = Field(default=None, description="of the virtual measurement")
+    forces: Forces = Forces()
+    angles: Measured = Measured()
+    stabilise: Stabilise = Stabilise()
+    seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    def cut_vehicle(self) -> CutVehicle:
+        """The vehicle without its tyres; raises InputError."""
+        vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
+        return cut(extended(vehicle, self), self.vehicle.chassis)
+
+    def deviations(self, vehicle: CutVehicle) -> np.ndarray:
+        """Standard deviations (6 h,) of the samples, N and N m."""
+        return np.tile(np.repeat([self.forces.force_deviation, self.forces.moment_deviation], 3), len(vehicle.hubs))
+
+    def measured(self, vehicle: CutVehicle) -> tuple[HubForces, Angles]:
+        """Both files; raises InputError."""
+        assert self.forces.file is not None and self.angles.file is not None
+        columns = {f"{hub}_{name}": units for hub in vehicle.hubs for name, units in COMPONENTS.items()}
+        path = self.path(self.forces.file, "forces.file")
+        forces, period = read_time_series(path, columns)
+        if period > CHASSIS:
+            allowed = (
+                f"its samples lie {period:g} s apart, and a vehicle moves within {CHASSIS:g} s: if its times are "
+                "in milliseconds, not in seconds, correct the unit that heads them"
+            )
+            raise InputError(self.file, "forces.file", self.forces.file, allowed)
+        angles, other = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
+        if abs(other - period) > 1e-9 * period:
+            raise InputError(
+                self.file,
+                "angles.file",
+                self.angles.file,
+                f"is sampled every {other:g} s and the forces every {period:g} s: they must agree",
+            )
+        last = period * (min(len(forces), len(angles)) - 1)
+        if last < self.run.duration * (1 - 1e-9):
+            allowed = f"the files end at {last:g} s{other_unit(last, self.run.duration)}"
+            raise InputError(self.file, "run.duration", self.run.duration, allowed)
+        count = round(self.run.duration / period) + 1
+        return HubForces(forces[:count], period, self.forces.frame), Angles(angles[:count], period)
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HubScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(HubScene, table, file, folder)
+    if (scene.forces.file is None) == (scene.road is None):
+        raise InputError(file, "road", None, "give either the table road, for a virtual measurement, or forces.file")
+    if (scene.forces.file is None) != (scene.angles.file is None):
+        missing = "angles.file" if scene.angles.file is None else "forces.file"
+        raise InputError(file, missing, None, "is missing: forces and angles are measured together")
+    if scene.forces.file is not None:
+        _check_file_only(file, scene)
+    elif scene.forces.accept:
+        raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
+    _check_steps(file, scene)
+    return with_own(scene)
+
+
+def _check_file_only(file: str, scene: HubScene) -> None:
+    """What a virtual measurement can choose, and files have as they are."""
+    for table, name, own in (
+        ("forces", "sampling_rate", scene.forces),
+        ("forces", "noise", scene.forces),
+        ("angles", "noise", scene.angles),
+    ):
+        if name in own.model_fields_set:
+            raise InputError(file, f"{table}.{name}", getattr(own, name), f"is that of {table}.file: drop it")
+
+
+def _check_steps(file: str, scene: HubScene) -> None:
+    step, duration = scene.run.step, scene.run.duration
+    if not divides(step, duration):
+        allowed = f"must divide run.duration = {duration:g} s, as {fitting(step, duration)} s does"
+        raise InputError(file, "run.step", step, allowed)
+    period = 1.0 / scene.forces.sampling_rate
+    if scene.road is not None and not (divides(step, period) and divides(period, duration)):
+        allowed = f"its period must be a multiple of run.step = {step:g} s and divide run.duration = {duration:g} s"
+        raise InputError(file, "forces.sampling_rate", scene.forces.sampling_rate, allowed)

@@ -1,0 +1,244 @@
+"""A Kalman filter of roll and pitch beside the cut vehicle: measured angles and rates, and the measured hub forces.
+
+State: roll, pitch and their rates. The hub forces turn the rigid vehicle; that its springs give is noise of the
+acceleration, ``model`` (rad/s^2). Products of rates are neglected, and so is the difference of angles and turns about
+the body's axes, as is right for tilts of a few degrees. What was not measured, NaN, is left to the prediction.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.signals import Sampled
+from models.drift.score import SURPRISED
+from models.multibody.cut_rigid import rigid
+from models.multibody.cut_table import Drive
+from models.systems.hub_forces.measurement import Angles, HubForces
+from models.systems.hub_forces.scene import Frame
+from models.systems.hub_forces.tilt_march import march
+from models.vehicles.cut_vehicle import CutVehicle
+
+SURPRISE = 4.0
+"""Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
+
+BIASED, SURE = 0.1, 4.0
+"""Mean of a value's innovations, in deviations, and in its own standard errors, from which on it is called biased. One
+right run in 4000 passes the second; a gyro wrong by 0.1 degree/s has -0.35 and 27 in 15 s."""
+VALUES = "roll", "pitch", "roll_rate", "pitch_rate"
+UNEXPLAINED = 0.65
+"""Largest part of the measured rates that the hub forces do not explain. The rigid vehicle leaves 0.3 to 0.45 of them
+on rough roads, for its springs give; forces in another frame than stated leave 0.8, exchanged hubs 2 and more."""
+BALANCED = 15.0
+"""s: the longest stretch over which moments are integrated to be compared with rates; beyond, small biases add up."""
+UNKNOWN = 0.1**2
+"""rad^2, rad^2/s^2: variance at the start of what is not measured there."""
+REMEDY = "check signs, units, order of the hubs and frame, or state larger deviations"
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """Estimated roll, pitch and rates (m, 4), their standard deviations, and the mean of the normalised innovation
+    squared per measured value: 1 where the stated deviations are right. doubts : what contradicts the measurement."""
+
+    states: np.ndarray
+    deviations: np.ndarray
+    period: float
+    surprise: float
+    doubts: tuple[str, ...] = ()
+
+
+@dataclass
+class FilterState:
+    """What a filter knows after a sample: state (4,), its covariance (4, 4), the sum of the normalised innovations
+    squared and their count, the squares (2, 2) of unexplained and of whole rates of roll and pitch, and the sums (5, 4)
+    of innovations that ``tilt_march.march`` keeps."""
+
+    x: np.ndarray = field(default_factory=lambda: np.full(4, np.nan))
+    p: np.ndarray = field(default_factory=lambda: np.full((4, 4), np.nan))
+    surprise: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    rates: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    sums: np.ndarray = field(default_factory=lambda: np.zeros((5, 4)))
+
+
+class TiltFilter:
+    """Filters angles sampled with the forces, block by block.
+
+    force_deviation : (6 h,), N and N m, of each sample; angle_deviations : rad and rad/s; model : rad/s^2.
+    """
+
+    def __init__(
+        self,
+        vehicle: CutVehicle,
+        frame: str,
+        period: float,
+        force_deviation: np.ndarray,
+        angle_deviations: tuple[float, float],
+        model: float,
+        file: str = "",
+    ) -> None:
+        _check(frame, period, angle_deviations, model)
+        self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
+        self.forces_noise = self.rigid.turning(force_deviation)[:2, :2]
+        push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
+        self.noise = push @ (self.forces_noise + model**2 * np.eye(2)) @ push.T
+        self.variances = np.repeat(angle_deviations, 2) ** 2
+        self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
+        self.state = FilterState()
+
+    def advance(self, wrenches: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Estimates (n, 4) and deviations at samples of hub forces (n, 6 h) and angles (n, 4), NaN where not measured.
+
+        The first sample is the last one of the block before. Raises InputError where angles and forces contradict
+        one another, or are infinite.
+        """
+        _check_numbers(wrenches, angles, self.file)
+        own, count = self.state, len(angles)
+        if np.isnan(own.x[0]):
+            own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
+        level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
+        turning = self.rigid.moments(level)
+        turning = turning @ self.inverse.T
+        self._check_balance(turning, angles[:, 2:])
+        states, spread = np.empty((count, 4)), np.empty((count, 4))
+        given = turning, angles, self.period, self.noise, self.variances
+        own.surprise += march(own.x, own.p, *given, own.sums, states, spread)
+        if not self.surprise <= SURPRISE:
+            raise InputError(
+                self.file,
+                "angles",
+                None,
+                "contradict the hub forces: the squares of the innovations are "
+                f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}",
+            )
+        return states, spread
+
+    @property
+    def surprise(self) -> float:
+        """Mean of the normalised innovations squared per measured value."""
+        return float(self.state.surprise[0] / max(self.state.surprise[1], 1.0))
+
+    def biases(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (4,) of the normalised innovations of roll, pitch and their rates, and its standard error (4,).
+
+        The springs of the vehicle, which the filter takes for noise, make innovations that hang together: by their
+        correlation with the one before as many fewer are independent.
+        """
+        count, total, squares, products, _ = self.state.sums
+        number = np.maximum(count, 1.0)
+        variance = np.maximum(squares / number - (total / number) ** 2, 0.0)
+        along = np.clip(products / np.maximum(squares, 1e-300), 0.0, 0.999)
+        return total / number, np.sqrt(variance * (1 + along) / (1 - along) / number)
+
+    def doubts(self) -> tuple[str, ...]:
+        """What the innovations say against the measurement: too large, or with a mean; an angle that is wrong by a
+        constant leaves no trace in them."""
+        large = (
+            f"the filter's innovations squared are {self.surprise:.3g} times what the stated deviations allow (up "
+            f"to {SURPRISED:g} is not said): {REMEDY}"
+        )
+        mean, error = self.biases()
+        biased = [
+            f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
+            f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
+            for name, own, wide in zip(VALUES, mean, error, strict=True)
+            if abs(own) > max(BIASED, SURE * wide)
+        ]
+        return (*([large] if self.surprise > SURPRISED else []), *biased)
+
+    def _check_balance(self, turning: np.ndarray, rates: np.ndarray) -> None:
+        """Refuse hub forces whose moments, integrated, are not the measured rates of roll and pitch.
+
+        A constant offset of a transducer, which the filter takes for noise, makes a straight line of what is left of a
+        stretch: it is not counted, or 30 N at one wheel would be as much as a smooth road.
+
+        turning : (n, 2), rad/s^2; rates : (n, 2), rad/s.
+        """
+        dt, length = self.period, round(BALANCED / self.period)
+        for first in range(0, len(rates) - 1, length):
+            part, own = turning[first : first + length + 1], rates[first : first + length + 1]
+            if not np.isfinite(own).all():
+                continue
+            integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
+            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(own) / 6
+            left = np.var(_level_line(own - integral), axis=0)
+            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(own, axis=0)
+        unexplained, whole = self.state.rates
+        share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
+        for name, found in zip(("roll", "pitch"), share, strict=True):
+            if not found <= UNEXPLAINED:
+                raise InputError(
+                    self.file,
+                    f"angles.{name}_rate",
+                    None,
+                    f"contradicts the hub forces: {found:.0%} of "
+                    "it is not the integral of their moment "
+                    f"(at most {UNEXPLAINED:.0%}): {REMEDY}",
+                )
+
+
+def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
+    """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
+    if frame not in get_args(Frame):
+        raise InputError("", "frame", frame, "is none", get_args(Frame))
+    for name, value in (
+        ("period", period),
+        ("angle_deviations", min(angle_deviations)),
+        ("model", model),
+        ("angle_deviations", max(angle_deviations)),
+    ):
+        if not 0.0 < value < math.inf:
+            raise InputError("", name, value, "must be above 0, and finite")
+
+
+def _check_numbers(wrenches: np.ndarray, angles: np.ndarray, file: str) -> None:
+    """Refuse forces that are no numbers, and infinite angles; an angle of NaN was not measured."""
+    for name, wrong in (("forces", ~np.isfinite(wrenches)), ("angles", np.isinf(angles))):
+        if wrong.any():
+            row = int(np.flatnonzero(wrong.any(axis=1))[0])
+            raise InputError(file, name, None, f"hold what is no number in sample {row} of this stretch")
+
+
+def _level_line(values: np.ndarray) -> np.ndarray:
+    """Values (n, k) without their straight lines."""
+    line = np.linspace(-1.0, 1.0, len(values))
+    return values - np.outer(line, line @ values / (line @ line))
+
+
+def estimate(
+    vehicle: CutVehicle,
+    forces: HubForces,
+    angles: Angles,
+    force_deviation: np.ndarray,
+    angle_deviations: tuple[float, float],
+    model: float,
+    file: str = "",
+) -> Tilt:
+    """Filter angles sampled with the forces, see ``TiltFilter``; raises InputError also where nothing was measured."""
+    if len(forces.samples) != len(angles.samples):
+        raise InputError(
+            file, "angles", len(angles.samples), f"must be as many samples as the forces', {len(forces.samples)}"
+        )
+    if np.isnan(angles.samples).all():
+        raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
+    own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
+    states, spread = own.advance(forces.samples, angles.samples)
+    return Tilt(states, spread, forces.period, own.surprise, own.doubts())
+
+
+def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Wrenches (m, 6 h) of the space in axes that roll and pitch by angles (m, 2 and more), rad."""
+    (sr, sp), (cr, cp), zero = np.sin(angles[:, :2]).T, np.cos(angles[:, :2]).T, np.zeros(len(angles))
+    turned = np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]])
+    return np.einsum("mhi,ijm->mhj", wrenches.reshape(len(wrenches), -1, 3), turned).reshape(wrenches.shape)
+
+
+def pulled(drive: Drive, vehicle: CutVehicle, tilt: Tilt, step: float, bandwidth: float, ratio: float = 0.7) -> Drive:
+    """The drive with moments towards the estimate: wc = 2 pi ``bandwidth`` (Hz), damping ``ratio``, rigid inertia."""
+    rows, corner = len(drive.hubs), 2 * math.pi * bandwidth
+    wanted = Sampled(tilt.states, tilt.period, held=False).sample(0.0, step / 2, rows)
+    roll, pitch, _ = np.diag(rigid(vehicle).inertia)
+    pull = (roll * corner**2, 2 * ratio * roll * corner, pitch * corner**2, 2 * ratio * pitch * corner)
+    return replace(drive, guide=np.hstack([wanted, np.zeros((rows, 2))]), pull=pull)

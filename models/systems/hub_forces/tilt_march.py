@@ -1,0 +1,82 @@
+"""Compiled recursion of the Kalman filter of roll and pitch, one measured value after another."""
+
+import numpy as np
+
+from models.machine.compiled import njit
+
+
+@njit(cache=True, error_model="numpy")
+def march(x, p, turning, measured, dt, noise, variances, sums, states, spread):
+    """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0, both left at the last.
+
+    turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was; noise (4, 4) : what
+    the covariance gains in a step of dt (s); variances (4,) of measured values. Adds to sums (5, 4), of every value's
+    normalised innovations: how many, their sum, that of their squares, that of their products with the one before, and
+    the last one. Writes the states (n, 4) and their deviations. Returns the sum of the normalised innovations squared
+    and how many there were.
+    """
+    gain, surprise, used = np.empty(4), 0.0, 0
+    for i in range(len(measured)):
+        if i:
+            _predict(x, p, turning[i - 1], dt, noise)
+            for j in range(4):
+                if np.isnan(measured[i, j]):
+                    continue
+                s, off = p[j, j] + variances[j], measured[i, j] - x[j]
+                white = off / np.sqrt(s)
+                sums[0, j] += 1.0
+                sums[1, j] += white
+                sums[2, j] += white * white
+                sums[3, j] += white * sums[4, j]
+                sums[4, j] = white
+                surprise += off * off / s
+                used += 1
+                for k in range(4):
+                    gain[k] = p[k, j] / s
+                for k in range(4):
+                    x[k] += gain[k] * off
+                _learn(p, gain, j, variances[j], variances[j] / s)
+        for k in range(4):
+            states[i, k], spread[i, k] = x[k], np.sqrt(p[k, k])
+    return surprise, used
+
+
+@njit(cache=True, error_model="numpy")
+def _learn(p, gain, j, variance, kept):
+    """Covariance after value j, in Joseph's form: what is subtracted from itself might leave less than nothing.
+
+    kept : variance by the innovation's, which is 1 - gain[j] without its cancellation. What the value's own error
+    leaves in another state, gain^2 variance, is left there even where rounding is larger than that.
+    """
+    for m in range(4):
+        own = p[j, m]
+        for k in range(4):
+            p[k, m] -= gain[k] * own
+        p[j, m] = kept * own
+    for k in range(4):
+        own = p[k, j]
+        for m in range(4):
+            p[k, m] -= gain[m] * own
+        p[k, j] = kept * own
+        for m in range(4):
+            p[k, m] += gain[k] * variance * gain[m]
+    for k in range(4):
+        for m in range(k):
+            p[k, m] = p[m, k] = 0.5 * (p[k, m] + p[m, k])
+        p[k, k] = max(p[k, k], gain[k] * gain[k] * variance)
+
+
+@njit(cache=True, error_model="numpy")
+def _predict(x, p, turning, dt, noise):
+    """One step of angles by their rates and of rates by an acceleration."""
+    for k in range(2):
+        x[k] += dt * (x[2 + k] + 0.5 * dt * turning[k])
+        x[2 + k] += dt * turning[k]
+        for m in range(4):
+            p[k, m] += dt * p[2 + k, m]
+    for m in range(2):
+        for k in range(4):
+            p[k, m] += dt * p[k, 2 + m]
+    for k in range(4):
+        for m in range(4):
+            p[k, m] += noise[k, m]

@@ -1,0 +1,332 @@
+"""All channels of all files on one clock, in columns on disk.
+
+The rule. The clock is that of the wheel forces, the fastest of them, unless the scene names a rate; it begins with the
+first moment at which all wheel forces are there and ends with the last. Files are placed by their absolute start times
+where all say one, else each one's zero is the same moment; ``offset`` is added. What is slower, or as fast, is
+interpolated linearly; what is faster is freed of what the clock cannot show by a filter without phase. What lies in a
+gap of more than 1.5 of its own periods, or outside its file, is NaN.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.finding import Finding, Weight
+from models.core.scene_effects import extended
+from models.core.whole_files import write_whole
+from models.measured.channel import BLOCK, Source
+from models.measured.columns import Columns
+from models.measured.no_value import without_absurd
+from models.measured.recording import Recording
+from models.measured.resampling import SAME, onto
+from models.measured.signal import Signal
+from models.measured.timing import EVEN, Timing, timing
+from models.systems.measured.scene import MeasuredScene
+
+Progress = Callable[[str, float], None]
+COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
+LEAST = 100
+"""Samples of the shortest recording."""
+SLOW = {"force": 0.02, "moment": 0.02, "acceleration": 1.0, "angular rate": 1.0}
+"""s between samples beyond which a channel shows nothing of its quantity; wheel forces move with up to 25 Hz."""
+FAST = 60e3
+"""Hz: no amplifier of wheel forces or gyros is faster."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Mapped signals of one group of one file, with their timing on the common time.
+
+    The file's clock was slowed down by its ``drift``, and ``shift`` (s) added.
+    """
+
+    source: Source
+    signals: tuple[Signal, ...]
+    timing: Timing
+    shift: float
+    drift: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels, in the file's words."""
+        return tuple(signal.channel for signal in self.signals)
+
+    @property
+    def factors(self) -> np.ndarray:
+        """To SI, with sign."""
+        return np.array([signal.sign * signal.factor for signal in self.signals])
+
+    def si(self, values: np.ndarray) -> np.ndarray:
+        """Values (n, signals) of the file in SI."""
+        return (values - np.array([signal.zero for signal in self.signals])) * self.factors
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Times start + i period, i < count, s of the common time."""
+
+    start: float
+    period: float
+    count: int
+
+    def times(self, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Some or all of them."""
+        return self.start + self.period * np.arange(first, self.count if count is None else first + count)
+
+    def places(self, times: np.ndarray) -> np.ndarray:
+        """Nearest index of each time, which may lie outside."""
+        return np.rint((times - self.start) / self.period).astype(np.int64)
+
+
+def record(
+    scene: MeasuredScene,
+    sources: Sequence[Source],
+    signals: Sequence[Signal],
+    hubs: Sequence[str],
+    folder: Path,
+    progress: Progress = lambda text, part: None,
+) -> Recording:
+    """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
+
+    hubs : where forces are put in; these set the clock. What is in the folder from the same files is taken as it is.
+    Raises InputError for files that do not overlap, or none of whose channels is a wheel force.
+    """
+    shifts, start, noticed = placed(scene, sources)
+    progress("reading times", 0.0)
+    placing = zip(sources, shifts, (file.drift for file in scene.files), strict=True)
+    groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
+    leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
+    if not leading:
+        raise InputError(
+            scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the vehicle"
+        )
+    grid = _grid(scene, leading)
+    noticed += [finding for group in groups for finding in (*_of_group(group), *_outside(scene, group, grid))]
+    columns = _columns(folder, scene, signals, sources, grid)
+    if columns.done < grid.count:
+        absurd = list[Finding]()
+        for i, group in enumerate(groups):
+            progress(f"reading {group.source.path.name}", i / len(groups))
+            absurd += (_direct if _even(group, grid) else _resampled)(group, grid, columns, folder)
+        _referred(scene, signals, columns)
+        (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
+        columns.close(grid.count)
+    noticed += _absurd(folder)
+    began = start + timedelta(seconds=grid.start) if start else None
+    comment = "\n".join(source.comment for source in sources if source.comment)
+    said = [finding for source in sources for finding in source.noticed]
+    said += [*noticed, _rule(scene, groups, grid)]
+    return extended(Recording(tuple(signals), columns, grid.period, began, comment, tuple(said)), scene)
+
+
+def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
+    """Moments about points above or below hubs, brought to the hubs: (Mx - r Fy, My + r Fx) of a point r above."""
+    for hub, lever in scene.levers.items():
+        own = {(s.quantity, s.component): s for s in signals if s.at == hub and not s.check}
+        for axis, other, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
+            moment, force = own.get(("moment", axis)), own.get(("force", other))
+            if moment is not None and force is not None:
+                values = columns.read(moment.name) + sign * lever * columns.read(force.name)
+                columns.put((moment.name,), 0, values[:, None])
+
+
+def _absurd(folder: Path) -> list[Finding]:
+    """What was absurd when the columns were written, in this run or in one that was killed."""
+    rows = json.loads((folder / ABSURD).read_text())
+    return [Finding(**{**row, "signals": tuple(row["signals"]), "times": tuple(row["times"])}) for row in rows]
+
+
+def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
+    """What was done to bring all onto one clock."""
+    ways: dict[str, list[str]] = {}
+    for group in groups:
+        own = f"{group.source.path.name} ({group.timing.rate:.6g} Hz)"
+        faster = group.timing.period < grid.period * (1 - SAME)
+        way = "as it is" if _even(group, grid) else "filtered without phase" if faster else "interpolated linearly"
+        ways.setdefault(way, []).append(own)
+    by = "the scene" if scene.clock.rate else "the wheel forces"
+    told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
+    return Finding(
+        "clock",
+        "note",
+        "recording",
+        f"The clock is that of {by}, {1 / grid.period:.6g} Hz, {grid.count} samples; {told}.",
+        1 / grid.period,
+        "Hz",
+    )
+
+
+def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
+    """What is added to each file's times (s), when the common time was 0, and what to say of it."""
+    starts = [source.start for source in sources]
+    offsets = [file.offset for file in scene.files]
+    known = [start for start in starts if start is not None]
+    if len(known) == len(starts):
+        first = min(known)
+        return [(s - first).total_seconds() + o for s, o in zip(known, offsets, strict=True)], first, []
+    silent = ", ".join(source.path.name for source in sources if source.start is None)
+    weight: Weight = "doubt" if len(starts) > 1 else "note"
+    text = f"{silent}: no start time is given"
+    if len(starts) > 1:
+        text += ": the zero of every file is taken as the same moment; set offset of [[files]] if it is not"
+    found = Finding("start", weight, silent, f"{text}.")
+    return offsets, known[0] if len(starts) == 1 and known else None, [found]
+
+
+def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[Group]:
+    """Groups of a file of which any channel is mapped."""
+    of = {channel.name: channel.group for channel in source.channels}
+    own = [signal for signal in signals if signal.file == source.path.name]
+    for number in dict.fromkeys(of[signal.channel] for signal in own):
+        mapped = tuple(signal for signal in own if of[signal.channel] == number)
+        times = np.concatenate([block.times for block in source.blocks([mapped[0].channel])])
+        where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {mapped[0].channel} ..."
+        found = timing(times, where, tuple(s.name for s in mapped[:1]))
+        slowed = replace(found, times=found.times / (1 + drift) + shift, period=found.period / (1 + drift))
+        yield Group(source, mapped, slowed, shift, drift)
+
+
+def _of_group(group: Group) -> Iterator[Finding]:
+    """What was found in the times of a group, and whether they seem to be of another unit."""
+    yield from group.timing.findings
+    own, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
+    slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)
+    slow = own.period > slowest
+    if not slow and own.rate < FAST:
+        return
+    true, written = ("milliseconds", "seconds") if slow else ("seconds", "milliseconds")
+    text = (
+        f"{where}: the samples lie {own.period:.4g} s apart ({own.rate:.4g} Hz) and last for "
+        f"{own.end - own.times[0]:.4g} s, which is too {'slow' if slow else 'fast'} for {group.signals[0].quantity}: "
+        f"if its times are in {true}, not in {written}, correct the unit that heads them."
+    )
+    weight: Weight = "error" if own.period > 10 * slowest else "doubt"
+    yield Finding("times", weight, where, text, own.period, "s", (group.signals[0].name,))
+
+
+def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
+    own = scene.clock
+    fastest = min(leading, key=lambda group: group.timing.period)
+    period = 1.0 / own.rate if own.rate else fastest.timing.period
+    if period < fastest.timing.period * (1 - SAME):
+        raise InputError(
+            scene.file,
+            "clock.rate",
+            own.rate,
+            f"is faster than the wheel forces, {fastest.timing.rate:g} Hz, which adds nothing",
+        )
+    first, last = max(g.timing.times[0] for g in leading), min(g.timing.times[-1] for g in leading)
+    if first >= last:
+        spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
+        raise InputError(scene.file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
+    times = fastest.timing.times
+    start = float(times[min(np.searchsorted(times, first + own.start - EVEN * period), len(times) - 1)])
+    end = last if own.duration is None else min(last, start + own.duration)
+    count = int(np.floor((end - start) / period + EVEN)) + 1
+    if own.duration is not None and start + own.duration > last + period:
+        raise InputError(scene.file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
+    if count < LEAST:
+        raise InputError(
+            scene.file, "clock", None, f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
+        )
+    return Grid(start, period, count)
+
+
+def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding]:
+    """Say, or refuse, that a group does not cover the recording."""
+    end = grid.start + grid.period * (grid.count - 1)
+    late, early = group.timing.times[0] - grid.start, end - group.timing.end
+    place = f"{group.source.path.name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
+    if late >= end - grid.start or early >= end - grid.start:
+        raise InputError(
+            scene.file,
+            "files",
+            None,
+            f"{place} lies wholly outside the wheel forces "
+            f"({grid.start:.6g} to {end:.6g} s): it runs from {group.timing.times[0]:.6g} to "
+            f"{group.timing.end:.6g} s; set offset",
+        )
+    missing = max(late, 0.0) + max(early, 0.0)
+    if missing > 2 * max(grid.period, group.timing.period):
+        yield Finding(
+            "overlap",
+            "doubt",
+            group.source.path.name,
+            f"{place} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it.",
+            missing,
+            "s",
+            (group.signals[0].name,),
+        )
+
+
+def _columns(
+    folder: Path, scene: MeasuredScene, signals: Sequence[Signal], sources: Sequence[Source], grid: Grid
+) -> Columns:
+    """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
+    files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
+    own = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
+    now = {"files": files, "map": own, "clock": [grid.start, grid.period], "levers": scene.levers}
+    path = folder / SOURCES
+    if path.is_file() and json.loads(path.read_text()) != now:
+        raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
+    write_whole(path, json.dumps(now))
+    return Columns(folder / COLUMNS, tuple(signal.name for signal in signals), grid.count)
+
+
+def _even(group: Group, grid: Grid) -> bool:
+    """Whether the samples of a group are those of the clock."""
+    own = group.timing
+    at = grid.places(own.times)
+    inside = (at >= 0) & (at < grid.count)
+    off = np.abs(own.times[inside] - grid.start - grid.period * at[inside])
+    return own.order is None and abs(own.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
+
+
+def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+    """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
+    names, done = tuple(signal.name for signal in group.signals), 0
+    for block in group.source.blocks(group.names):
+        at = grid.places(group.timing.times[block.first : block.first + len(block.values)])
+        inside = (at >= done) & (at < grid.count)
+        if inside.any():
+            last = int(at[inside][-1]) + 1
+            for first in range(done, last, BLOCK):
+                count = min(BLOCK, last - first)
+                here = inside & (at >= first) & (at < first + count)
+                values = np.full((count, len(names)), np.nan)
+                values[at[here] - first] = group.si(block.values[here])
+                columns.put(names, first, values)
+            done = last
+    for first in range(done, grid.count, BLOCK):
+        columns.put(names, first, np.full((min(BLOCK, grid.count - first), len(names)), np.nan))
+    absurd = list[Finding]()
+    for signal in group.signals:
+        values, finding = without_absurd(signal, columns.read(signal.name), grid.times() - grid.start)
+        if finding:
+            columns.put((signal.name,), 0, values[:, None])
+            absurd.append(finding)
+    return absurd
+
+
+def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
+    """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
+    absurd."""
+    count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
+    raw = Columns(folder / RAW, group.names, count)
+    for block in group.source.blocks(group.names):
+        raw.put(group.names, block.first, group.si(block.values))
+    times, order, absurd = grid.times(), group.timing.order, list[Finding]()
+    for signal in group.signals:
+        values = raw.read(signal.channel)
+        values, finding = without_absurd(
+            signal, values if order is None else values[order], group.timing.times - grid.start
+        )
+        absurd += [finding] if finding else []
+        columns.put((signal.name,), 0, onto(group.timing.times, values, group.timing.period, times)[:, None])
+    raw.remove()
+    return absurd

@@ -1,0 +1,241 @@
+"""What the findings of a recording do to the section forces: run once as recorded and once with each finding put right.
+
+A finding that names its size says how to put it right: a late channel is shifted, a wrong factor taken out, a spike
+left out. Of a gap nobody knows what was lost: there the deviation that its bridge is known to is planted instead. The
+two runs differ by what the finding does to every section force, as rms and as damage. A long recording is run for
+``LONGEST`` s, about the place where the finding is worst.
+"""
+
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError, RunFailed
+from models.core.finding import FEW, Finding
+from models.drift.score import Verdict, rms
+from models.fatigue.damage import SLOPE, damage_ratio
+from models.measured.checks.spikes import spikes
+from models.measured.columns import Columns
+from models.measured.gaps import BRIDGED, filled
+from models.measured.recording import Recording
+from models.measured.signal import Signal
+from models.systems.measured.section_run import Outcome
+from models.systems.measured.sections import Answer
+
+LONGEST = 30.0
+"""s of a recording that are run for a finding."""
+FORCE, DAMAGE = (0.05, 0.15), (0.05, 0.25)
+"""Change of a section force, rms by its own rms without its mean, and |damage ratio - 1|: up to the first the run is
+accepted, beyond the second it is rejected, between the two it is accepted with doubt. 5 % of an amplitude are 28 % of
+damage of slope 5."""
+SMALL = 0.02
+"""Of the largest rms in the same unit: a section force that is smaller carries nothing that could be wrong."""
+SETTLING = 1.0
+"""s at the beginning that are not compared: there the run settles."""
+Samples = dict[Signal, np.ndarray]
+Run = Callable[[Recording, Path], Outcome]
+
+
+@dataclass(frozen=True)
+class Consequence:
+    """The section that a finding changes most: rms of the change by that of the force, and damage as recorded by that
+    of the finding put right; NaN and no section where it cannot be told."""
+
+    finding: Finding
+    section: str = ""
+    force: float = np.nan
+    damage: float = np.nan
+
+    @property
+    def grade(self) -> int:
+        """0 harmless, 1 a doubt or not known, 2 beyond what may be accepted."""
+        if not self.section:
+            return 1
+        return max(
+            sum(abs(value) > bound for bound in bounds)
+            for value, bounds in ((self.force, FORCE), (self.damage - 1.0, DAMAGE))
+        )
+
+    def __str__(self) -> str:
+        """With figures, for an engineer."""
+        where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
+        if not self.section:
+            return f"{where}: what it does to the section forces is not known"
+        return f"{where}: changes {self.section} by {self.force:.1%} of its rms, its damage is {self.damage:.3g} times"
+
+
+def consequences(
+    findings: Iterable[Finding], recording: Recording, run: Run, answers: Sequence[Answer], folder: Path
+) -> tuple[Consequence, ...]:
+    """One for every doubt; run : makes a run of a recording in a folder; answers : the section forces that count."""
+    shutil.rmtree(folder, ignore_errors=True)
+    known, out = dict[int, Outcome](), list[Consequence]()
+    for number, finding in enumerate(_different(findings)):
+        signals = [s for s in recording.signals if s.name in finding.signals]
+        right = CORRECTIONS.get(finding.check)
+        if right is None or not signals:
+            out.append(Consequence(finding))
+            continue
+        first, count = _window(finding, recording)
+        samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
+        changed = right(finding, signals, samples, recording.period)
+        try:
+            if first not in known:
+                known[first] = run(_stretch(recording, samples, folder / f"from {first}"), folder / f"from {first}")
+            other = run(_stretch(recording, samples | changed, folder / str(number)), folder / str(number))
+        except (InputError, RunFailed):
+            out.append(Consequence(finding))
+            continue
+        out.append(_worst(finding, known[first], other, answers))
+    return tuple(out)
+
+
+def judged(verdict: Verdict, found: Sequence[Consequence]) -> Verdict:
+    """The verdict on a run that is accepted but for what its findings do."""
+    worst = max((one.grade for one in found), default=0)
+    if verdict.word != "accepted" or worst == 0:
+        return verdict
+    reason = "; ".join(told(one for one in found if one.grade == worst))
+    bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
+    return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
+
+
+def told(found: Iterable[Consequence]) -> list[str]:
+    """A text each; where more than FEW are of one check only the worst, which says of how many."""
+    kinds: dict[str, list[Consequence]] = {}
+    for consequence in found:
+        kinds.setdefault(consequence.finding.check, []).append(consequence)
+    out = list[str]()
+    for alike in kinds.values():
+        worst = max(alike, key=lambda one: (one.grade, np.nan_to_num(abs(one.force))))
+        out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > FEW else map(str, alike)
+    return out
+
+
+def _different(findings: Iterable[Finding]) -> list[Finding]:
+    """Doubts, those of the same check about the same channels once; what a filter says follows from all others."""
+    doubts = [finding for finding in findings if finding.weight == "doubt"]
+    first = {(finding.check, finding.signals or finding.place): finding for finding in reversed(doubts)}
+    return list(reversed(first.values()))
+
+
+def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
+    """First sample and number of samples that are run."""
+    count = min(recording.count, round(LONGEST / recording.period) + 1)
+    middle = finding.times[0] if finding.times else 0.0
+    first = min(max(round((middle - LONGEST / 2) / recording.period), 0), recording.count - count)
+    return first, count
+
+
+def _stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
+    """A recording of these samples."""
+    folder.mkdir(parents=True, exist_ok=True)
+    count = len(next(iter(samples.values())))
+    columns = Columns(folder / "samples.columns", tuple(s.name for s in recording.signals), count)
+    columns.write(0, np.column_stack([samples[s] for s in recording.signals]))
+    return Recording(recording.signals, columns, recording.period)
+
+
+def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequence[Answer]) -> Consequence:
+    """The section force that differs most, of those that carry anything."""
+    first = min(round(SETTLING / right.period), right.done // 4)
+    pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
+    size = {a: rms(own - own.mean()) for a, (_, own) in pairs.items()}
+    most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
+    every = [
+        Consequence(finding, a.name, rms(one - own) / size[a], damage_ratio(one, own, SLOPE))
+        for a, (one, own) in pairs.items()
+        if size[a] > SMALL * most[a.unit]
+    ]
+    return max(every, key=lambda one: (one.grade, abs(one.force)), default=Consequence(finding))
+
+
+def _late(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    assert finding.size is not None
+    return {s: _read_at(samples[s], finding.size / period * np.ones(len(samples[s]))) for s in signals}
+
+
+def _drifted(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    assert finding.size is not None
+    return {s: _read_at(samples[s], finding.size * np.arange(len(samples[s]))) for s in signals}
+
+
+def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Values (n,) read so many samples (n,) later, by a cubic spline; NaN where one beside it is not known."""
+    from scipy.interpolate import make_interp_spline
+
+    known, places = np.isfinite(values), np.arange(len(values))
+    if np.count_nonzero(known) < 4:
+        return values
+    at = np.clip(places + later, 0, len(values) - 1)
+    found = np.asarray(make_interp_spline(places[known], values[known], k=3)(np.clip(at, *places[known][[0, -1]])))
+    lost = np.interp(at, places, (~known).astype(float)) > 0
+    return np.where(lost, np.nan, found)
+
+
+def _gained(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    assert finding.size is not None
+    factor = 1.0 + finding.size / 100 if finding.unit == "%" else finding.size
+    return {s: samples[s] / factor for s in signals}
+
+
+def _offset(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    assert finding.size is not None
+    return {s: samples[s] - finding.size for s in signals}
+
+
+def _referred(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    assert finding.size is not None
+    force = {(s.at, s.component): s for s in samples if s.quantity == "force" and not s.check}
+    out = dict[Signal, np.ndarray]()
+    for s in signals:
+        other, sign = {"x": ("y", -1.0), "y": ("x", 1.0)}[s.component]
+        if (s.at, other) in force:
+            out[s] = samples[s] + sign * finding.size * samples[force[s.at, other]]
+    return out
+
+
+def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    one, other = signals
+    return {one: samples[other], other: samples[one]}
+
+
+def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    """Without spikes of one or two samples."""
+    out = dict[Signal, np.ndarray]()
+    for s in signals:
+        at, values = spikes(samples[s])[0], samples[s].copy()
+        values[np.minimum(np.concatenate((at, at + 1)), len(values) - 1)] = np.nan
+        out[s] = filled(values, period, BRIDGED)[0]
+    return out
+
+
+def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
+    """Gaps bridged as they are for the run, off by a standard deviation, one gap upwards, the next one downwards."""
+    out = dict[Signal, np.ndarray]()
+    for s in signals:
+        if s.quantity in ("force", "moment"):
+            values, gaps = filled(samples[s], period, BRIDGED)
+            out[s] = values.copy()
+            for number, gap in enumerate(gaps):
+                out[s][gap.first : gap.end] += (-1.0) ** number * np.nan_to_num(gap.doubt)
+    return out
+
+
+CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
+    "shift": _late,
+    "drift": _drifted,
+    "gain": _gained,
+    "sign": _gained,
+    "unit": _gained,
+    "offset": _offset,
+    "lever": _referred,
+    "exchanged": _exchanged,
+    "spikes": _smooth,
+    "gaps": _bridged,
+    "no value": _bridged,
+}
+"""By the name of the check."""

@@ -1,0 +1,1 @@
+"""Effects of scenes of a recording, one file each: see ``models.core.scene_effects``."""

@@ -1,0 +1,23 @@
+"""Roll and pitch held by a moment towards a Kalman filter's estimate."""
+
+from typing import Any
+
+PLACE = "stabilise.method"
+COST = "a filter over all samples before the run, and a moment over time"
+COUNTS = {"all": {"pulled angles": 2}}
+MODULES = ("models.systems.hub_forces.tilt_filter", "models.systems.hub_forces.tilt_march")
+
+
+def named(scene: Any) -> bool:
+    """Whether a scene has it."""
+    return bool(scene.stabilise.method == "kalman")
+
+
+def leave_out(table: dict[str, Any], scene: Any) -> None:
+    """Nothing holds roll and pitch: to enforce them would cost more."""
+    table.setdefault("stabilise", {})["method"] = "none"
+
+
+def put_in(table: dict[str, Any], scene: Any) -> None:
+    """With the usual bandwidth."""
+    table.setdefault("stabilise", {})["method"] = "kalman"

@@ -1,0 +1,258 @@
+"""A recording on the pitch-plane vehicle: its vertical wheel forces, summed by axle, drive it; its pitch may hold it.
+
+The vehicle, its effects, engines, trust and verdict are those of its scenes (``models.systems.pitch_plane``); the
+recording is handed to them as the files that such scenes read. A recording's pitch is positive nose down (ISO 8855),
+this vehicle's nose up. Forces in the axes of hubs or chassis turn with the vehicle: its wheels do not pitch against
+the chassis.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.result import Result
+from models.core.time_series import write_time_series
+from models.drift import score
+from models.drift.score import Limits, Verdict
+from models.drift.section_forces import section_forces
+from models.measured import axle_forces
+from models.measured.axle_forces import AXLES, axle_signals, axles
+from models.measured.columns import Columns
+from models.measured.gaps import BRIDGED, filled
+from models.measured.recording import Recording
+from models.measured.signal import Signal
+from models.systems.measured.section_run import Hold, Outcome
+from models.systems.measured.sections import Answer
+from models.systems.pitch_plane import trust as drift_trust
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.trust import Trust
+
+CHASSIS = "chassis"
+STEP = 1e-3
+"""s, the longest step: the fastest pole of the published vehicle needs one below 2.8 ms."""
+UNSEEN = (
+    "free, with forces that turn with the vehicle and no measured pitch: an offset, or forces of another frame, "
+    "would drive it off unseen"
+)
+EFFECTS = {"kalman": "kalman_filter", "prescribed": "prescribed_pitch"}
+SPRINGS = {"f3": "front spring", "f4": "rear spring"}
+
+
+@dataclass(frozen=True)
+class PlaneJob:
+    """A run to be made: parameters name a set or a TOML file of one; ``hold`` as in ``section_run``; step in s."""
+
+    recording: Recording
+    parameters: str
+    engine: str = "mujoco"
+    hold: Hold = field(default_factory=Hold)
+    step: float | None = None
+    file: str = ""
+
+    @property
+    def effect(self) -> str | None:
+        """Name of the effect that holds the pitch."""
+        return EFFECTS.get(self.hold.method)
+
+
+@dataclass(frozen=True)
+class PlaneRun:
+    """A run, what limits it, what it is worth, and its section forces as ``section_run`` gives them."""
+
+    result: Result
+    trust: Trust | None
+    verdict: Verdict
+    outcome: Outcome
+
+
+def run(job: PlaneJob, folder: Path, limits: Limits | None = None) -> PlaneRun:
+    """Write the files of a scene into a new folder, and run it; raises InputError, Refused, RunFailed."""
+    folder.mkdir(parents=True)
+    scene, said = scene_of(job, folder)
+    result = simulate(scene, job.engine)
+    limited = trusted(scene, job.hold.force)
+    if limited and job.recording.find("angle", CHASSIS, "pitch"):
+        limited = replace(limited, unchecked="")  # the run is compared with it
+    own = score.own_figures(result, scene.vehicle_parameters())
+    until = limited.until[1] if limited and limited.until else result.times[-1]
+    effects = [job.effect] if job.effect else []
+    # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
+    verdict = score.blind_verdict(
+        own, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
+    )
+    if job.effect is None and verdict.word == "accepted":
+        verdict = _beside_pitch(job, result, limits or Limits(), verdict)
+    return PlaneRun(result, limited, verdict, _outcome(result, said, folder))
+
+
+def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdict) -> Verdict:
+    """The verdict on a free run that ends before noise drives it off, beside its pitch as measured.
+
+    Where forces turn with the vehicle nothing grows, but offsets and forces of another frame drive it off all the same,
+    and its forces along the vehicle are as wrong as its pitch: there a measured pitch must bear the run out.
+    """
+    found = job.recording.find("angle", CHASSIS, "pitch")
+    if not found:
+        turns = any(signal.frame != "inertial" for axle in AXLES for signal in axle_signals(job.recording, axle))
+        return Verdict("stabilise", UNSEEN) if turns else verdict
+    measured = job.recording.samples(found[0])
+    known = np.flatnonzero(np.isfinite(measured))
+    beside = np.interp(result.times, job.recording.period * known, measured[known])
+    off = float(np.abs(score.low_pass(result["pitch"] + beside, float(result.times[1]))).max())
+    if off <= limits.pitch_error:
+        return verdict
+    return Verdict(
+        "stabilise",
+        f"free, and its pitch is up to {off:.2g} rad off the measured one "
+        f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets",
+    )
+
+
+def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
+    """The scene of the pitch plane, its files in the folder, and what was bridged."""
+    period, said = job.recording.period, list[Finding]()
+    forces = {axle: ("N", _axle(job, axle, said)) for axle in AXLES}
+    write_time_series(folder / "wheel_forces.csv", forces, period)
+    frames = {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
+    if len(frames & {"inertial"}) != len(frames) and "inertial" in frames:
+        raise InputError(
+            job.file,
+            "files.channels",
+            None,
+            "vertical forces must all keep their direction in space, or all turn with the vehicle",
+        )
+    fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
+    effects: dict[str, Any] = {
+        "wheel_forces": {
+            "file": "wheel_forces.csv",
+            "interpolation": "smooth",
+            "frame": "inertial" if fixed else "body",
+            "accept": list(axle_forces.CHECKS),
+        }
+    }
+    if job.effect:
+        effects[job.effect] = _held(job, folder, said)
+    step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
+    scene = build(
+        {
+            "title": "recording",
+            "vehicle": {"parameters": job.parameters},
+            "effects": effects,
+            "run": {"duration": job.recording.duration, "step": step},
+        },
+        job.file,
+        folder,
+    )
+    _check_axles(job, scene)
+    return scene, tuple(said)
+
+
+def trusted(scene: Scene, deviation: float) -> Trust | None:
+    """What limits the run of a scene whose forces have noise of this standard deviation (N) already; None where it is
+    held to a measured pitch."""
+    assembly = assemble(scene)
+    found = drift_trust.trust(assembly)
+    if found is None or deviation <= 0:
+        return found
+    noise = drift_trust.noise(assembly, deviation).passes(found.angle)
+    return replace(found, times={**found.times, f"noise of {deviation:g} N": noise})
+
+
+def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:
+    signals = axle_signals(job.recording, axle)
+    if len(signals) != (1 if signals and signals[0].at == axle else 2):
+        raise InputError(
+            job.file,
+            "files.channels",
+            None,
+            f"the vertical force is needed at {AXLES[axle][0]!r}, or at both {AXLES[axle][1]!r} and {AXLES[axle][2]!r}",
+        )
+    return np.asarray(sum(_whole(job, signal, said) for signal in signals))
+
+
+def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
+    """Samples of a signal, short gaps bridged; InputError for a long one."""
+    values, gaps = filled(job.recording.samples(signal), period := job.recording.period, BRIDGED)
+    if not np.isfinite(values).all():
+        raise InputError(
+            signal.file,
+            signal.channel,
+            None,
+            f"has a gap of more than {BRIDGED:g} s: take a stretch without it (clock.start, clock.duration)",
+        )
+    if gaps:
+        longest = max(gap.end - gap.first for gap in gaps) * period
+        said.append(
+            Finding(
+                "gaps",
+                "doubt",
+                signal.name,
+                f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged.",
+                longest,
+                "s",
+                (signal.name,),
+            )
+        )
+    return values
+
+
+def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
+    """The effect's table, and its file of pitch and rate, nose up."""
+    hold, columns, deviations = job.hold, dict[str, tuple[str, np.ndarray]](), dict[str, float]()
+    known = (
+        ("angle", "pitch", "rad", "pitch_deviation", hold.angle),
+        ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
+    )
+    for quantity, name, unit, key, deviation in known:
+        found = [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check]
+        if found and (job.hold.method == "kalman" or quantity == "angle"):
+            own = job.recording.samples(found[0]) if hold.method == "kalman" else _whole(job, found[0], said)
+            columns[name], deviations[key] = (unit, -own), deviation
+    if "pitch" not in columns:
+        raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS!r}")
+    write_time_series(folder / "pitch.csv", columns, job.recording.period)
+    if hold.method == "prescribed":
+        return {"file": "pitch.csv", "bandwidth": hold.smoothing}
+    noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in AXLES))
+    return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
+
+
+def _check_axles(job: PlaneJob, scene: Scene) -> None:
+    """Refuse forces that cannot be this vehicle's; doubts are told by the checks of the recording."""
+    own = axles(job.recording, scene.vehicle_parameters())
+    errors = [each.text for each in axle_forces.check(own) if each.weight == "error"] if own else []
+    if errors:
+        raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
+
+
+def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome:
+    """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
+    forces = section_forces(result["f3"], result["f4"], result["pitch"])
+    found = {
+        Answer(
+            f"{spring} F{axis}",
+            "N",
+            f"on the {CHASSIS} in its axes, {'forward' if axis == 'x' else 'upward'} positive",
+            spring,
+            "force",
+            spring,
+            axis,
+        ): forces[f"{name}{axis}"]
+        for name, spring in SPRINGS.items()
+        for axis in "xz"
+    }
+    found[Answer(f"{CHASSIS} pitch", "rad", "nose down positive", "", "angle", CHASSIS, "pitch")] = -result["pitch"]
+    found[
+        Answer(f"{CHASSIS} pitch rate", "rad/s", "nose down positive", "", "angular rate", CHASSIS, "pitch")
+    ] = -result["pitch_rate"]
+    columns = Columns(folder / "run.f64", tuple(answer.name for answer in found), len(result.times))
+    columns.write(0, np.column_stack(list(found.values())))
+    surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
+    return Outcome(columns, tuple(found), float(result.times[1]), len(result.times), float(surprise), said)

@@ -1,0 +1,170 @@
+"""Scenes of an engineer's own measurements: files and their channel map, vehicle, stabiliser, what is handed on."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Query, Strict, accepted, quantity
+from models.drift.score import Limits
+from models.measured.signal import Frame, Quantity
+from models.systems.measured.rig import Rig, in_plane, in_space
+from models.systems.measured.verdict import LIMITS
+from models.systems.measured.virtual import VirtualTable
+from models.systems.pitch_plane.scene import parameter_set
+from models.vehicles.cut_vehicle import cut
+from models.vehicles.pitch_plane import Parameters
+from models.vehicles.vehicle_file import load_vehicle
+
+Engine = Literal["reference", "exudyn", "mujoco"]
+
+
+class Vehicle(Strict):
+    """[vehicle]: a vehicle file and the body that the others ride on, or a parameter set of the pitch plane."""
+
+    file: str | None = Field(default=None, description="a vehicle that comes with twinrig, or a TOML file of your own")
+    chassis: str = Field(default="body", description="the body with all six freedoms")
+    parameters: str | None = Field(default=None, description="of the pitch-plane vehicle: a set, or a TOML file")
+    accept: list[Query] = accepted()
+
+
+class MappedChannel(Strict):
+    """One of [[files.channels]]: what a channel of the file measures."""
+
+    channel: str = Field(description="name in the file")
+    quantity: Quantity = Field(description="what it measures")
+    at: str = Field(min_length=1, description="hub, body, connector or sensor that it belongs to")
+    component: str = Field(default="", description="x, y, z; roll, pitch, yaw of angles and rates; none of a travel")
+    frame: Frame | None = Field(default=None, description="whose axes")
+    sign: Literal[1, -1] = Field(default=1, description="-1 where the file counts the other way")
+    unit: str | None = Field(default=None, description="where the file names none, or another than it means")
+    zero: float = Field(default=0.0, allow_inf_nan=False, description="what it reads at nought, in its unit: taken off")
+    gravity: bool = Field(default=True, description="whether an acceleration includes it: +9.81 m/s^2 upwards at rest")
+    check: bool = Field(default=False, description="only compared with, never put in")
+
+
+class MeasuredFile(Strict):
+    """One of [[files]]: CSV, MDF4, RPC III or TDMS."""
+
+    file: str = Field(description="the file, beside the scene")
+    offset: float = quantity("s", "added to its clock", default=0.0, signed=True)
+    drift: float = Field(default=0.0, gt=-0.1, lt=0.1, description="by which its clock is fast: 1e-4 is 0.36 s an hour")
+    channels: list[MappedChannel] = Field(min_length=1, description="what its channels measure")
+
+
+class Sensor(Strict):
+    """[sensors.NAME]: where an accelerometer or gyro sits."""
+
+    body: str = Field(description="that carries it")
+    position: list[float] = Field(min_length=3, max_length=3, description="x, y, z in m, in the vehicle's design axes")
+
+
+class Clock(Strict):
+    """[clock]: of the recording; without it that of the wheel forces."""
+
+    rate: float | None = quantity("Hz", "samples per second of the recording", default=None)
+    start: float = quantity("s", "left out at the beginning", default=0.0, zero=True)
+    duration: float | None = quantity("s", "taken of what follows; else all", default=None)
+
+
+class Deviations(Strict):
+    """[noise]: standard deviation of the white noise on each sample; what is not named is estimated by the checks."""
+
+    force: float | None = quantity("N", "of every force sample", default=None)
+    moment: float | None = quantity("N m", "of every moment sample", default=None)
+    angle: float | None = quantity("rad", "of every angle", default=None)
+    rate: float | None = quantity("rad/s", "of every angular rate", default=None)
+
+
+class Stabilise(Strict):
+    """[stabilise]: how roll and pitch are held."""
+
+    method: Literal["kalman", "prescribed", "none"] = Field(default="kalman", description="what holds roll and pitch")
+    bandwidth: float = quantity("Hz", "of the moment towards the filter's estimate", default=0.7)
+    model: float = quantity("rad/s^2", "deviation of what springs add to a rigid vehicle, to the filter", default=10.0)
+    smoothing: float = quantity("Hz", "low-pass of angles before they are enforced", default=5.0)
+
+
+class Run(Strict):
+    """[run]."""
+
+    engine: Engine = Field(default="mujoco", description="that computes it; --engine names another")
+    step: float | None = quantity("s", "of Runge-Kutta 4; else the clock's period, or a part of it", default=None)
+
+
+class HandOn(Strict):
+    """[hand_on]: what the fatigue group gets."""
+
+    sections: list[str] | None = Field(default=None, description="springs, mounts, bars, joints; all if not named")
+    formats: list[Literal["csv", "mf4", "rsp", "tdms"]] = Field(default=["csv"], description="of the section forces")
+    slopes: list[float] = Field(default=[3.0, 5.0, 8.0], min_length=1, description="Woehler exponents")
+
+
+class MeasuredScene(SceneFile):
+    """One scene of a recording."""
+
+    system: Literal["measured"] = "measured"
+    study: str = Field(default="recording", description="the study that runs the scene")
+    vehicle: Vehicle
+    files: list[MeasuredFile] = Field(default=[], description="what was measured")
+    virtual: VirtualTable | None = Field(default=None, description="a virtual measurement in place of files")
+    levers: dict[str, float] = Field(
+        default={},
+        description="hub -> m by which the point that its moments are about "
+        "lies above it; of the contact patch minus the radius",
+    )
+    sensors: dict[str, Sensor] = Field(default={}, description="where accelerometers sit")
+    clock: Clock = Clock()
+    noise: Deviations = Deviations()
+    stabilise: Stabilise = Stabilise()
+    run: Run = Run()
+    limits: Limits = Field(default=LIMITS, description="of the verdict")
+    hand_on: HandOn = HandOn()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    def rig(self) -> Rig:
+        """The vehicle that is driven; raises InputError."""
+        own = self.vehicle
+        if own.file is None:
+            assert own.parameters is not None
+            return in_plane(own.parameters)
+        return in_space(
+            cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis), tuple(self.sensors)
+        )
+
+    def plane(self) -> Parameters | None:
+        """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
+        own = self.vehicle.parameters
+        return None if own is None else parameter_set(own, self.file, Path(self.folder))
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(MeasuredScene, table, file, folder)
+    _check_vehicle(scene)
+    if bool(scene.files) == (scene.virtual is not None):
+        raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")
+    names = [each.file for each in scene.files]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
+    return with_own(scene)
+
+
+def _check_vehicle(scene: MeasuredScene) -> None:
+    own = scene.vehicle
+    if (own.file is None) == (own.parameters is None):
+        raise InputError(
+            scene.file,
+            "vehicle",
+            None,
+            "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle",
+        )
+    if own.parameters is not None and "chassis" in own.model_fields_set:
+        raise InputError(scene.file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
+    if own.parameters is not None and scene.virtual is not None:
+        raise InputError(scene.file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")

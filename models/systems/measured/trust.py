@@ -1,0 +1,172 @@
+"""How long a free run of a vehicle in space on measured hub forces can be trusted, said before it starts.
+
+The cut vehicle as one rigid body (``models.multibody.cut_rigid``). An error of roll, pitch and heading, e (3,), obeys
+
+    e'' = A e + I^-1 (moment of noise and bias),
+
+with A = 0 where the forces turn with the vehicle (frames "hub" and "body"), and A = I^-1 diag(m g h, m g h, 0) where
+they keep their directions ("inertial"): what carries the vehicle from below its centre of mass topples it. Its impulse
+response is G = sinh(sqrt(A) t) / sqrt(A), so that white samples of covariance C, ``period`` apart, leave the variance
+int G q G^T dt with q = period I^-1 C I^-1: q t^3 / 3 where A = 0. A bias leaves int G dt I^-1 M, a tilt at the start
+cosh(sqrt(A) t) of itself, a rate G of itself.
+
+Forces that turn with the vehicle do not feel it: gravity acts on all bodies alike, and the section forces of such a
+run are right whatever its tilt is. What ends its trust for them is tumbling, when its angles lose their meaning. Where
+forces keep their directions an error of ``ANGLE`` turns as much of every force into another axis.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from models.engines.cut_vehicle import UPRIGHT
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_rigid import Rigid, rigid
+from models.systems.pitch_plane.trust import ANGLE, Trust
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+
+POINTS = 2000
+"""Times at which the laws are summed."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """How wrong a measurement is.
+
+    force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
+    hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
+    """
+
+    force: float
+    moment: float
+    bias: np.ndarray | None = None
+    tilt: tuple[float, float] = (0.0, 0.0)
+    rate: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What the errors of a measurement make of a free run.
+
+    means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
+    deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.
+    """
+
+    times: np.ndarray
+    means: dict[str, np.ndarray]
+    deviations: np.ndarray
+    rates: np.ndarray
+    frame: str = "hub"
+
+    def passes(self, angle: float = ANGLE, source: str | None = None) -> float | None:
+        """First time (s) at which half of all runs have roll or pitch off by more than ``angle`` (rad).
+
+        source : one of ``means`` or "noise" alone; None: all together.
+        """
+        mean = sum((own for name, own in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3)))
+        spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
+        beyond = _inside(mean[:, :2], spread[:, :2], angle) < 0.5
+        return float(self.times[beyond.argmax()]) if beyond.any() else None
+
+    @property
+    def angle(self) -> float:
+        """Error (rad) from which on the section forces of a free run are not trusted."""
+        return ANGLE if self.frame == "inertial" else UPRIGHT
+
+    @property
+    def trusted(self) -> float:
+        """Time (s) until which the section forces of a free run are trusted; at most that of the run."""
+        passed = self.passes(self.angle)
+        return float(self.times[-1]) if passed is None else passed
+
+    def trust(self, angle: float | None = None) -> Trust:
+        """Times by source; ``angle`` (rad) other than that of the section forces: 0.05 rad for the motion itself."""
+        limit = self.angle if angle is None else angle
+        times = {name: self.passes(limit, name) for name in ("noise", *self.means)}
+        return Trust({**times, "all together": self.passes(limit)}, float(self.rates.max()), limit)
+
+
+def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
+    """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
+    own, law = rigid(vehicle), _Law(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
+    deviation = np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
+    noise = period * own.turning(deviation)
+    spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
+    means = dict[str, np.ndarray]()
+    if level.bias is not None:
+        turning = np.linalg.solve(own.inertia, own.moments(np.asarray(level.bias, float)[None])[0])
+        means["bias"] = law.summed(law.impulse) @ turning
+    start, rate = np.array([*level.tilt, 0.0]), np.array([*level.rate, 0.0])
+    if start.any():
+        means["tilt at the start"] = law.step @ start
+    if rate.any():
+        means["rate at the start"] = law.impulse @ rate
+    return Drift(law.times, means, spread, law.rates, frame)
+
+
+def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray, frame: str) -> np.ndarray:
+    """Size (n, 3) in m of the error of x, y, z at times (n,) of a free run: noise, bias and tilt at the start.
+
+    Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
+    bias alone. One standard deviation of the noise beside the others' means.
+    """
+    own, deviation = rigid(vehicle), np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
+    mean = np.zeros((len(times), 3))
+    bias = np.zeros(len(deviation)) if level.bias is None else np.asarray(level.bias, float)
+    mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / own.mass)
+    if frame != "inertial":
+        turning = np.linalg.solve(own.inertia, own.moments(bias[None])[0])
+        for axis, about, sign in ((0, 1, 1.0), (1, 0, -1.0)):
+            tilt = level.tilt[about] * times**2 / 2 + level.rate[about] * times**3 / 6 + turning[about] * times**4 / 24
+            mean[:, axis] += sign * GRAVITY * tilt
+    return np.sqrt(mean**2 + own.position_variance(deviation, period, times, frame))
+
+
+@dataclass(frozen=True)
+class _Law:
+    """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
+
+    own: Rigid
+    frame: str
+    times: np.ndarray
+    _modes: tuple[np.ndarray, np.ndarray] = field(init=False)
+
+    def __post_init__(self) -> None:
+        carried = -self.own.arms[:, 2].mean() * self.own.mass * GRAVITY if self.frame == "inertial" else 0.0
+        values, shapes = np.linalg.eig(np.linalg.solve(self.own.inertia, np.diag([carried, carried, 0.0])))
+        object.__setattr__(self, "_modes", (np.sqrt(values.astype(complex)), shapes))
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Growth rates (3,), 1/s, 0 where an error does not grow by itself."""
+        return np.asarray(self._modes[0].real)
+
+    def _of(self, factors: np.ndarray) -> np.ndarray:
+        """Matrices (n, 3, 3) of modal factors (n, 3)."""
+        shapes = self._modes[1]
+        return np.asarray(((shapes * factors[:, None, :]) @ np.linalg.inv(shapes)).real)
+
+    @cached_property
+    def impulse(self) -> np.ndarray:
+        """G (n, 3, 3): angles after a sudden rate."""
+        turns = np.outer(self.times, self._modes[0])
+        return self._of(self.times[:, None] * np.sinc(1j * turns / np.pi))
+
+    @cached_property
+    def step(self) -> np.ndarray:
+        """(n, 3, 3): angles after a tilt."""
+        return self._of(np.cosh(np.outer(self.times, self._modes[0])))
+
+    def summed(self, values: np.ndarray) -> np.ndarray:
+        """Integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
+        steps = 0.5 * (values[1:] + values[:-1]) * self.times[1]
+        return np.concatenate((np.zeros_like(values[:1]), np.cumsum(steps, axis=0)))
+
+
+def _inside(mean: np.ndarray, deviation: np.ndarray, angle: float) -> np.ndarray:
+    """Share (n,) of normal errors of these means and deviations (n, axes) all of which are within +-angle."""
+    from scipy.special import ndtr
+
+    spread = np.maximum(deviation, 1e-300)
+    return np.asarray(np.prod(ndtr((angle - mean) / spread) - ndtr((-angle - mean) / spread), axis=1))

@@ -1,0 +1,223 @@
+"""A virtual measurement: a vehicle in space on a rough road, and what transducers on it would write into a file."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.steps import divides, fitting
+from models.core.strict import Strict, quantity
+from models.engines.cut_vehicle import HubRun, build
+from models.measured.columns import Columns
+from models.measured.faults_of_measurement import Faults, measured
+from models.measured.faults_of_measurement import check as check_faults
+from models.measured.recording import Recording
+from models.measured.signal import Quantity, Signal
+from models.multibody.cut_table import Drive
+from models.road.iso8608 import iso8608_road
+from models.sensors.rotations import from_cardan, matrix
+from models.sensors.virtual_accelerometers import in_space
+from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.scene import Frame, Road
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
+
+FILE_UNITS: dict[Quantity, tuple[str, float]] = {
+    "force": ("kN", 1e3),
+    "moment": ("N*m", 1.0),
+    "acceleration": ("m/s^2", 1.0),
+    "angular rate": ("deg/s", np.pi / 180),
+    "angle": ("deg", np.pi / 180),
+    "travel": ("mm", 1e-3),
+    "strain": ("-", 1.0),
+}
+"""Unit of each quantity in the files that are written, and its factor: those of a test track, not SI throughout."""
+HUB: tuple[tuple[str, Quantity, str], ...] = (
+    ("fx", "force", "x"),
+    ("fy", "force", "y"),
+    ("fz", "force", "z"),
+    ("mx", "moment", "x"),
+    ("my", "moment", "y"),
+    ("mz", "moment", "z"),
+)
+"""Channels of a hub, after its name and an underscore: quantity and component."""
+
+
+Place = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class VirtualTable(Strict):
+    """[virtual]: the vehicle on a road, and what is measured of it."""
+
+    road: Road = Field(default=Road(), description="two tracks of a random road")
+    duration: float = quantity("s", "of the measurement", default=15.0)
+    step: float = quantity("s", "of Runge-Kutta 4 on the road", default=1e-3)
+    sampling_rate: float = quantity("Hz", "of every channel", default=1000.0)
+    frame: Frame = Field(default="hub", description="axes of the hub forces")
+    accelerometers: dict[str, Place] = Field(
+        default={}, description="tri-axial ones on the chassis: name and place x, y, z in the vehicle's design axes, m"
+    )
+    travels: list[str] = Field(default=[], description="springs, mounts or bars whose travel is a check channel")
+    sections: list[str] = Field(default=[], description="springs, mounts or bars whose force is a check channel")
+    faults: Faults = Field(default=Faults(), description="what the transducers add to the truth")
+    format: str = Field(default="mf4", description="extension of the file that is written: csv, mf4, rsp or tdms")
+    seed: int = Field(default=1, ge=0, le=2**62, description="of noise and dropouts")
+
+
+@dataclass(frozen=True)
+class VirtualMeasurement:
+    """What would be recorded if nothing were wrong with any transducer.
+
+    signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
+    every : steps of a sampling period.
+    """
+
+    vehicle: CutVehicle
+    run: HubRun
+    signals: tuple[Signal, ...]
+    values: np.ndarray
+    every: int
+
+    @property
+    def step(self) -> float:
+        """s."""
+        return float(self.run.times[1])
+
+    @property
+    def period(self) -> float:
+        """Sampling period (s)."""
+        return self.step * self.every
+
+    def samples(self, faults: Faults, seed: int, path: int = 0) -> np.ndarray:
+        """Samples (m, signals), SI, with everything that the faults name; NaN where a transducer was silent."""
+        return measured(faults, self.signals, self.values, self.step, self.every, seed, path)
+
+
+def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, file: str = "") -> VirtualMeasurement:
+    """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed."""
+    signals = check(vehicle, own, file)
+    left, right = (iso8608_road(own.road.iso8608, own.road.seed + i) for i in range(2))
+    drive = two_tracks(vehicle, left, right, own.road.speed, own.step, round(own.duration / own.step))
+    run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
+    hubs = run.wrenches.reshape(len(run.times), -1)
+    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), _checks(vehicle, run, drive, own)])
+    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
+
+
+def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signal, ...]:
+    """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
+    period = 1.0 / own.sampling_rate
+    if not divides(own.step, own.duration):
+        raise InputError(
+            file,
+            "virtual.step",
+            own.step,
+            f"must divide virtual.duration = {own.duration:g} s, as {fitting(own.step, own.duration)} s does",
+        )
+    if not (divides(own.step, period) and divides(period, own.duration)):
+        raise InputError(
+            file,
+            "virtual.sampling_rate",
+            own.sampling_rate,
+            "its period must be a multiple of "
+            f"virtual.step = {own.step:g} s and divide virtual.duration = {own.duration:g} s",
+        )
+    known = tuple(element.name for element in vehicle.elements)
+    for place, names in (("travels", own.travels), ("sections", own.sections)):
+        for name in (name for name in names if name not in known):
+            raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
+    signals = _signals(vehicle, own)
+    check_faults(own.faults, signals, file)
+    return signals
+
+
+def _signal(channel: str, what: Quantity, at: str, component: str, frame: Frame, check: bool = False) -> Signal:
+    unit, factor = FILE_UNITS[what]
+    return Signal(channel, "", channel, what, at, component, frame, 1, unit, factor, check=check)
+
+
+def _signals(vehicle: CutVehicle, own: VirtualTable) -> tuple[Signal, ...]:
+    """Of hubs, motion and check channels, in the order of their columns."""
+    body, elements = vehicle.chassis, {element.name: element for element in vehicle.elements}
+    found = [_signal(f"{hub}_{name}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis in HUB]
+    found += [_signal(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
+    found += [_signal(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
+    found += [
+        _signal(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers for axis in "xyz"
+    ]
+    found += [
+        _signal(f"{name}_force", "force" if elements[name].unit == "N" else "moment", name, "", "body", True)
+        for name in own.sections
+    ]
+    return (*found, *(_signal(f"{name}_travel", "travel", name, "", "body", True) for name in own.travels))
+
+
+def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
+    """Roll and pitch, the rates about the chassis' own axes that gyros read, and its accelerometers (n, m)."""
+    from scipy.interpolate import make_interp_spline
+
+    n, angles = vehicle.size, run.states[:, [ROLL, PITCH]]
+    rates = body_rates(angles, run.states[:, [n + ROLL, n + PITCH, n + HEADING]])
+    if not places:
+        return np.hstack([angles, rates])
+    slopes = make_interp_spline(run.times, np.hstack([run.states[:, [n + X, n + Y, n + Z]], rates]), k=5).derivative()
+    felt, alpha = np.split(np.asarray(slopes(run.times)), 2, axis=1)
+    felt[:, 2] += GRAVITY
+    turn = matrix(from_cardan(angles[:, 0], angles[:, 1], run.states[:, HEADING]))
+    arms = np.array(list(places.values())) - np.array(vehicle.tree.body(vehicle.chassis).position)
+    readings = in_space(arms, np.einsum("nji,nj->ni", turn, felt), rates, alpha)
+    return np.hstack([angles, rates, readings.reshape(len(readings), -1)])
+
+
+def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Rates (n, 3) about the chassis' own axes, rad/s, of roll and pitch (n, 2), rad, and the rates (n, 3) of roll,
+    pitch and heading, which is turned first, then pitch, then roll."""
+    (roll, pitch), (droll, dpitch, dheading) = angles.T, rates.T
+    return np.column_stack(
+        [
+            droll - dheading * np.sin(pitch),
+            dpitch * np.cos(roll) + dheading * np.sin(roll) * np.cos(pitch),
+            -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch),
+        ]
+    )
+
+
+def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> np.ndarray:
+    """Forces and travels (n, m) of springs, mounts and bars, only to be compared with."""
+    names = [element.name for element in vehicle.elements]
+    forces = run.elements[:, [names.index(name) for name in own.sections]]
+    if not own.travels:
+        return forces
+    return np.hstack([forces, travels(vehicle, run, drive)[:, [names.index(name) for name in own.travels]]])
+
+
+def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
+    """Travel (n, elements) from the design position, m (rad of a bar), positive in compression, along a run."""
+    gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
+    model = build("reference", replace(vehicle, elements=gauges), drive, run.times[1], run.times[-1])
+    return model.reported(run.times, run.states).elements
+
+
+def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
+    """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
+    lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
+    for signal in signals:
+        entry = {
+            "channel": signal.channel,
+            "quantity": signal.quantity,
+            "at": signal.at,
+            "component": signal.component,
+            "frame": signal.frame,
+        }
+        text = ", ".join(f'{key} = "{value}"' for key, value in entry.items() if value)
+        lines.append(f"  {{ {text}{', check = true' if signal.check else ''} }},")
+    return "\n".join([*lines, "]", ""])
+
+
+def recording(found: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
+    """The samples (m, signals) as a recording, past all files and maps; ``path`` is where its columns lie."""
+    columns = Columns(path, tuple(signal.name for signal in found.signals), len(samples))
+    columns.write(0, samples)
+    return Recording(found.signals, columns, found.period)

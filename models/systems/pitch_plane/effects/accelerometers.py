@@ -1,0 +1,103 @@
+"""Tri-axial accelerometers on the chassis, on rigid mounts or on a bracket that gives way.
+
+They read the engine's own accelerations at their instants, and feed nothing back. Between their samples the
+reading is held.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.noise import ACCELEROMETERS, normal
+from models.core.strict import Strict, quantity
+from models.engines.assembly import Assembly
+from models.systems.pitch_plane.sampling import check_rate, numbers, read
+
+if TYPE_CHECKING:
+    from models.engines.protocol import Model, Trajectory
+
+COST = "one acceleration of the engine per sample after the run; no state in any engine"
+EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
+COUNTS = {"all": {"channels": 3}}
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values."""
+CHANNELS = ("ax1", "ay1", "az1 and so on, three per sensor")
+PLACE = "effects.accelerometers.sampling_rate"
+
+
+class Bracket(Strict):
+    """[effects.accelerometers.sensors.NAME.bracket]: what the sensor stands on, too light to move the body."""
+
+    frequency: float = quantity("Hz", "natural frequency of the sensor on its bracket")
+    damping: float = quantity("", "damping ratio", zero=True)
+
+
+class Sensor(Strict):
+    """[effects.accelerometers.sensors.NAME]: where it is, from the centre of mass along the chassis' own axes."""
+
+    x: float = quantity("m", "forward", signed=True)
+    y: float = quantity("m", "to the right", default=0.0, signed=True)
+    z: float = quantity("m", "down", signed=True)
+    bracket: Bracket | None = Field(None, description="a compliant mount; rigid where it is left out")
+
+
+class Parameters(Strict):
+    """[effects.accelerometers]."""
+
+    sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
+    sensors: dict[str, Sensor] = Field(min_length=1, description="tables with x, y, z of each sensor, by its name")
+    deviation: float = quantity("m/s^2", "standard deviation of each sample's white noise", default=0.0, zero=True)
+    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
+    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+
+    def positions(self) -> dict[str, tuple[float, float, float]]:
+        """Places (m) of all sensors by name."""
+        return {name: (sensor.x, sensor.y, sensor.z) for name, sensor in self.sensors.items()}
+
+
+def names(p: Parameters) -> list[tuple[str, ...]]:
+    """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
+    return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
+
+
+@dataclass(frozen=True)
+class Accelerometers:
+    """The sensors as an output of the run."""
+
+    parameters: Parameters
+
+    def __call__(self, assembly: Assembly, run: "Trajectory", model: "Model") -> Channels:
+        """Three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
+        p, number = self.parameters, numbers(run.times, self.parameters.sampling_rate)
+        row = read(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
+        values = self._felt(assembly, run, model, np.unique(row))[number]
+        return {
+            channel: ("m/s^2", f"accelerometer {sensor}, specific force along the chassis' {axis}", values[:, i, j])
+            for i, (sensor, channels) in enumerate(zip(p.sensors, names(p), strict=True))
+            for j, (axis, channel) in enumerate(zip("xyz", channels, strict=True))
+        }
+
+    def _felt(self, assembly: Assembly, run: "Trajectory", model: "Model", rows: np.ndarray) -> np.ndarray:
+        """Readings (samples, sensors, 3) at the rows of the sensors' instants."""
+        from models.sensors.virtual_accelerometers import on_bracket, readings
+
+        p, y = self.parameters, run.states[rows]
+        moved = np.array([model.acceleration(run.times[row], run.states[row]) for row in rows])
+        places = np.array(list(p.positions().values()))
+        values = readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
+        for i, sensor in enumerate(p.sensors.values()):
+            if sensor.bracket is not None:
+                values[:, i] = on_bracket(
+                    values[:, i], 1 / p.sampling_rate, sensor.bracket.frequency, sensor.bracket.damping
+                )
+        noise = normal(p.seed, p.path, len(values), 3 * len(places), source=ACCELEROMETERS)
+        return values + p.deviation * noise.reshape(values.shape)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with accelerometers among its results."""
+    check_rate(assembly.scene, PLACE, p.sampling_rate)
+    return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)))

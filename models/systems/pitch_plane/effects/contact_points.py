@@ -1,0 +1,98 @@
+"""Where the massless contact points of a force-excited vehicle are (rows 9 and 10 of eq. 37).
+
+With e = z - zeta each obeys d e' + k e = f alone: it feels the vehicle's force and never feeds back. So
+it is not a state of any engine but an exact filter over the samples of the force, whatever the run's steps.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.signals import Sampled, Smooth, Stacked
+from models.core.strict import Strict
+from models.engines.assembly import Assembly
+
+NEEDS = ("wheel_forces",)
+EXCLUDES = ("road",)
+AFTER = ("wheel_forces", "force_noise", "prescribed_pitch", "prescribed_heave_and_pitch")
+COST = "two exact first-order filters after the run; no state in any engine"
+EXAMPLE: dict[str, float] = {}
+COUNTS = {"all": {"channels": 2}}
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values."""
+CHANNELS = ("zeta1", "zeta2")
+
+
+class Parameters(Strict):
+    """[effects.contact_points]: no settings."""
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with the contact points among its results."""
+    if assembly.mode == "force-body":
+        raise InputError(
+            assembly.scene.file,
+            "effects.contact_points",
+            None,
+            "contact points move vertically: use frame = 'inertial' for the wheel forces",
+        )
+    return replace(assembly, outputs=(*assembly.outputs, contact_points))
+
+
+def contact_points(assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+    """Channels zeta1, zeta2 (m, down), starting with the tyres at rest under the first force."""
+    p, signal = assembly.parameters, assembly.input
+    forces = signal.parts[0] if isinstance(signal, Stacked) else signal
+    assert isinstance(forces, Sampled | Smooth)
+    pieces = forces.polynomials()
+    tyres = (("front", p.k1, p.d1), ("rear", p.k2, p.d2))
+    return {
+        f"zeta{i + 1}": (
+            "m",
+            f"contact point under the {name} wheel, down",
+            states[:, i] - compression(pieces[:, :, i], forces.period, stiffness, damping, times),
+        )
+        for i, (name, stiffness, damping) in enumerate(tyres)
+    }
+
+
+def compression(pieces: np.ndarray, period: float, stiffness: float, damping: float, times: np.ndarray) -> np.ndarray:
+    """Tyre compression e (n,) in m of d e' + k e = f at any times (n,) in s, exact for a polynomial f.
+
+    pieces : (powers, periods), the force (N) in the time since each sample, lowest power first.
+    On each piece e = P(t) + (e_0 - P(0)) exp(-t / tau) with tau = d / k and the particular solution
+    P = (f - tau f' + tau^2 f'' - ...) / k, which ends because f is a polynomial.
+    """
+    tau = damping / stiffness
+    particular = _particular(pieces, tau) / stiffness
+    piece = np.clip(np.floor(times / period + 1e-9).astype(int), 0, pieces.shape[1] - 1)
+    since = np.maximum(times - piece * period, 0.0)
+    found = sum(particular[power, piece] * since**power for power in range(len(particular)))
+    if tau == 0.0:
+        return np.asarray(found)
+    starts = _starts(particular, pieces[0, 0] / stiffness, period, tau)
+    return found + (starts - particular[0])[piece] * np.exp(-since / tau)
+
+
+def _particular(pieces: np.ndarray, tau: float) -> np.ndarray:
+    """Coefficients of f - tau f' + tau^2 f'' - ..., shape as ``pieces``."""
+    total, derivative = np.zeros_like(pieces), pieces.copy()
+    for order in range(len(pieces)):
+        total += (-tau) ** order * derivative
+        derivative = np.vstack([derivative[1:] * np.arange(1, len(pieces))[:, None], np.zeros_like(pieces[:1])])
+    return total
+
+
+def _starts(particular: np.ndarray, first: float, period: float, tau: float) -> np.ndarray:
+    """Compression at the start of each piece (m): that of the end of the one before it."""
+    powers = period ** np.arange(len(particular))
+    gained = powers @ particular - particular[0] * math.exp(-period / tau)
+    starts = np.empty(particular.shape[1])
+    starts[0] = first
+    for i in range(len(starts) - 1):
+        starts[i + 1] = gained[i] + starts[i] * math.exp(-period / tau)
+    return starts

@@ -1,0 +1,63 @@
+"""A bias on the gyro: a constant turn-on part and a slow first-order Gauss-Markov instability.
+
+The grade of an inertial unit, 0.001 to 10 degrees per hour, is a statement on this bias, not on its white noise.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.strict import Strict, quantity
+from models.engines.assembly import Assembly
+from models.sensors.gyro import DEGREES_PER_HOUR, bias
+from models.systems.pitch_plane.effects.gyro import Channels, Gyro
+from models.systems.pitch_plane.sampling import numbers
+
+NEEDS = ("gyro",)
+COST = "one filter over the gyro's samples after the run; no state in any engine"
+EXAMPLE = {"turn_on": 1.0}
+COUNTS = {"all": {"channels": 1}}
+
+CHANNELS = ("gyro_bias",)
+
+
+class Parameters(Strict):
+    """[effects.gyro_bias]."""
+
+    turn_on: float = quantity("deg/h", "standard deviation of the part that is drawn once and stays", zero=True)
+    instability: float = quantity("deg/h", "standard deviation of the part that wanders", default=0.0, zero=True)
+    correlation_time: float = quantity("s", "time in which the wandering part forgets itself", default=300.0)
+    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the bias")
+    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+
+
+@dataclass(frozen=True)
+class Biased:
+    """A gyro whose samples carry the bias."""
+
+    gyro: Gyro
+    parameters: Any
+
+    def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+        """Channel ``gyro`` with the bias on it, and ``gyro_bias`` alone (both rad/s)."""
+        p, rate = self.parameters, self.gyro.parameters.sampling_rate
+        unit, meaning, read = self.gyro(assembly, times, states)["gyro"]
+        number = numbers(times, rate)
+        drift = bias(
+            int(number[-1]) + 1,
+            1 / rate,
+            p.turn_on * DEGREES_PER_HOUR,
+            p.instability * DEGREES_PER_HOUR,
+            p.correlation_time,
+            p.seed,
+            p.path,
+        )[number]
+        return {"gyro": (unit, meaning, read + drift), "gyro_bias": ("rad/s", "bias of the gyro", drift)}
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with a biased gyro in place of its plain one."""
+    own = tuple(Biased(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
+    return replace(assembly, outputs=own)

@@ -1,0 +1,42 @@
+"""The paper's high-pass against drift, acting during the run: pitch slower than a cut-off is taken out.
+
+Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 + 2 zeta wc s + wc^2) in place of
+1, is algebraically a rotational spring and damper to the ground. The inertia that it works against is that of the
+chassis with the wheels on its arms, I + J (``models.drift.growth.rigid_pitch``): pitch drift moves the wheels along.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from models.core.strict import Strict, quantity
+from models.drift.growth import rigid_pitch
+from models.engines.assembly import Assembly
+from models.vehicles.description import PitchSpring
+from models.vehicles.pitch_plane import Parameters as Vehicle
+
+NEEDS = ("wheel_forces",)
+EXCLUDES = ("pitch_spring", "prescribed_pitch", "prescribed_heave_and_pitch")
+COST = "one native spring-damper"
+EXAMPLE = {"cut_off": 0.5}
+COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}
+
+
+class Parameters(Strict):
+    """[effects.high_pass]."""
+
+    cut_off: float = quantity("Hz", "pitch slower than this is taken for drift")
+    damping_ratio: float = quantity("1", "damping ratio of the high-pass", default=0.7, zero=True)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The force-excited vehicle whose slow pitch is held back."""
+    spring = PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio))
+    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
+    return replace(assembly, vehicle=vehicle)
+
+
+def spring_of(p: Vehicle, cut_off: float, damping_ratio: float = 0.7) -> tuple[float, float]:
+    """Stiffness k = (I + J) wc^2 in N m/rad and damping d = 2 zeta (I + J) wc in N m s/rad, cut_off in Hz."""
+    corner, inertia = 2 * math.pi * cut_off, rigid_pitch(p).total
+    return inertia * corner**2, 2 * damping_ratio * inertia * corner

@@ -1,0 +1,310 @@
+"""Pitch drawn by a moment towards what a Kalman filter makes of measured angle and rate, gaps and all.
+
+The filter runs before the simulation and alone, beside a vehicle of the scene's own parameters and forces
+(``pitch_filter``). The simulation then feels two moments. One is what the model's inertia lacks by the filter's
+estimate: its share of the suspension's moment. The other draws the pitch to the estimate,
+(I + J) (wc^2 (estimate - pitch) + 2 zeta wc (its rate - pitch rate)) with J of the wheels, wc = 2 pi bandwidth: a
+native rotational spring and damper, and a moment over time. So no estimate is differentiated, the forces stay
+functions of time and state alone, and every engine gets the very same estimate.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.signals import Sampled, Smooth
+from models.core.steps import divides
+from models.core.strict import Strict, quantity
+from models.core.tables import RADIANS, RADIANS_PER_SECOND
+from models.drift.growth import rigid_pitch
+from models.drift.innovations import Consistency, consistency
+from models.engines.assembly import Assembly
+from models.vehicles.description import PitchSpring
+
+if TYPE_CHECKING:
+    from models.systems.pitch_plane.pitch_filter import Estimate, Measurement
+
+NEEDS = ("wheel_forces",)
+EXCLUDES = ("pitch_spring", "high_pass", "prescribed_pitch", "prescribed_heave_and_pitch")
+AFTER = ("wheel_forces", "force_noise")
+COST = "a filter over all samples before the run, about 0.1 ms each; one native spring-damper and one moment over time"
+EXAMPLE = {"file": "pitch.csv", "force_deviation": 8.0, "pitch_deviation": 0.5}
+COUNTS = {
+    "exudyn": {"native items": 2, "callbacks": 1},
+    "mujoco": {"native items": 1, "callbacks": 1},
+    "all": {"channels": 10},
+}
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values."""
+CHANNELS = (
+    "kalman_moment",
+    "inertia_moment",
+    "pitch_estimate",
+    "pitch_rate_estimate",
+    "pitch_deviation",
+    "pitch_rate_deviation",
+    "inertia_share",
+    "kalman_used",
+    "kalman_missed",
+    "kalman_surprise",
+)
+
+
+BANDWIDTH = 3.0
+"""Hz. Above the filter's own, (q/r)^(1/4) = 1.2 Hz at 0.2 % of force noise and an angle of 0.1 degree white at 1 kHz,
+so that the vehicle follows what the filter corrects; not more, because all that is faster in the estimate is the
+measurement's noise: the moment's rms grows from 0.4 % of I pitch'' at 3 Hz to 1.4 % at 8 Hz."""
+
+
+SURPRISE = 4.0
+"""Largest mean of the normalised innovation squared with which a run is made: errors twice as large as stated. A right
+filter has 1; one that is sure of a model with 5 % wrong inertia 1.1 to 1.3."""
+
+
+class Parameters(Strict):
+    """[effects.kalman_filter]; a deviation per measured column, at least one."""
+
+    file: str = Field(
+        description="CSV with the columns time [s] and pitch [rad] and/or pitch_rate [rad/s]; nose up; "
+        "empty or nan where nothing was measured"
+    )
+    force_deviation: float = quantity("N", "standard deviation of the noise of each force sample")
+    pitch_deviation: float | None = quantity("rad", "standard deviation of each measured pitch", default=None)
+    rate_deviation: float | None = quantity("rad/s", "standard deviation of each measured pitch rate", default=None)
+    start_deviation: float = quantity("rad", "standard deviation of the pitch at the start", default=0.0, zero=True)
+    inertia_deviation: float = quantity(
+        "",
+        "standard deviation of the share by which the chassis' 1/I may be wrong; 0 trusts it",
+        default=0.0,
+        zero=True,
+    )
+    bandwidth: float = quantity("Hz", "of the moment that draws the vehicle to the estimate", default=BANDWIDTH)
+    damping_ratio: float = quantity("", "of the same", default=0.7)
+    smoother: bool = Field(False, description="use all measurements for every time, later ones too")
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The force-excited vehicle, drawn towards the estimate of its pitch."""
+    guide = guide_of(assembly, p)
+    _check_surprise(assembly, p, guide)
+    _check_bandwidth(assembly, p, guide)
+    stiffness, damping = pull(assembly, p)
+    moment = guide.values @ np.array([[stiffness], [damping]]) + guide.lacking[:, None]
+    spring = PitchSpring("chassis", stiffness, damping)
+    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
+    guided = replace(assembly, vehicle=vehicle).with_moment(Sampled(moment, guide.period, held=False))
+    return replace(
+        guided,
+        outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
+        doubts=(*guided.doubts, *_doubts(p, guide)),
+    )
+
+
+def pull(assembly: Assembly, p: Parameters) -> tuple[float, float]:
+    """Stiffness (N m/rad) and damping (N m s/rad) of the moment towards the estimate."""
+    corner, inertia = 2 * math.pi * p.bandwidth, rigid_pitch(assembly.parameters).total
+    return inertia * corner**2, 2 * p.damping_ratio * inertia * corner
+
+
+@dataclass(frozen=True)
+class Guide:
+    """What the run follows, at times i ``period`` (s).
+
+    states : (n, 7), the filter's (``models/systems/pitch_plane/pitch_filter.py``)
+    values, deviations : (n, 2), estimated pitch and rate (rad, rad/s) and their standard deviations
+    inertia : (n,), share by which 1/I is estimated above the model's; lacking : (n,), the moment (N m) to it
+    used, missed : (n,), measured values so far
+    surprise : (n,), sum of the normalised innovations squared so far
+    consistency : what all innovations say of the filter
+    """
+
+    period: float
+    states: np.ndarray
+    values: np.ndarray
+    deviations: np.ndarray
+    inertia: np.ndarray
+    lacking: np.ndarray
+    used: np.ndarray
+    missed: np.ndarray
+    surprise: np.ndarray
+    consistency: Consistency
+
+
+_LATEST: dict[str, Guide] = {}
+"""The last guide, by a digest of all that it depends on: a check and a run per engine need it once."""
+
+
+def guide_of(assembly: Assembly, p: Parameters) -> Guide:
+    """What a force-excited assembly would follow; raises InputError for a file that is none, RunFailed."""
+    from models.systems.pitch_plane.pitch_filter import estimate
+
+    measured = _measurement(assembly, p)
+    key = _digest(assembly, measured, p)
+    if key not in _LATEST:
+        found = estimate(
+            assembly,
+            measured,
+            p.force_deviation,
+            start_deviation=p.start_deviation,
+            inertia_deviation=p.inertia_deviation,
+            smoother=p.smoother,
+        )
+        _LATEST.clear()
+        _LATEST[key] = _read(assembly, found, measured)
+    return _LATEST[key]
+
+
+def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Guide:
+    from models.systems.pitch_plane.pitch_filter import INERTIA, PITCH, RATE, suspension_moment
+
+    deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
+    share, names = found.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    fits = consistency(found.innovations, [names[column] for column in measured.columns])
+    return Guide(
+        found.period,
+        found.states,
+        found.states[:, [PITCH, RATE]],
+        deviations,
+        share,
+        share * suspension_moment(assembly, found.states),
+        np.cumsum(found.used),
+        np.cumsum(found.missed),
+        np.nancumsum(found.surprises),
+        fits,
+    )
+
+
+def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
+    forces = assembly.input
+    assert isinstance(forces, Sampled | Smooth)
+    named = (
+        assembly.mode,
+        assembly.vehicle.geometry,
+        assembly.scene.run.duration,
+        forces.period,
+        forces.held,
+        type(forces).__name__,
+        measured.period,
+        measured.columns,
+        measured.deviations,
+        p.force_deviation,
+        p.start_deviation,
+        p.inertia_deviation,
+        p.smoother,
+    )
+    arrays = (assembly.parameters.array(), assembly.initial, forces.values, measured.values)
+    return sha256(b"".join((repr(named).encode(), *(array.tobytes() for array in arrays)))).hexdigest()
+
+
+def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
+    """The file's columns with their deviations; refuses what the filter could not use."""
+    from models.core.time_series import other_unit, read_time_series
+    from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
+
+    scene, place = assembly.scene, "effects.kalman_filter"
+    known = (("pitch", RADIANS, PITCH, p.pitch_deviation), ("pitch_rate", RADIANS_PER_SECOND, RATE, p.rate_deviation))
+    given = {name: (units, state, deviation) for name, units, state, deviation in known if deviation is not None}
+    if not given:
+        raise InputError(scene.file, place, None, "needs pitch_deviation, rate_deviation or both: the columns to read")
+    path = scene.path(p.file, f"{place}.file")
+    values, period = read_time_series(path, {name: own[0] for name, own in given.items()}, gaps=True)
+    for name, column in zip(given, values.T, strict=True):
+        if not np.isfinite(column).any():
+            raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
+    if len(values) * period < scene.run.duration * (1 - 1e-9):
+        raise InputError(
+            scene.file,
+            f"{place}.file",
+            p.file,
+            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s"
+            f"{other_unit(len(values) * period, scene.run.duration)}",
+        )
+    _check_periods(assembly, p, period)
+    return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))
+
+
+def _check_periods(assembly: Assembly, p: Parameters, period: float) -> None:
+    assert assembly.input is not None and assembly.input.period is not None
+    short, long = sorted((period, assembly.input.period))
+    if not divides(short, long):
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter.file",
+            p.file,
+            f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
+            "a multiple of the other",
+        )
+
+
+def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+    """A filter whose measurement contradicts its forces or its model would draw the vehicle anywhere."""
+    mean = float(guide.surprise[-1] / max(guide.used[-1], 1))
+    if mean > SURPRISE:
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter",
+            None,
+            f"{p.file} contradicts forces and model: the squares of the innovations are {mean:.3g} times "
+            f"what the deviations allow (at most {SURPRISE:g}): check sign and unit, or state larger ones",
+        )
+
+
+def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
+    """What the filter's own innovations say against it."""
+    if guide.consistency.consistent:
+        return ()
+    square = guide.consistency.figures[0]
+    known = f"the stated deviation of the pitch, up to {guide.deviations[:, 0].max():.2g} rad, is not to be relied upon"
+    remedy = (
+        "the stated deviations are too large: state smaller ones"
+        if square.value < square.low
+        else f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
+    )
+    return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
+
+
+def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:
+    """A moment that is slower than the pitch runs away cannot hold it : only vertical forces make it run."""
+    if assembly.mode != "force" or assembly.vehicle.geometry != "exact":
+        return
+    share = math.sqrt(assembly.parameters.I / rigid_pitch(assembly.parameters).total)
+    growth = share * float(np.sqrt(np.mean(guide.values[:, 1] ** 2)))
+    if 2 * math.pi * p.bandwidth <= growth:
+        raise InputError(
+            assembly.scene.file,
+            "effects.kalman_filter.bandwidth",
+            p.bandwidth,
+            f"must be above {growth / (2 * math.pi):.3g} Hz: a pitch error grows at {growth:.3g} 1/s here",
+        )
+
+
+def _channels(
+    guide: Guide, stiffness: float, damping: float, assembly: Assembly, times: np.ndarray, states: np.ndarray
+) -> Channels:
+    """The moment and what it follows, at the saved times."""
+    grid = guide.period * np.arange(len(guide.values))
+    pitch, rate, pitch_deviation, rate_deviation, inertia, lacking = (
+        np.interp(times, grid, column)
+        for column in (*guide.values.T, *guide.deviations.T, guide.inertia, guide.lacking)
+    )
+    latest = np.clip(np.floor(times / guide.period + 1e-6).astype(int), 0, len(grid) - 1)
+    moment = stiffness * (pitch - states[:, 3]) + damping * (rate - states[:, 7])
+    return {
+        "kalman_moment": ("N m", "artificial moment towards the estimated pitch, nose up", moment),
+        "inertia_moment": ("N m", "artificial moment that the model's inertia lacks, nose up", lacking),
+        "pitch_estimate": ("rad", "estimated pitch, nose up", pitch),
+        "pitch_rate_estimate": ("rad/s", "estimated rate of pitch, nose up", rate),
+        "pitch_deviation": ("rad", "standard deviation of the estimated pitch", pitch_deviation),
+        "pitch_rate_deviation": ("rad/s", "standard deviation of its estimated rate", rate_deviation),
+        "inertia_share": ("", "share by which 1/I of the chassis is estimated to exceed the scene's", inertia),
+        "kalman_used": ("", "measured values that the filter has taken in so far", guide.used[latest]),
+        "kalman_missed": ("", "measured values so far that were no numbers", guide.missed[latest]),
+        "kalman_surprise": ("", "sum of the normalised innovations squared so far", guide.surprise[latest]),
+    }

@@ -1,0 +1,48 @@
+"""A sensor that reads the chassis' pitch: white noise on each sample, as of an inertial unit that gives angles.
+
+It is read only, and feeds nothing back. Between its samples the reading is held.
+"""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.noise import PITCH_SENSOR, normal
+from models.core.strict import Strict, quantity
+from models.engines.assembly import Assembly
+from models.systems.pitch_plane.sampling import check_rate, numbers, read
+
+COST = "one reading after the run; no state in any engine"
+EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.01}
+COUNTS = {"all": {"channels": 1}}
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values."""
+CHANNELS = ("pitch_reading",)
+PLACE = "effects.pitch_sensor.sampling_rate"
+
+
+class Parameters(Strict):
+    """[effects.pitch_sensor]."""
+
+    sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
+    deviation: float = quantity("rad", "standard deviation of each sample", zero=True)
+    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
+    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with a pitch reading among its results."""
+    check_rate(assembly.scene, PLACE, p.sampling_rate)
+    return replace(assembly, outputs=(*assembly.outputs, partial(pitch_reading, p)))
+
+
+def pitch_reading(p: Any, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
+    """Channel ``pitch_reading`` (rad), nose up."""
+    true = read(times, states[:, 3], p.sampling_rate, assembly.scene, PLACE)
+    number = numbers(times, p.sampling_rate)
+    noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=PITCH_SENSOR)[:, 0]
+    return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", true + noise[number])}

@@ -1,0 +1,28 @@
+"""A rotational spring and damper between chassis and ground: the folk remedy against drift."""
+
+from dataclasses import replace
+from typing import Any
+
+from models.core.strict import Strict, quantity
+from models.engines.assembly import Assembly
+from models.vehicles.description import PitchSpring
+
+EXCLUDES = ("prescribed_pitch", "prescribed_heave_and_pitch")
+COST = "one native spring-damper; with a dead band a law of its own, compiled in MuJoCo and in Python in Exudyn"
+EXAMPLE = {"stiffness": 2e4, "damping": 1e3}
+COUNTS = {"exudyn": {"native items": 1}, "mujoco": {"native items": 1}}
+
+
+class Parameters(Strict):
+    """[effects.pitch_spring]."""
+
+    stiffness: float = quantity("N m/rad", "rotational stiffness to the ground")
+    damping: float = quantity("N m s/rad", "rotational damping to the ground", default=0.0, zero=True)
+    dead_band: float = quantity("rad", "no moment within this pitch to either side of zero", default=0.0, zero=True)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The assembly with the spring on its chassis."""
+    spring = PitchSpring("chassis", p.stiffness, p.damping, p.dead_band)
+    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
+    return replace(assembly, vehicle=vehicle)

@@ -1,0 +1,140 @@
+"""A road under the wheels (eq. 38): from a formula, an ISO 8608 class, or a measured file."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.strict import Strict, quantity
+from models.engines.assembly import Assembly
+
+EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
+COST = "height and slope under each wheel, read from a table of half steps"
+EXAMPLE = {"source": "study", "speed": 20.0}
+COUNTS = {"exudyn": {"native items": 4, "callbacks": 4}, "mujoco": {"callbacks": 1}, "all": {"channels": 2}}
+
+OWN = {
+    "study": ("gd", "grade"),
+    "hills": ("grade",),
+    "iso8608": ("road_class", "seed", "level", "grade"),
+    "opencrg": ("file", "track", "offset", "beyond_end", "run_in"),
+    "csv": ("file", "track", "beyond_end", "run_in"),
+}
+"""Which keys belong to which source; a measured road has a grade of its own, which no key may change."""
+NEEDED = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
+STEEPEST = 0.5
+"""Slope angles (rad) stay below this: beyond it the vehicle, whose wheels move vertically, is no model any more."""
+
+
+class Parameters(Strict):
+    """[effects.road]; keys beyond source and speed belong to one source each."""
+
+    source: Literal["study", "hills", "iso8608", "opencrg", "csv"] = Field(description="where the road comes from")
+    speed: float = quantity("m/s", "constant speed of the vehicle")
+    gd: float | None = quantity("m^3", "study: one-sided roughness at 0.1 1/m", default=None)
+    grade: float | None = Field(
+        None,
+        gt=-STEEPEST,
+        lt=STEEPEST,
+        json_schema_extra={"unit": "rad"},
+        description="study, hills, iso8608: slope angle that the road comes to after its fade-in, positive uphill",
+    )
+    road_class: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(None, description="iso8608: class")
+    seed: int | None = Field(None, ge=0, lt=2**128, description="iso8608: seed of the phases")
+    level: Literal["one-sided", "two-sided"] | None = Field(None, description="iso8608: how the class's level is read")
+    file: str | None = Field(None, description="opencrg, csv: the measured road")
+    track: Literal["left", "right", "mean", "centre"] | None = Field(None, description="opencrg, csv: which track")
+    offset: float | None = quantity("m", "opencrg: lateral place of the vehicle", default=None, signed=True)
+    beyond_end: Literal["mirrored", "refused"] | None = Field(None, description="opencrg, csv: how the road goes on")
+    run_in: float | None = quantity("m", "opencrg, csv: length over which the road rises from the flat", default=None)
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The vehicle driven over the road."""
+    from models.road.signal import RoadUnderWheels
+
+    _check_keys(assembly.scene.file, p)
+    distance = p.speed * assembly.scene.run.duration
+    profile, kinks = _profile(assembly.scene, p, distance)
+    wheelbase = assembly.parameters.a + assembly.parameters.b
+    return assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
+
+
+def _check_keys(file: str, p: Parameters) -> None:
+    given = [name for name in type(p).model_fields if name not in ("source", "speed") and getattr(p, name) is not None]
+    for name in given:
+        if name not in OWN[p.source]:
+            own = ", ".join(("speed", *OWN[p.source]))
+            raise InputError(
+                file,
+                f"effects.road.{name}",
+                getattr(p, name),
+                f"has no meaning for source = {p.source!r}, which takes {own}",
+            )
+    for name in NEEDED.get(p.source, ()):
+        if name not in given:
+            meaning = str(type(p).model_fields[name].description).partition(": ")[2]
+            raise InputError(
+                file, f"effects.road.{name}", None, f"is missing: source = {p.source!r} needs it ({meaning})"
+            )
+
+
+def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
+    """The profile, and the stations (m) at which it is only C2."""
+    if p.source in ("opencrg", "csv"):
+        profile = _measured(scene, p, distance)
+        return profile, (profile.start, profile.start + profile.window_length)
+    if p.source == "iso8608":
+        from models.road.iso8608 import iso8608_road
+
+        assert p.road_class is not None
+        profile = iso8608_road(p.road_class, 0 if p.seed is None else p.seed, level=p.level or "one-sided")
+    else:
+        from models.road.study import STUDY_GD, hills_road, study_road
+
+        profile = hills_road() if p.source == "hills" else study_road(STUDY_GD if p.gd is None else p.gd)
+    return _graded(profile, p.grade)
+
+
+def _graded(profile: Any, grade: float | None) -> tuple[Any, tuple[float, ...]]:
+    """The profile, on a grade where one is named, and the stations (m) at which it is only C2."""
+    faded_in = profile.window_length
+    if grade is None:
+        return profile, (0.0, faded_in)
+    from models.road.grade import TRANSITION, Graded
+
+    return Graded(profile, grade, faded_in), (0.0, faded_in, faded_in + TRANSITION)
+
+
+def _measured(scene: Any, p: Parameters, distance: float) -> Any:
+    from models.road.continuation import RUN_IN, continued, run_in
+
+    path, track = scene.path(p.file, "effects.road.file"), p.track or "mean"
+    length = RUN_IN if p.run_in is None else p.run_in
+    if p.source == "opencrg":
+        from models.road.opencrg import read_opencrg
+
+        raw = read_opencrg(path, track, offset=0.0 if p.offset is None else p.offset)
+    else:
+        from models.road.csv_road import read_csv_road
+
+        raw = read_csv_road(path, track)
+    _check_length(scene, p, raw, distance, length)
+    longer = continued(raw, str(p.beyond_end), distance, path)
+    assert isinstance(longer, type(raw))
+    return run_in(longer, length)
+
+
+def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: float) -> None:
+    """Refuse in the scene's own words what the road's file makes impossible."""
+    total = raw.end - raw.start
+    if run_in > total:
+        raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")
+    if p.beyond_end == "refused" and distance > total * (1 + 1e-9):
+        raise InputError(
+            scene.file,
+            "effects.road.beyond_end",
+            "refused",
+            f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
+            "run.duration, lower effects.road.speed or set this to 'mirrored'",
+        )

@@ -1,0 +1,101 @@
+"""Wheel forces prescribed from a file (eq. 37): the vehicle is cut off the road."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.signals import Interpolation, sampled
+from models.core.strict import Strict
+from models.core.tables import NEWTONS
+from models.engines.assembly import Assembly
+
+if TYPE_CHECKING:
+    from models.core.finding import Finding
+    from models.measured.signal import Signal
+
+EXCLUDES = ("road",)
+COST = "one force per wheel, read from a table; no tyre"
+EXAMPLE = {"file": "forces.csv", "interpolation": "held"}
+COUNTS = {"exudyn": {"callbacks": 3}}
+"""Two forces stand in the place of two tyres. Held ones take one callback before each of Exudyn's steps beside one per
+wheel, and none in MuJoCo."""
+
+
+class Parameters(Strict):
+    """[effects.wheel_forces]."""
+
+    file: str = Field(description="CSV with the columns time [s], front [N], rear [N]; forces up on the wheels")
+    interpolation: Interpolation = Field(description="held, linear or smooth between the samples")
+    frame: Literal["inertial", "body"] = Field("inertial", description="axis of the forces: vertical, or the chassis'")
+    accept: list[
+        Literal["weight", "balance", "sign", "unit", "swapped", "start", "times", "copied", "spikes", "clipped"]
+    ] = Field([], description="findings of the checks against the vehicle's weight that are meant as they are")
+
+
+def extend(assembly: Assembly, p: Any) -> Assembly:
+    """The vehicle without tyres, driven by the two forces."""
+    from models.core.time_series import other_unit, read_time_series
+
+    scene = assembly.scene
+    columns = {"front": NEWTONS, "rear": NEWTONS}
+    values, period = read_time_series(scene.path(p.file, "effects.wheel_forces.file"), columns)
+    signal = sampled(values, period, p.interpolation)
+    if signal.end < scene.run.duration * (1 - 1e-9):
+        raise InputError(
+            scene.file,
+            "effects.wheel_forces.file",
+            p.file,
+            f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration"
+            f"{other_unit(signal.end, scene.run.duration)}",
+        )
+    turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
+    driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
+    return replace(driven, doubts=(*driven.doubts, *_judged(driven, p, values, period)))
+
+
+def _judged(assembly: Assembly, p: Parameters, values: np.ndarray, period: float) -> tuple[str, ...]:
+    """Doubts about forces (n, 2) in N that cannot be this vehicle's; InputError for what is beyond doubt."""
+    from models.measured.axle_forces import IN_FILE, AxleForces, check
+    from models.measured.signal import Signal
+
+    front, rear = (
+        Signal(axle, p.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
+    )
+    scene = assembly.scene
+    own = AxleForces(
+        values,
+        period,
+        assembly.parameters,
+        ((front,), (rear,)),
+        scene.run.duration,
+        IN_FILE,
+        rests=not scene.start,
+        turn=assembly.mode == "force-body",
+    )
+    looked = (*check(own), *_samples((front, rear), values, period))
+    findings = tuple(each for each in looked if each.weight != "note" and each.check not in p.accept)
+    errors = [each for each in findings if each.weight == "error"]
+    if errors:
+        names = ", ".join(f'"{name}"' for name in dict.fromkeys(each.check for each in errors))
+        raise InputError(
+            scene.file,
+            "effects.wheel_forces.file",
+            p.file,
+            f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
+        )
+    return tuple(each.text for each in findings)
+
+
+def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -> "list[Finding]":
+    """Samples that no wheel has felt: spikes, and what a range has cut off. A lifted wheel's zeros are neither."""
+    from models.measured.checks import clipped, spikes
+    from models.measured.checks.evidence import Evidence
+    from models.measured.columns import MemoryColumns
+    from models.measured.recording import Recording
+
+    felt = MemoryColumns(tuple(s.name for s in signals), np.where(values == 0.0, np.nan, values))
+    evidence = Evidence(Recording(signals, felt, period), None)
+    return [*spikes.check(evidence), *(found for found in clipped.check(evidence) if found.unit == "%")]

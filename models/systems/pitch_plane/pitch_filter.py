@@ -1,0 +1,221 @@
+"""An extended Kalman filter beside a force-excited vehicle: its pitch from measured angle and rate, gaps and all.
+
+filterpy's ``ExtendedKalmanFilter`` (Joseph form) over the samples of the wheel forces. The prediction is the
+vehicle's own nonlinear step (the reference's Runge-Kutta), its Jacobians are that same step's, and the process
+noise is the exact response of a step to the noise of its force samples: no exponential of a stiff matrix is taken.
+
+State: (z1 - z3, z2 - z3, pitch) and their rates, m and rad, and the share by which 1/I differs from the model's.
+Equations (37) do not feel where the vehicle stands or how fast it falls as a whole, and no measured pitch shows it:
+with the absolute heave among the states their covariance would grow for ever as t^3 beside entries of 1e-10.
+The inertia is what a wrong model errs by: wheel forces turn the vehicle as d/dt (I pitch' - b m1 z1' + a m2 z2')
+= b f1 - a f2 whatever its springs and dampers are. A filter that trusts a wrong inertia either follows the
+measurement's noise or lacks as much of every fast motion as the inertia is wrong.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
+
+from models.core.errors import RunFailed
+from models.engines.assembly import Assembly
+from models.systems.pitch_plane.pitch_step import RELATIVE, PitchStep
+from models.vehicles.pitch_plane_equations import suspension
+
+PITCH, RATE, INERTIA, STATES = 2, 5, 6, 7
+"""Where pitch, its rate and the inertia's share stand in the filter's state, and how long it is."""
+KNOWN = 1e-6
+"""Deviation (m, rad, m/s, rad/s, share) of what is known at the start: nothing beside any measurement, but not 0."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Measured pitch and/or pitch rate.
+
+    values : (n, columns) in rad and rad/s, the first row at t = 0; NaN where nothing was measured
+    period : s; columns : PITCH, RATE or both; deviations : white noise of each column, per sample
+    """
+
+    values: np.ndarray
+    period: float
+    columns: tuple[int, ...]
+    deviations: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the filter, or the smoother, found at times i ``period`` (s), n of them.
+
+    states : (n, 7), see above
+    covariances : (n, 7, 7), without what the force sample of that very instant has done already
+    pending : (n, 7, 2), what it has: a root of its covariance
+    used, missed : (n,) measured values that were taken in, and that were no numbers
+    surprises : (n,) normalised innovation squared, chi-square of ``used`` degrees of freedom where the filter is
+        consistent; NaN where nothing was measured
+    innovations : (n, columns), whitened: independent and of deviation 1 where it is; NaN where nothing was measured
+    """
+
+    period: float
+    states: np.ndarray
+    covariances: np.ndarray
+    pending: np.ndarray
+    used: np.ndarray
+    missed: np.ndarray
+    surprises: np.ndarray
+    innovations: np.ndarray
+
+    def errors(self) -> np.ndarray:
+        """Covariance (n, 7, 7) of the states' errors."""
+        return self.covariances + self.pending @ self.pending.transpose(0, 2, 1)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """Of the step that ends at each time: its prediction (n, 7), transition and noise (n, 7, 7)."""
+
+    predictions: np.ndarray
+    transitions: np.ndarray
+    noises: np.ndarray
+
+
+class PitchFilter(ExtendedKalmanFilter):
+    """The vehicle over one step after the other; ``x`` (7,), ``P`` (7, 7) as filterpy names them."""
+
+    def __init__(
+        self, step: PitchStep, start: np.ndarray, covariance: np.ndarray, intensity: float, measured: Measurement
+    ) -> None:
+        """start (7,), covariance (7, 7); intensity: variance (N^2) of a force sample, per step of the filter."""
+        super().__init__(dim_x=STATES, dim_z=1)
+        self.step, self.intensity, self.measured = step, intensity, measured
+        self.x, self.P = start.copy(), covariance.copy()
+        self.late = np.zeros((STATES, 2))
+        self._there = np.isfinite(measured.values) @ (1 << np.arange(len(measured.columns)))
+        self._seen = [self._of(there) for there in range(1 << len(measured.columns))]
+
+    def predict_x(self, u: Any = 0) -> None:
+        """State and Jacobians over step number ``u``.
+
+        A force sample that is read linearly acts on the step before it, too. That part, ``late``, is not in P: it
+        joins one step later, with what the same sample does then. So the noise that joins is white, and the
+        covariance of the error is P with the part that is late.
+        """
+        self.x, self.F, early, late = self.step.advance(self.x, u)
+        push = early + self.F.dot(self.late)
+        self.Q, self.late = self.intensity * push.dot(push.T), late
+
+    def measure(self, number: int) -> np.ndarray:
+        """Take in what is a number in a row of the measurement: the whitened innovations (columns,), NaN where none."""
+        white, there = np.full(len(self.measured.columns), math.nan), self._there[number]
+        if not there:
+            return white
+        chosen, rows, own = self._seen[there]
+        late = rows.dot(self.late)
+        values = self.measured.values[number, chosen]
+        self.update(values, lambda x: rows, rows.dot, R=own + self.intensity * late.dot(late.T))
+        white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
+        return white
+
+    def _of(self, there: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Columns that the bits of a number name, what each sees of the state (m, 7), and its noise (m, m)."""
+        chosen = np.array([i for i in range(len(self.measured.columns)) if there >> i & 1], dtype=int)
+        return (
+            chosen,
+            self._I[[self.measured.columns[i] for i in chosen]],
+            np.diag([self.measured.deviations[i] ** 2 for i in chosen]),
+        )
+
+
+def estimate(
+    assembly: Assembly,
+    measured: Measurement,
+    deviation: float,
+    *,
+    start_deviation: float = 0.0,
+    inertia_deviation: float = 0.0,
+    smoother: bool = False,
+) -> Estimate:
+    """Filter the pitch of a force-excited assembly over its run.
+
+    deviation : N, standard deviation of the noise of each force sample, white
+    start_deviation : rad, that of the pitch at the start, the vehicle turned as a whole
+    inertia_deviation : standard deviation of the share by which 1/I may differ from the model's; 0 trusts it
+    smoother : whether each estimate knows of later measurements, too
+
+    The steps are the finer of the two sampling periods, of which the coarser one is a multiple; between force
+    samples that are coarser the noise keeps its intensity, not its correlation over their period. Raises RunFailed
+    if anything that is not a number reaches the estimate.
+    """
+    assert assembly.input is not None and assembly.input.period is not None
+    period = min(assembly.input.period, measured.period)
+    step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
+    start = _start(assembly, start_deviation, inertia_deviation)
+    found, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
+    return _smoothed(found, steps) if smoother else found
+
+
+def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
+    """Predict over each step, take in what was measured at its end, and keep everything."""
+    n, period, measured = own.step.count + 1, own.step.period, own.measured
+    every, width = round(measured.period / period), len(measured.columns)
+    states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
+    covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
+    missed, innovations = np.zeros(n, dtype=int), np.full((n, width), np.nan)
+    for i in range(n):
+        if i:
+            own.predict(i - 1)
+        if not math.isfinite(own.x.dot(own.P).dot(own.x)):
+            raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
+        predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
+        if i % every == 0 and i // every < len(measured.values):
+            innovations[i] = own.measure(i // every)
+            missed[i] = np.count_nonzero(np.isnan(innovations[i]))
+        states[i], covariances[i], pending[i] = own.x, own.P, own.late
+    pending *= math.sqrt(own.intensity)
+    used = np.count_nonzero(np.isfinite(innovations), axis=1)
+    surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
+    found = Estimate(period, states, covariances, pending, used, missed, surprises, innovations)
+    return found, _Steps(predictions, transitions, noises)
+
+
+def _smoothed(found: Estimate, steps: _Steps) -> Estimate:
+    """The same by filterpy's Rauch-Tung-Striebel smoother.
+
+    It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
+    """
+    n = len(found.states)
+    states, covariances = np.ones((n, 8)), np.zeros((n, 8, 8))
+    transitions, noises = np.zeros((n, 8, 8)), np.zeros((n, 8, 8))
+    states[:, :7], covariances[:, :7, :7], noises[:, :7, :7] = found.states, found.covariances, steps.noises
+    transitions[:, :7, :7], transitions[:, 7, 7] = steps.transitions, 1.0
+    linear = np.einsum("nij,nj->ni", steps.transitions[1:], found.states[:-1])
+    transitions[1:, :7, 7] = steps.predictions[1:] - linear
+    states, covariances, _, _ = KalmanFilter(8, 1).rts_smoother(states, covariances, transitions, noises, _inverse)
+    return replace(found, states=states[:, :7], covariances=covariances[:, :7, :7])
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of the covariance of seven states and an eighth that is certain."""
+    found = np.zeros((8, 8))
+    found[:7, :7] = np.linalg.inv(matrix[:7, :7])
+    return found
+
+
+def suspension_moment(assembly: Assembly, states: np.ndarray) -> np.ndarray:
+    """Moment (n,) in N m of the suspension on the chassis, nose up, at filter states (n, 7); eqs (35) and (36)."""
+    p, (front, rear, pitch, front_rate, rear_rate, rate, _) = assembly.parameters, states.T
+    exact = assembly.vehicle.geometry == "exact"
+    sine, cosine = (np.sin(pitch), np.cos(pitch)) if exact else (pitch, np.ones_like(pitch))
+    still = np.zeros_like(pitch)
+    f3, f4 = suspension((front, rear, still, pitch, front_rate, rear_rate, still, rate), p.array(), sine, cosine)
+    return cosine * (p.b * f3 - p.a * f4)
+
+
+def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:
+    """State and covariance at the start: the vehicle turned as a whole by ``turn`` (rad), its inertia's share."""
+    p = assembly.parameters
+    turned = turn * np.array([-p.b, p.a, 1.0, 0.0, 0.0, 0.0, 0.0])
+    covariance = np.outer(turned, turned) + KNOWN**2 * np.eye(STATES)
+    covariance[INERTIA, INERTIA] += inertia**2
+    return np.append(RELATIVE @ assembly.initial, 0.0), covariance

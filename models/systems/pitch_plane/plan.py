@@ -1,0 +1,137 @@
+"""What a scene will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.core.errors import Refused
+from models.core.finding import Finding
+from models.core.scene_effects import lines as effect_lines
+from models.core.scene_effects import module_of
+from models.core.systems import DEFAULT
+from models.engines.assembly import Assembly
+from models.engines.catalogue import CATALOGUE
+from models.engines.protocol import build
+from models.engines.protocol import check as check_engine
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.run import state_names
+from models.systems.pitch_plane.scene import Scene, settings_of
+from models.vehicles.plausible_plane import plausible_plane
+
+MODES = {
+    "free": "free motion on the flat road",
+    "road": "excited by a road (eq. 38)",
+    "force": "excited by wheel forces in the inertial frame (eq. 37)",
+    "force-body": "excited by wheel forces in the chassis' frame",
+    "pitch": "excited by wheel forces, pitch prescribed (eq. 39)",
+    "heave-pitch": "excited by wheel forces, heave and pitch of the chassis prescribed",
+}
+
+
+def check(scene: Scene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    assembly = assemble(scene)
+    for engine in engines:
+        try:
+            check_engine(engine, assembly, settings_of(scene, engine))
+        except Refused as error:
+            raise Refused(error.engine, error.why, scene.file) from None
+
+
+def findings(scene: Scene) -> tuple[Finding, ...]:
+    """Queries about the vehicle, and doubts about what drives and what holds it."""
+    doubts = (Finding("input", "doubt", scene.file, text) for text in assemble(scene).doubts)
+    return (*plausible_plane(scene.vehicle_parameters(), scene.vehicle.accept), *doubts)
+
+
+def describe(scene: Scene) -> str:
+    """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
+    assembly = assemble(scene)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines += [_line("motion", _motion(scene, assembly))]
+    lines += _vehicle(scene, assembly) + effect_lines(scene)
+    lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
+    lines += ["", *_engines(scene, assembly)]
+    return "\n".join(lines)
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _motion(scene: Scene, assembly: Assembly) -> str:
+    return f"{MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
+
+
+def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
+    """Parameter set, bodies, struts and start, a line each."""
+    own, vehicle = scene.vehicle, assembly.vehicle
+    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
+    lines = [_line("vehicle", own.parameters + (f", but {changed}" if changed else ""))]
+    for body in vehicle.bodies:
+        inertia = "" if body.pitch_inertia is None else f", {body.pitch_inertia:g} kg m^2"
+        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
+    for strut in vehicle.struts:
+        ends = f"{strut.upper.body} - {strut.lower.body or 'ground'}"
+        pushes = ", only pushes" if strut.pushes_only else ""
+        text = f"{strut.name:<12} {strut.stiffness:g} N/m, {strut.damping:g} N s/m, {ends}{pushes}"
+        lines.append(_line("  strut", text))
+    for spring in vehicle.pitch_springs:
+        band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
+        text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"
+        lines.append(_line("  spring", text))
+    values = zip(state_names(), assembly.initial, strict=True)
+    start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
+    return [*lines, _line("states", ", ".join(state_names())), _line("start", start or "all zero")]
+
+
+def _channels(assembly: Assembly) -> list[str]:
+    names = ["states", "f1", "f2", "f3", "f4", "suspension_moment"]
+    names += ["zeta1", "zeta2"] if assembly.mode == "road" else []
+    names += ["enforced_force"] if assembly.mode == "heave-pitch" else []
+    names += ["inertia_term", "enforced_moment"] if assembly.guided else []
+    return names + [channel for name in assembly.scene.effects for channel in module_of(DEFAULT, name).CHANNELS]
+
+
+def trust_line(assembly: Assembly) -> list[str]:
+    """How long the pitch of a force-excited run can be trusted, one line; none for a road or a guided run."""
+    if assembly.mode not in ("force", "force-body"):
+        return []
+    from models.systems.pitch_plane.trust import trust
+
+    found = trust(assembly)
+    if found is None:
+        return []
+    if found.until is None and assembly.doubts:
+        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {found.unchecked}")]
+    return [_line("trust", str(found))]
+
+
+def doubt_lines(assembly: Assembly) -> list[str]:
+    """What contradicts the scene, a line each."""
+    return [_line("doubt", text) for text in assembly.doubts]
+
+
+HEADINGS = ("engine", "integrator", "order", "step", "steps", "freedoms", "native items", "callbacks")
+
+
+def _engines(scene: Scene, assembly: Assembly) -> list[str]:
+    """Table of what each engine builds, or why it refuses."""
+    rows = [HEADINGS, *(_engine(scene, assembly, engine) for engine in CATALOGUE)]
+    widths = [max(len(row[i]) for row in rows if len(row) > 2) for i in range(len(HEADINGS))]
+    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
+    note = ["  exudyn is handed M, D and K of the linear vehicle: no spring of its own takes part"]
+    return ["  " + "  ".join(row).rstrip() for row in padded] + (note if scene.vehicle.geometry == "linear" else [])
+
+
+def _engine(scene: Scene, assembly: Assembly, engine: str) -> tuple[str, ...]:
+    settings = settings_of(scene, engine)
+    try:
+        plan = build(engine, assembly, settings).plan()
+    except Refused as error:
+        return engine, f"refused: {error.why}"
+    order = CATALOGUE[engine][settings.integrator].order
+    return (
+        engine,
+        settings.integrator,
+        str(order),
+        f"{settings.step:g} s",
+        str(settings.steps),
+        *(str(plan[key]) for key in ("degrees of freedom", "native items", "callbacks")),
+    )

@@ -1,0 +1,162 @@
+"""One run, from scene to result: assemble, build in an engine, integrate, label."""
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.result import Channel, Result, result
+from models.engines.assembly import Assembly
+from models.engines.catalogue import OUTSIDE
+from models.engines.protocol import Model, Settings, Trajectory, build
+from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import Scene, settings_of
+from models.vehicles import pitch_plane
+
+Channels = dict[str, tuple[str, str, np.ndarray]]
+
+
+def run(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
+    """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
+
+    A run of an engine from outside the tree is compared with the reference, and says so in "beside reference".
+    """
+    assembly = assemble(scene)
+    own = settings or settings_of(scene, engine)
+    keep = _keep_every(scene, own)
+    model = build(engine, assembly, own)
+    start = time.perf_counter()
+    trajectory = model.run()
+    seconds = time.perf_counter() - start
+    channels = outputs(assembly, trajectory, model)
+    found = _labelled(assembly, engine, own, trajectory, channels, keep, seconds)
+    if engine in OUTSIDE:
+        from models.engines.beside_reference import beside_reference
+
+        found.data.attrs["beside reference"] = beside_reference(engine, assembly, own, trajectory)
+    return found
+
+
+def _keep_every(scene: Scene, settings: Settings) -> int:
+    """How many steps lie between two saved rows."""
+    wanted = scene.run.output_step
+    if wanted is None:
+        return 1
+    ratio = wanted / settings.step
+    if ratio < 0.5 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+        raise InputError(scene.file, "run.output_step", wanted, f"must be a multiple of the step {settings.step:g} s")
+    return round(ratio)
+
+
+def _labelled(
+    assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int, seconds: float
+) -> Result:
+    rows = slice(None, None, keep)
+    return result(
+        assembly.scene,
+        {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
+        {"time": Channel("time", run.times[rows], "s", "time")},
+        engine=engine,
+        counts=run.counts,
+        seconds=seconds,
+        doubts=assembly.doubts,
+        mode=assembly.mode,
+        integrator=settings.integrator,
+        step=settings.step,
+        integrated=json.dumps(pitch_plane.STATES),
+    )
+
+
+def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
+    """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
+
+    ``model`` is the one that made the run, and is asked where an effect reads accelerations.
+    """
+    names = {
+        "z1": "front wheel, down",
+        "z2": "rear wheel, down",
+        "z3": "chassis heave, down",
+        "pitch": "pitch, nose up",
+    }
+    channels: Channels = {}
+    for i, (name, meaning) in enumerate(names.items()):
+        unit = "rad" if name == "pitch" else "m"
+        channels[name] = (unit, meaning, run.states[:, i])
+        channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
+    inputs = _inputs(assembly, run.times)
+    channels |= _forces(assembly, run, inputs)
+    for output in assembly.outputs:
+        channels |= output(assembly, run.times, run.states)
+    for sensor in assembly.sensors:
+        assert model is not None
+        channels |= sensor(assembly, run, model)
+    return channels
+
+
+def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
+    """The input at the saved times: on a uniform grid, or one by one for adaptive engines."""
+    if assembly.input is None:
+        return None
+    step = times[1] - times[0]
+    if np.allclose(np.diff(times), step, rtol=1e-6, atol=0):
+        return assembly.input.sample(0.0, float(step), len(times))
+    return np.array([assembly.input.at(time) for time in times])
+
+
+def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
+    """Wheel forces f1, f2, suspension forces f3, f4, inertia term and enforced moment (eqs 33, 35, 36)."""
+    p, y = assembly.parameters, run.states
+    exact = assembly.vehicle.geometry == "exact"
+    sine, cosine = (np.sin(y[:, 3]), np.cos(y[:, 3])) if exact else (y[:, 3], np.ones(len(y)))
+    f3 = p.k3 * (y[:, 2] - y[:, 0] - p.b * sine) + p.d3 * (y[:, 6] - y[:, 4] - p.b * y[:, 7] * cosine)
+    f4 = p.k4 * (y[:, 2] - y[:, 1] + p.a * sine) + p.d4 * (y[:, 6] - y[:, 5] + p.a * y[:, 7] * cosine)
+    f1, f2 = _wheel_forces(assembly, y, inputs)
+    moment = cosine * (p.b * f3 - p.a * f4)
+    channels: Channels = {
+        "f1": ("N", "front wheel force, up", f1),
+        "f2": ("N", "rear wheel force, up", f2),
+        "f3": ("N", "front suspension force, compression", f3),
+        "f4": ("N", "rear suspension force, compression", f4),
+        "suspension_moment": ("N m", "pitch moment of the suspension on the chassis, nose up", moment),
+    }
+    if assembly.mode == "road" and inputs is not None:
+        channels["zeta1"] = ("m", "road under the front wheel, down", inputs[:, 0])
+        channels["zeta2"] = ("m", "road under the rear wheel, down", inputs[:, 1])
+    if run.force is not None:
+        channels["enforced_force"] = ("N", "force on the chassis, down, that the prescribed heave takes", run.force)
+    if run.moment is not None and inputs is not None:
+        channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, -1])
+        channels["enforced_moment"] = ("N m", "moment, nose up, that the prescribed pitch takes", run.moment)
+    return channels
+
+
+def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    p = assembly.parameters
+    if assembly.mode not in ("free", "road"):
+        assert inputs is not None
+        return inputs[:, 0], inputs[:, 1]
+    u = np.zeros((len(y), 4)) if inputs is None else inputs
+    pressed = np.array([p.k1, p.k2]) * (y[:, :2] - u[:, :2])
+    forces = pressed + np.array([p.d1, p.d2]) * (y[:, 4:6] - u[:, 2:])
+    if any(tyre.pushes_only for tyre in assembly.vehicle.tyres):
+        forces = np.maximum(np.minimum(forces, 2.0 * pressed), 0.0)
+    return forces[:, 0], forces[:, 1]
+
+
+def state_names() -> tuple[str, ...]:
+    """Names of the eight state channels."""
+    return (*pitch_plane.STATES, *(f"{name}_rate" for name in pitch_plane.STATES))
+
+
+def summary(result: Result) -> dict[str, Any]:
+    """Largest magnitude and rms of every channel, with its unit."""
+    return {
+        str(name): {
+            "unit": channel.attrs["units"],
+            "max": float(np.abs(channel.values).max()),
+            "rms": float(np.sqrt(np.mean(channel.values**2))),
+        }
+        for name, channel in result.data.data_vars.items()
+    }

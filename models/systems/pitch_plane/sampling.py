@@ -1,0 +1,61 @@
+"""Readings of a sensor: a channel of a run at the sensor's own instants, held in between, and as a file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.result import Result
+from models.core.steps import divides, fitting
+from models.core.time_series import write_time_series
+from models.engines.catalogue import CATALOGUE
+from models.systems.pitch_plane.scene import Scene
+
+SLACK = 1e-6
+"""Part of a period by which a row may lie beside its instant; a run's times are whole numbers of steps."""
+NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, which must divide the sampling period"
+
+
+def check_rate(scene: Scene, place: str, rate: float) -> None:
+    """Refuse, before a run, a sampling rate whose instants fall between the rows of an engine."""
+    if CATALOGUE["exudyn"][str(scene.settings("exudyn").integrator)].adaptive:
+        raise InputError(scene.file, place, rate, NO_ROW)
+    for engine in CATALOGUE:
+        step = float(scene.settings(engine).step or 0)
+        if not divides(step, 1 / rate):
+            allowed = (
+                f"its period {1 / rate:g} s must be a multiple of {engine}'s step {step:g} s; use a step of "
+                f"{fitting(step, 1 / rate)} s or another rate"
+            )
+            raise InputError(scene.file, place, rate, allowed)
+
+
+def numbers(times: np.ndarray, rate: float) -> np.ndarray:
+    """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
+    return np.floor(times * rate + SLACK).astype(np.int64)
+
+
+def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place: str) -> np.ndarray:
+    """What is read at the sensor's instant at or last before each row, shape (n,).
+
+    Raises InputError where a run has no row at an instant, as runs have whose engine picks its own rows.
+    """
+    number = numbers(times, rate)
+    row = np.searchsorted(times, (number - SLACK) / rate)
+    if np.abs(times[row] * rate - number).max() > SLACK:
+        raise InputError(scene.file, place, rate, NO_ROW)
+    return values[row]
+
+
+def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:
+    """The samples themselves as a file that other effects read: name of its column -> channel of the result.
+
+    Raises InputError where the result's rows are not equally spaced at a whole part of the sampling period.
+    """
+    spacing = float(result.times[1] - result.times[0])
+    if not divides(spacing, 1 / rate) or not np.allclose(np.diff(result.times), spacing, rtol=SLACK, atol=0):
+        raise InputError(path, "sampling rate", rate, f"the result's rows, {spacing:g} s apart, do not fit its period")
+    stride = round(1 / (rate * spacing))
+    rows = {name: (result.data[channel].attrs["units"], result[channel][::stride]) for name, channel in columns.items()}
+    write_time_series(path, rows, 1 / rate)

@@ -1,0 +1,195 @@
+"""Scenes of the pitch-plane vehicle."""
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import read_tables
+from models.core.scene_file import SceneFile, checked, existing, parse
+from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.strict import Query, Strict, accepted, quantity, read
+from models.core.systems import DEFAULT
+from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
+from models.engines.protocol import Settings
+from models.vehicles import pitch_plane
+from models.vehicles.description import Geometry
+
+SETS = Path(pitch_plane.__file__).with_name("parameters")
+"""Folder of the published parameter sets."""
+
+
+def parameter_sets() -> tuple[str, ...]:
+    """Names of the published parameter sets."""
+    return tuple(sorted(path.stem for path in SETS.glob("*.py") if path.stem != "__init__"))
+
+
+class VehicleTable(Strict):
+    """[vehicle]: a published parameter set or the user's own file, with overrides."""
+
+    parameters: str = Field(default="itwm_drift", description="a parameter set, or a TOML file with one")
+    geometry: Geometry = Field(default="exact", description="sin and cos of pitch, or linearised")
+    override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
+    accept: list[Query] = accepted()
+
+
+class RunTable(Strict):
+    """[run]: how long, and how finely."""
+
+    duration: float = quantity("s", "length of the run")
+    step: float = quantity("s", "step of fixed-step integrators", default=2.5e-4)
+    output_step: float | None = quantity("s", "spacing of the saved results, a multiple of the step", default=None)
+
+
+class EngineTable(Strict):
+    """[engines.NAME]: settings that differ from the recommended ones."""
+
+    integrator: str | None = Field(default=None, description="name of an integrator of this engine")
+    step: float | None = quantity("s", "step for this engine alone", default=None)
+    tolerance: float = quantity("", "relative tolerance of adaptive integrators", default=1e-9)
+    spectral_radius: float = Field(default=0.6, ge=0, le=1, description="of generalised-alpha at infinite frequency")
+
+
+class Scene(SceneFile):
+    """One scene file. ``effects`` are checked by the files that own them."""
+
+    system: Literal["pitch-plane"] = "pitch-plane"
+    study: str = Field(default="single_run", description="the study that runs the scene")
+    vehicle: VehicleTable = VehicleTable()
+    run: RunTable = Field(description="table with at least the duration")
+    start: dict[str, float] = Field(default_factory=dict, description="initial states beside the static equilibrium")
+    effects: dict[str, Any] = Field(default_factory=dict, description="the effects of the scene, a table each")
+    engines: dict[str, EngineTable] = Field(default_factory=dict)
+
+    def vehicle_parameters(self) -> pitch_plane.Parameters:
+        """The parameter set with the scene's overrides; each is judged under its own file's name."""
+        base = parameter_set(self.vehicle.parameters, self.file, Path(self.folder))
+        values = {**base.model_dump(), **self.vehicle.override}
+        p = read(pitch_plane.Parameters, values, self.file, "vehicle.override")
+        _check_rest(p, self)
+        return p
+
+    def table(self) -> dict[str, Any]:
+        """The scene as nested tables of plain values, defaults included: enough to run it again."""
+        plain = self.model_dump(exclude={"effects", "engines"}, exclude_none=True)
+        return plain | {
+            "effects": {name: values.model_dump(exclude_none=True) for name, values in self.effects.items()},
+            "engines": {name: values.model_dump(exclude_unset=True) for name, values in self.engines.items()},
+        }
+
+    def settings(self, engine: str) -> EngineTable:
+        """Settings of one engine, with recommended values where the scene says nothing."""
+        given = self.engines.get(engine, EngineTable())
+        name = given.integrator or ("GeneralizedAlpha" if self._constrained(engine) else RECOMMENDED[engine])
+        return given.model_copy(update={"integrator": name, "step": given.step or self.run.step})
+
+    def _constrained(self, engine: str) -> bool:
+        return engine == "exudyn" and not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
+
+
+def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
+    """A published set by its name, or the user's own from a TOML file."""
+    if name.endswith(".toml"):
+        return read(pitch_plane.Parameters, parse(existing(name, folder, file, "vehicle.parameters")), name)
+    if name not in parameter_sets():
+        allowed = "must be a TOML file with all parameters, or a published set"
+        raise InputError(file, "vehicle.parameters", name, allowed, parameter_sets())
+    return import_module(f"models.vehicles.parameters.{name}").PARAMETERS
+
+
+SMALLEST = 1e-9
+"""No parameter of a vehicle is smaller in SI units, but for a gravity of 0."""
+
+
+def _check_rest(p: pitch_plane.Parameters, scene: Scene) -> None:
+    """Every run begins from the static equilibrium, so there must be one."""
+    for name, value in p:
+        if 0 < value < SMALLEST:
+            allowed = f"too small for a vehicle: at least {SMALLEST:g}"
+            raise InputError(scene.file, f"vehicle.override.{name}", value, allowed)
+    try:
+        rest = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    except (ValueError, ArithmeticError):  # the sine of the pitch beyond 1
+        rest = np.full(8, np.nan)
+    if not np.isfinite(rest).all():
+        raise InputError(
+            scene.file,
+            "vehicle",
+            None,
+            "no static equilibrium with these parameters: the springs k1 to k4 are too soft for the weight",
+        )
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Scene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(Scene, table, file, folder)
+    effects = read_tables(scene.effects, DEFAULT, file)
+    for name in scene.engines:
+        _check_engine(name, scene)
+    _check_times(scene)
+    return scene.model_copy(update={"effects": effects})
+
+
+def _check_engine(name: str, scene: Scene) -> None:
+    """Known names, and no setting that the integrator would not read."""
+    if name not in CATALOGUE:
+        raise InputError(scene.file, f"engines.{name}", None, "no such engine", tuple(CATALOGUE))
+    given, place = scene.engines[name], f"engines.{name}"
+    integrator = str(scene.settings(name).integrator)
+    if integrator not in CATALOGUE[name]:
+        names = tuple(key for key in CATALOGUE[name] if (name, key) not in MISSING)
+        raise InputError(scene.file, f"{place}.integrator", integrator, "no such integrator", names)
+    if "spectral_radius" in given.model_fields_set and integrator != "GeneralizedAlpha":
+        allowed = f"has no meaning for {integrator}: it belongs to exudyn's GeneralizedAlpha"
+        raise InputError(scene.file, f"{place}.spectral_radius", given.spectral_radius, allowed)
+    if "tolerance" in given.model_fields_set and not CATALOGUE[name][integrator].adaptive:
+        adaptive = (
+            " or ".join(key for key, value in CATALOGUE[name].items() if value.adaptive and (name, key) not in MISSING)
+            or "other engines"
+        )
+        allowed = f"has no meaning for {integrator}, which takes steps of fixed length: it belongs to {adaptive}"
+        raise InputError(scene.file, f"{place}.tolerance", given.tolerance, allowed)
+
+
+def _check_times(scene: Scene) -> None:
+    """The duration and the saved spacing are whole numbers of every engine's steps."""
+    for name in CATALOGUE:
+        own = name in scene.engines and scene.engines[name].step is not None
+        _check_step(scene, f"engines.{name}.step" if own else "run.step", float(scene.settings(name).step or 0))
+    wanted = scene.run.output_step
+    _check_rows(scene)
+    if wanted is not None and wanted > scene.run.duration * (1 + 1e-9):
+        allowed = f"must be at most run.duration = {scene.run.duration:g} s"
+        raise InputError(scene.file, "run.output_step", wanted, allowed)
+
+
+def _check_rows(scene: Scene) -> None:
+    """An engine that picks its own steps saves its rows where they end."""
+    name = str(scene.settings("exudyn").integrator)
+    if scene.run.output_step is not None and "exudyn" in scene.engines and CATALOGUE["exudyn"][name].adaptive:
+        allowed = f"has no meaning for exudyn's {name}, whose rows lie where its own steps end: drop one of the two"
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
+
+
+def _check_step(scene: Scene, place: str, step: float) -> None:
+    length, wanted = scene.run.duration, scene.run.output_step
+    if length / step > MOST_STEPS:
+        allowed = f"needs {length / step:.3g} steps of {place} = {step:g} s; at most {MOST_STEPS:,} are possible"
+        raise InputError(scene.file, "run.duration", length, allowed)
+    if not divides(step, length):
+        allowed = f"must divide run.duration = {length:g} s; use for example {fitting(step, length)}"
+        raise InputError(scene.file, place, step, allowed)
+    if wanted is not None and not divides(step, wanted):
+        allowed = f"must be a multiple of {place} = {step:g} s"
+        raise InputError(scene.file, "run.output_step", wanted, allowed)
+
+
+def settings_of(scene: Scene, engine: str) -> Settings:
+    """Settings of a scene for one engine."""
+    own = scene.settings(engine)
+    assert own.integrator is not None and own.step is not None
+    return Settings(own.integrator, own.step, scene.run.duration, own.tolerance, own.spectral_radius)

@@ -1,0 +1,238 @@
+"""Small errors beside a force-excited run: its equations linearised along its own path, step by step.
+
+An error x (8,) of the state obeys x' = A(t) x + g(t), where A is the Jacobian of eq. (37) at the path and g what
+wrong forces or wrong parameters add. The march below is the exact linearisation of the reference's Runge-Kutta
+step, so it gives what a run with a very small error would give, free of rounding.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from models.core.signals import Sampled, Smooth
+from models.engines.assembly import Assembly
+from models.engines.reference import compiled
+from models.machine.compiled import named
+from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
+
+STEP = 1e-3
+"""Longest step (s) of the path; the fastest pole of the published vehicle, -697 1/s, needs one below 4 ms."""
+
+SMALL = 1e-6
+"""Part of a wrong model's difference that its derivative is taken over: errors of two parameters must not multiply,
+or a stiffness that is wrong together with the inertia would leave a moment that no run has."""
+
+
+@register_jitable
+def jacobian(y, u, p, body, flat, x, dx):
+    """dx = A x at the state y (8,) under the wheel forces u (2,); ``flat`` is the linearised geometry."""
+    pitch, rate = (0.0, 0.0) if flat else (y[3], y[7])
+    sine, cosine = math.sin(pitch), math.cos(pitch)
+    a, b, inertia = p[0], p[1], p[5]
+    turn = cosine * x[7] - rate * sine * x[3]
+    df3 = p[8] * (x[2] - x[0] - b * cosine * x[3]) + p[12] * (x[6] - x[4] - b * turn)
+    df4 = p[9] * (x[2] - x[1] + a * cosine * x[3]) + p[13] * (x[6] - x[5] + a * turn)
+    f3, f4 = suspension(y, p, sine, cosine)
+    for i in range(4):
+        dx[i] = x[4 + i]
+    dx[4], dx[5], dx[6] = df3 / p[2], df4 / p[3], -(df3 + df4) / p[4]
+    dx[7] = (cosine * (b * df3 - a * df4) - sine * (b * f3 - a * f4) * x[3]) / inertia
+    if body:
+        dx[4] += u[0] * sine * x[3] / p[2]
+        dx[5] += u[1] * sine * x[3] / p[3]
+        dx[7] += 2 * sine * cosine * (b * u[0] - a * u[1]) * x[3] / inertia
+
+
+@register_jitable
+def pushed(y, p, body, du, dx):
+    """Add to dx (8,) what the force errors du (2,) in N do."""
+    sine, cosine = (math.sin(y[3]), math.cos(y[3])) if body else (0.0, 1.0)
+    dx[4] -= cosine * du[0] / p[2]
+    dx[5] -= cosine * du[1] / p[3]
+    dx[7] += sine * sine * (p[1] * du[0] - p[0] * du[1]) / p[5]
+
+
+def _step_of(rhs, body, flat):
+    def step_of(y, x, step, inputs, errors, at, p, other):
+        """One Runge-Kutta step of the path y (8,) and the error columns x (m, 8), in place.
+
+        inputs (rows, 2) and errors (rows, m, 2) are read at the rows ``at``: start, middle and end of the step.
+        """
+        columns = x.shape[0]
+        wrong = (other != p).any()
+        k, kx = np.zeros((4, 8)), np.zeros((4, columns, 8))
+        stage, stage_x, off = np.empty(8), np.empty(8), np.zeros(8)
+        for s in range(4):
+            now = (s + 1) // 2
+            part = 0.5 * step * now
+            u, e = inputs[at[0][now]], errors[at[1][now]]
+            for q in range(8):
+                stage[q] = y[q] + part * k[s - 1, q]
+            rhs(stage, u, p, k[s])
+            if wrong:
+                rhs(stage, u, other, off)
+                for q in range(8):
+                    off[q] = (off[q] - k[s, q]) / SMALL
+            for j in range(columns):
+                for q in range(8):
+                    stage_x[q] = x[j, q] + part * kx[s - 1, j, q]
+                jacobian(stage, u, p, body, flat, stage_x, kx[s, j])
+                pushed(stage, p, body, e[j], kx[s, j])
+                for q in range(8):
+                    kx[s, j, q] += off[q]
+        for q in range(8):
+            y[q] += step / 6 * (k[0, q] + 2 * k[1, q] + 2 * k[2, q] + k[3, q])
+            for j in range(columns):
+                x[j, q] += step / 6 * (kx[0, j, q] + 2 * kx[1, j, q] + 2 * kx[2, j, q] + kx[3, j, q])
+
+    return register_jitable(named(step_of, rhs.__name__, body, flat))
+
+
+def compile_carry(one_step, key):
+    """March that keeps the path and its error columns at every step."""
+
+    def carry(y, x, step, count, inputs, errors, rows, p, other, states, kept):
+        to_middle, to_end, to_next = rows
+        states[0], kept[0] = y, x
+        for i in range(count):
+            row = i * to_next
+            at = (row, row + to_middle, row + to_end)
+            one_step(y, x, step, inputs, errors, (at, (3 * i, 3 * i + 1, 3 * i + 2)), p, other)
+            states[i + 1], kept[i + 1] = y, x
+
+    return compiled(carry, key)
+
+
+_MARCHES: dict[tuple[Any, ...], Any] = {}
+
+
+def march_along(compile_march: Any, mode: str, geometry: str):
+    """A march along the path of a mode and a geometry, compiled when first asked for."""
+    key = (mode, geometry)
+    if (compile_march, key) not in _MARCHES:
+        one_step = _step_of(RIGHT_HAND_SIDES[key], mode == "force-body", geometry == "linear")
+        _MARCHES[compile_march, key] = compile_march(one_step, key)
+    return _MARCHES[compile_march, key]
+
+
+@dataclass(frozen=True)
+class Path:
+    """A force-excited run as errors are carried along it: by fixed steps that divide the sampling period.
+
+    per_sample : steps from one sample of the forces to the next; samples : periods that the run covers.
+    """
+
+    assembly: Assembly
+    forces: Sampled | Smooth
+    per_sample: int
+    samples: int
+
+    @property
+    def step(self) -> float:
+        """Step of the march (s)."""
+        return self.forces.period / self.per_sample
+
+    @property
+    def rows(self) -> tuple[int, int, int]:
+        """Rows of the input table from a step's start to its middle, its end and the next step."""
+        return (0, 0, 1) if self.forces.held else (1, 2, 2)
+
+    def table(self, signal: Any) -> np.ndarray:
+        """A signal at the stages of all steps, shape (rows, channels)."""
+        count = self.per_sample * self.samples
+        return (
+            signal.sample(0.0, self.step, count)
+            if self.forces.held
+            else signal.sample(0.0, self.step / 2, 2 * count + 1)
+        )
+
+    def march(self, compile_march: Any):
+        """A compiled march that fits the assembly."""
+        return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
+
+    def carry(
+        self, columns: np.ndarray, errors: np.ndarray | None = None, other: Parameters | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
+
+        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
+        the parameters of a wrong model, whose error forces every column.
+        """
+        count = self.per_sample * self.samples
+        inputs = self.table(self.forces)
+        p = self.assembly.parameters.array()
+        wrong = p if other is None else p + SMALL * (other.array() - p)
+        pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
+        states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
+        march = self.march(compile_carry)
+        march(
+            self.assembly.initial.copy(),
+            np.array(columns, dtype=float),
+            self.step,
+            count,
+            inputs,
+            pushes,
+            self.rows,
+            p,
+            wrong,
+            states,
+            kept,
+        )
+        return states, kept
+
+    @property
+    def times(self) -> np.ndarray:
+        """Ends of the steps (s), the start included."""
+        return self.step * np.arange(self.per_sample * self.samples + 1)
+
+
+def path_of(assembly: Assembly, longest: float = STEP) -> Path:
+    """The path of a free force-excited run; raises ValueError for any other."""
+    forces = assembly.input
+    held_up = assembly.vehicle.pitch_springs or assembly.moment is not None
+    if assembly.mode not in ("force", "force-body") or held_up or not isinstance(forces, Sampled | Smooth):
+        raise ValueError("errors grow along a free force-excited run; this one is guided or held, or has a road")
+    samples = round(assembly.scene.run.duration / forces.period)
+    return Path(assembly, forces, max(1, math.ceil(forces.period / longest - 1e-9)), samples)
+
+
+def tilted(assembly: Assembly) -> np.ndarray:
+    """Two columns (2, 8): a tilt of 1 rad and a rate of 1 rad/s of the rigid vehicle, its wheels moving along.
+
+    The struts keep their lengths, so that no fast motion is started that would have to die out first.
+    """
+    p, pitch = assembly.parameters, assembly.initial[3]
+    cosine = 1.0 if assembly.vehicle.geometry == "linear" else math.cos(pitch)
+    shape = np.array([-p.b * cosine, p.a * cosine, 0.0, 1.0])
+    return np.array([[*shape, *np.zeros(4)], [*np.zeros(4), *shape]])
+
+
+def tilt_map(path: Path) -> np.ndarray:
+    """How the tilt and its rate at the end of a path follow from those at its start, shape (2, 2).
+
+    The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
+    fast motion is in the four numbers.
+    """
+    _, columns = path.carry(tilted(path.assembly))
+    return columns[-1][:, [3, 7]].T
+
+
+def measured_growth(path: Path) -> tuple[float, float]:
+    """Growth rate (1/s) of a tilt error along a path, and its uncertainty (1/s), which falls with the length.
+
+    The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
+    they meet, at 1, an error of the map moves them by its square root.
+    """
+    found, duration = tilt_map(path), path.forces.period * path.samples
+    off = abs(float(np.linalg.det(found)) - 1.0)
+    return float(np.log(np.abs(np.linalg.eigvals(found)).max())) / duration, math.sqrt(off) / duration
+
+
+def swing(path: Path) -> float:
+    """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
+    half = 0.5 * float(np.trace(tilt_map(path)))
+    return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0

@@ -1,0 +1,204 @@
+"""How long a force-excited run can be trusted, said before it starts.
+
+Each source of error has its own time at which the pitch is ``angle`` off: half of all noise paths by the closed law
+along the wheel forces; the error between the samples, and that of a wrong model, carried along the run's own path;
+and rounding, which no integrator escapes. The earliest one counts. What samples do not show, motion faster than half
+their rate, nothing here can see.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.core.signals import Sampled, Smooth
+from models.drift.growth import MEDIAN, growth_rate, growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
+from models.engines.assembly import Assembly
+from models.systems.pitch_plane.tangent import STEP, Path, path_of
+from models.vehicles.pitch_plane import Parameters
+
+if TYPE_CHECKING:
+    from models.measured.axle_forces import AxleForces
+
+ANGLE = 0.05
+"""A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
+LEAST = 8
+"""Samples that a quintic spline needs, with two to spare."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What the wheel forces alone say, before any run.
+
+    times (n,) in s, those of the samples; rate : mean growth rate, 1/s; until (n,) : the rate in the sinh law at each
+    time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
+    """
+
+    times: np.ndarray
+    rate: float
+    until: np.ndarray
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Size of the pitch error (rad) that one source makes, at ``times`` (n,) in s, as long as it is small."""
+
+    times: np.ndarray
+    size: np.ndarray
+
+    def passes(self, angle: float = ANGLE) -> float | None:
+        """First time (s) at which the size exceeds ``angle`` (rad), None if it never does."""
+        beyond = ~(self.size <= angle)  # what is not a number any more has
+        return float(self.times[beyond.argmax()]) if beyond.any() else None
+
+
+def growth(assembly: Assembly) -> Growth:
+    """Growth along a free force-excited run; raises ValueError for any other."""
+    path = path_of(assembly)
+    times = path.forces.period * np.arange(path.samples + 1)
+    if assembly.mode == "force-body" or assembly.vehicle.geometry == "linear":
+        return Growth(times, 0.0, np.zeros(len(times)))
+    values, p = _covering(path), assembly.parameters
+    rate = pitch_rate_of_forces(values, path.forces.period, p)
+    own = (rate, path.forces.period, p)
+    return Growth(times, growth_rate(*own), growth_until(*own))
+
+
+def _covering(path: Path) -> np.ndarray:
+    """Samples (n + 1, 2) of the run; where held ones end with it, the last one stands twice."""
+    values = path.forces.values[: path.samples + 1]
+    return values if len(values) > path.samples else np.vstack([values, values[-1:]])
+
+
+def noise(assembly: Assembly, deviation: float) -> Curve:
+    """Median size over paths, for white samples of ``deviation`` (N) each."""
+    own, period = growth(assembly), path_of(assembly).forces.period
+    intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
+    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, intensity)))
+
+
+def interpolation_error(path: Path) -> np.ndarray:
+    """Error (3 steps, 2) in N of the scene's rule between the samples, by a quintic spline through the same ones.
+
+    At the start, the middle and the end of each step. Linear samples err by f'' t (T - t) / 2, on average by
+    f'' T^2 / 12. Held ones first of all delay the whole run by T / 2, which is no drift: they are judged by the
+    spline as late as that, and err by -f'' T^2 / 24 on average.
+    """
+    spline = Smooth(_covering(path), path.forces.period, degree=5)
+    count = path.per_sample * path.samples
+    late = path.forces.period / 2 if path.forces.held else 0.0
+    true = spline.sample(-late, path.step / 2, 2 * count + 1)
+    given = path.table(path.forces)
+    read = [given] * 3 if path.forces.held else [given[0:-1:2], given[1::2], given[2::2]]
+    return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
+
+
+def interpolation(assembly: Assembly, longest: float = STEP) -> Curve:
+    """Error of the rule between the samples alone; 0 for a run of too few samples to tell."""
+    path = path_of(assembly, longest)
+    return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
+
+
+def model(assembly: Assembly, other: Parameters, longest: float = STEP) -> Curve:
+    """Error of a run with the parameters ``other`` instead of the assembly's.
+
+    What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
+    The difference is carried along a run with the mean of both models, which leaves no error of second order.
+    """
+    own = assembly.parameters.model_dump()
+    change = {name: getattr(other, name) - value for name, value in own.items()}
+    mean = Parameters(**{name: value + 0.5 * change[name] for name, value in own.items()})
+    shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
+    return _carried(path_of(replace(assembly, parameters=mean), longest), other=shifted)
+
+
+def _carried(path: Path, errors: np.ndarray | None = None, other: Parameters | None = None) -> Curve:
+    pushes = None if errors is None else errors[:, None, :]
+    _, columns = path.carry(np.zeros((1, 8)), pushes, other)
+    return Curve(path.times, np.abs(columns[:, 0, 3]))
+
+
+def rounding(assembly: Assembly) -> Curve:
+    """Median size of what rounding alone does, each step rounding the pitch rate anew: a floor for every solver."""
+    own, path = growth(assembly), path_of(assembly)
+    rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
+    each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
+    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, each**2 / path.step)))
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Times (s) by source of error, None where it does not end the run's trust; ``rate`` in 1/s, ``angle`` in rad.
+
+    unchecked : what was not looked at, with what would show it.
+    """
+
+    times: dict[str, float | None]
+    rate: float
+    angle: float
+    unchecked: str = ""
+
+    @property
+    def until(self) -> tuple[str, float] | None:
+        """The source that comes first and its time (s); None if nothing limits the run."""
+        limits = [(time, name) for name, time in self.times.items() if time is not None]
+        return min(limits)[::-1] if limits else None
+
+    def __str__(self) -> str:
+        """The one line of a plan."""
+        grown, rest = f"{self.angle:g} rad, growth rate {self.rate:.3g} 1/s", self.unchecked and f"; {self.unchecked}"
+        if self.until is None:
+            return f"nothing known limits this run ({grown}; looked at: {', '.join(self.times)}){rest}"
+        name, time = self.until
+        return f"trusted until about {time:.3g} s ({grown}, {name}){rest}"
+
+
+def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
+    """What limits a scene's run; None for a run that is guided, held, or on a road, where no error grows."""
+    forces = assembly.input
+    try:
+        path_of(assembly)
+    except ValueError:
+        return None
+    assert isinstance(forces, Sampled | Smooth)
+    times = {"interpolation between the samples": interpolation(assembly).passes(angle)}
+    added = assembly.scene.effects.get("force_noise")
+    if added is not None and added.deviation > 0:
+        named = f"noise of {added.deviation:g} N at {1 / forces.period:g} Hz"
+        times[named] = noise(assembly, added.deviation).passes(angle)
+    times |= _steady(assembly, angle)
+    times["rounding"] = rounding(assembly).passes(angle)
+    return Trust(times, growth(assembly).rate, angle, _unchecked(assembly))
+
+
+def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
+    """When the steady accelerations of doubtful forces have moved the vehicle: turned it by the angle, or made it fall
+    or rise by as much as that angle moves one axle against the other."""
+    if not assembly.doubts:
+        return {}
+    from models.measured.axle_forces import steady
+
+    p, found = assembly.parameters, steady(_axles(assembly))
+    ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
+    return {
+        name: math.sqrt(2 * way / abs(acceleration))
+        for (name, way), acceleration, seen in zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True)
+        if seen
+    }
+
+
+def _axles(assembly: Assembly) -> "AxleForces":
+    """The wheel forces of a run as the checks of recordings read them."""
+    from models.measured.axle_forces import AxleForces
+
+    path, turn = path_of(assembly), assembly.mode == "force-body"
+    forces, lasts = _covering(path), assembly.scene.run.duration
+    return AxleForces(forces, path.forces.period, assembly.parameters, ((), ()), lasts, turn=turn)
+
+
+def _unchecked(assembly: Assembly) -> str:
+    """What was not looked at of wheel forces from a file."""
+    from models.measured.axle_forces import unchecked
+
+    return unchecked(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

@@ -1,0 +1,23 @@
+"""Tyres that only push: a wheel may leave the road. It has no covariance, so that it is run in time."""
+
+from dataclasses import replace
+from typing import Any
+
+from models.core.strict import Strict
+from models.systems.ride.of_scene import Built
+
+NEEDS = ("gravity_and_preload",)
+WHY = "for without gravity a tyre bears no load that it could lose"
+COST = "runs in time in place of one covariance; in Exudyn a law per tyre in Python"
+EXAMPLE: dict[str, float] = {}
+COUNTS = {"all": {"tyres that lift": 4}}
+MODULES = ("models.ride.nonlinear_copies",)
+
+
+class Parameters(Strict):
+    """[effects.lift_off]: no settings."""
+
+
+def extend(built: Built, p: Any) -> Built:
+    """The vehicle on tyres that only push, by the law of ``models.systems.pitch_plane.effects.lift_off``."""
+    return replace(built, vehicle=built.vehicle.with_tyres(pushes_only=True))

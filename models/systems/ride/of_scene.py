@@ -1,0 +1,186 @@
+"""From a scene of ride to its vehicle, its road and the system that both make at a speed."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import copysign
+from typing import TYPE_CHECKING
+
+from models.core.errors import InputError
+from models.core.scene_effects import extended
+from models.road.excitation import Excitation
+from models.road.iso8608 import level_of_class
+from models.road.shape_filter import ShapeFilter
+from models.road.two_track import TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.systems.ride.scene import RideScene
+from models.vehicles.linear_vehicle import LinearVehicle, Wheel
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+
+if TYPE_CHECKING:
+    from models.road.fitted import FittedRoad
+
+GRAVITY = 9.81
+"""m/s^2, where a scene's operating point is the loaded one."""
+Linear = Callable[[float], LinearVehicle]
+"""A linear vehicle at a speed (m/s)."""
+CLOSED = "ride"
+"""The study that reads reduced vehicles, by their closed form."""
+BESIDE = 1.0
+"""Where (m) the one track of a vehicle without a width lies: its level is the same wherever that is."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What effects extend: the vehicle, and what becomes of the road under its wheels, one change after another.
+
+    A change keeps the noise; states that it adds to those of the road's own filters come last.
+    """
+
+    vehicle: SpatialVehicle
+    road: tuple[Callable[[Excitation], Excitation], ...] = ()
+
+
+def vehicle_of(scene: RideScene) -> SpatialVehicle:
+    """The scene's vehicle with its effects, and with gravity where its operating point is the loaded one.
+
+    InputError for a loaded vehicle that may yaw: its preloaded springs keep their directions in space, not in it, so
+    that their moments about z would pull it back or push it on; and for a tyre that may lift where small motion is
+    asked for.
+    """
+    vehicle = _built(scene).vehicle
+    if vehicle.lifts and scene.vehicle.small_motion:
+        allowed = "in small motion no wheel leaves the road: leave it out beside effects.lift_off"
+        raise InputError(scene.file, "vehicle.small_motion", True, allowed)
+    if scene.vehicle.operating_point == "loaded" and vehicle.side_forces:
+        allowed = "a vehicle with side forces may yaw, while preloads keep their directions in space: use unloaded"
+        raise InputError(scene.file, "vehicle.operating_point", "loaded", allowed)
+    return replace(vehicle, gravity=GRAVITY if scene.vehicle.operating_point == "loaded" else 0.0)
+
+
+def _built(scene: RideScene) -> Built:
+    return extended(
+        Built(
+            load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file", reduced=scene.study == CLOSED)
+        ),
+        scene,
+    )
+
+
+def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
+    """Refuse curves and friction where nobody has said that their slopes at rest shall stand for them, and tyres that
+    may lift."""
+    if vehicle.lifts:
+        raise InputError(
+            scene.file,
+            "effects.lift_off",
+            None,
+            "has no covariance: use the study ride_nonlinear, whose copies and engines run in time, or leave it out",
+        )
+    bent = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
+    if bent and not scene.vehicle.small_motion:
+        raise InputError(
+            scene.file,
+            "vehicle.file",
+            scene.vehicle.file,
+            f"has curves or friction ({', '.join(bent)}), whose slopes at rest can be 60 % wrong: "
+            "use the study ride_nonlinear, or say vehicle.small_motion = true",
+        )
+
+
+def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
+    """The vehicle at a speed (m/s), linearised by an engine or from its equations."""
+    if engine != "reference":
+        from models.engines.spatial_speeds import at_speeds
+
+        return at_speeds(engine, vehicle)
+    if vehicle.side_forces or vehicle.drags:
+        return lambda speed: linearise(vehicle, speed)
+    only = linearise(vehicle)
+    return lambda speed: only
+
+
+def road_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> TwoTrackRoad:
+    """The scene's road; its level holds at half the front track where the scene does not say where."""
+    road = scene.road
+    if road.file is not None:
+        fitted = fitted_road(scene).road
+        return TwoTrackRoad(replace(fitted.mean, cutoff=road.cutoff), replace(fitted.roll, cutoff=road.cutoff))
+    if road.q_mean is not None and road.q_roll is not None:
+        return TwoTrackRoad(
+            ShapeFilter(road.corner_mean, road.q_mean, road.cutoff),
+            ShapeFilter(road.corner_roll, road.q_roll, road.cutoff),
+        )
+    level = road.level if road.iso8608 is None else level_of_class(road.iso8608)
+    return road_of_level(
+        half_track_of(scene, wheels), level, corners=(road.corner_mean, road.corner_roll), cutoff=road.cutoff
+    )
+
+
+def fitted_road(scene: RideScene) -> "FittedRoad":
+    """The measured road of a scene with what was fitted to it; InputError where nothing can be."""
+    from models.road.fitted import fit
+    from models.road.measured_tracks import read_tracks
+
+    road = scene.road
+    assert road.file is not None
+    path = scene.path(road.file, "road.file")
+    return fit(read_tracks(path, road.track_width, first=road.first, last=road.last))
+
+
+def half_track_of(scene: RideScene, wheels: tuple[Wheel, ...]) -> float:
+    """Where (m) the road's tracks lie."""
+    if scene.road.file is not None:
+        return scene.road.track_width / 2.0
+    return scene.road.half_track or half_track(wheels) or BESIDE
+
+
+def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, str] | None = None) -> Excitation:
+    """The road under the wheels with the scene's effects, in its case of correlation or another one."""
+    left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
+    placed = placed_wheels(scene, wheels)
+    try:
+        found = excitation(road_of(scene, wheels), placed, left_right, front_rear)
+    except InputError as error:
+        if error.file:
+            raise
+        raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
+    for change in _built(scene).road if scene.effects else ():
+        found = change(found)
+    return found
+
+
+@contextmanager
+def told_by(scene: RideScene) -> Iterator[None]:
+    """What a computation finds wrong names no file: it is told by the scene's key that is to blame."""
+    try:
+        yield
+    except InputError as error:
+        if error.file:
+            raise
+        if error.place.partition(" ")[0] not in ("vehicle", "output"):
+            raise InputError(scene.file, error.place, error.value, error.allowed) from None
+        what = error.allowed if error.place == "vehicle" else f"{error.place}: {error.allowed}"
+        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, what) from None
+
+
+def placed_wheels(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+    """Where the wheels meet the road: at their own y, or all in the tracks of the first axle's wheels.
+
+    A vehicle without a width runs on one of the tracks where the road is given by their level.
+    """
+    if not any(wheel.y for wheel in wheels):
+        return on_track(wheels, half_track_of(scene, wheels)) if scene.road.q_mean is None else wheels
+    if scene.road.wheels == "own":
+        return wheels
+    if half_track(wheels) == 0.0:
+        raise InputError(scene.file, "road.wheels", "tracks", "the first axle has no two tracks in which to run")
+    return in_tracks(wheels)
+
+
+def in_tracks(wheels: tuple[Wheel, ...]) -> tuple[Wheel, ...]:
+    """The wheels of every axle in the tracks of the first one, side by side: its outermost wheel leads."""
+    first = [wheel.y for wheel in wheels if wheel.axle == 0]
+    tracks = {1.0: max(first), -1.0: min(first)}
+    return tuple(replace(wheel, y=tracks[copysign(1.0, wheel.y)] if wheel.y else 0.0) for wheel in wheels)

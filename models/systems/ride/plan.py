@@ -1,0 +1,141 @@
+"""What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
+
+from dataclasses import replace
+
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.core.scene_effects import lines as effect_lines
+from models.road.two_track import half_track
+from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
+from models.systems.ride.scene import RideScene
+from models.vehicles.limits import NONE
+from models.vehicles.linear_vehicle import Wheel
+from models.vehicles.plausible import plausible
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise, wheels
+
+
+def check(scene: RideScene, engines: tuple[str, ...]) -> None:
+    """Everything that can be refused before a run is refused here, before any file is written."""
+    vehicle = vehicle_of(scene)
+    excitation_of(scene, wheels(vehicle))
+    kinds = {output.name: output.kind for output in vehicle.outputs}
+    weighted = tuple(f"{name} {by}" for name, by in scene.weighting.items())
+    for i, name in enumerate(scene.quantities):
+        if name not in (*kinds, *weighted):
+            raise InputError(scene.file, f"quantities.{i}", name, "is no output of the vehicle", (*kinds, *weighted))
+    for name in scene.weighting:
+        if name not in kinds:
+            raise InputError(scene.file, f"weighting.{name}", None, "is no output of the vehicle", tuple(kinds))
+        if kinds[name] != "acceleration":
+            allowed = f"weights accelerations, and this output is one of the kind {kinds[name]!r}"
+            raise InputError(scene.file, f"weighting.{name}", scene.weighting[name], allowed)
+
+
+def findings(scene: RideScene) -> tuple[Finding, ...]:
+    """Queries about the vehicle."""
+    return plausible(vehicle_of(scene), scene.vehicle.accept)
+
+
+def describe(scene: RideScene) -> str:
+    """The scene's plan as text: vehicle, freedoms, road, cases, outputs and what is not computed."""
+    vehicle = vehicle_of(scene)
+    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
+    lines += [_line("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}")]
+    lines += _bodies(vehicle)
+    lines += [_line("road", road_of(scene, wheels(vehicle)).label(_track(scene, vehicle)))]
+    lines += [_line("", text) for text in met(scene, wheels(vehicle))]
+    lines += [_line("speed", _speed(scene))]
+    lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
+    lines += [_line("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none")]
+    return "\n".join([*lines, *effect_lines(scene)])
+
+
+LEFT_RIGHT = {
+    "modelled": "every wheel meets z_M + y theta, one mean and one roll process for all",
+    "uncorrelated": "the left wheels meet z_M + y theta, the right ones the same of a second, independent pair",
+    "equal": "every wheel meets z_M + |y| theta, so that tracks of one distance do not roll it",
+}
+FRONT_REAR = {
+    "delayed": "every axle meets what the first one met, its distance later",
+    "uncorrelated": "every axle meets a road of its own",
+    "equal": "every axle meets what the first one meets, at once",
+}
+
+
+def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
+    """What the wheels of an axle meet, and what the axles do, in words."""
+    road, placed = scene.road, placed_wheels(scene, wheels)
+    place = "its own place" if road.wheels == "own" else "that of the front wheel on its side"
+    if len({wheel.y for wheel in placed}) == 1:
+        place = f"{placed[0].y:g} m for all: one track"
+    return (
+        f"left and right {road.left_right}: {LEFT_RIGHT[road.left_right]}; y is {place}",
+        f"axles {road.front_rear}: {FRONT_REAR[road.front_rear]}",
+    )
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _track(scene: RideScene, vehicle: SpatialVehicle) -> float:
+    if scene.road.file is not None:
+        return scene.road.track_width / 2.0
+    return scene.road.half_track or half_track(wheels(vehicle))
+
+
+def _bodies(vehicle: SpatialVehicle) -> list[str]:
+    """A line per body, then the number of freedoms and their frequencies where no speed is needed."""
+    lines = []
+    for body in vehicle.bodies:
+        on = f" on {body.parent}" if body.parent else ""
+        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"))
+    parts = (len(vehicle.springs), len(vehicle.bars), len(vehicle.tyres))
+    lines.append(_line("  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)))
+    lines += [_line("freedoms", f"{len(vehicle.coordinates())}{_frequencies(vehicle)}")]
+    return [*lines, *(_line("question", text) for text in doubts(vehicle))]
+
+
+def _frequencies(vehicle: SpatialVehicle) -> str:
+    if vehicle.side_forces or vehicle.drags:
+        return ", frequencies depend on the speed"
+    return f", undamped {', '.join(f'{f:.3g}' for f in undamped(vehicle))} Hz"
+
+
+def undamped(vehicle: SpatialVehicle) -> list[float]:
+    """Frequencies (Hz) of a vehicle without damping, side forces and drag; 0 for what nothing pulls back."""
+    import numpy as np
+    from scipy.linalg import eigvalsh
+
+    linear = linearise(replace(vehicle, side_forces=(), drags=(), limits=NONE))
+    squares = eigvalsh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
+    return [float(f) for f in np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)]
+
+
+USUAL = (0.2, 500.0)
+"""Hz: frequencies of road vehicles, from a soft body to the stiffest mount."""
+FREE = 1e-4
+"""Hz: what is slower is nothing but a motion that is free."""
+
+
+def doubts(vehicle: SpatialVehicle) -> list[str]:
+    """A question where the vehicle has motions that no road vehicle has, as with a value in other units than SI."""
+    found = [f for f in undamped(vehicle) if f > FREE]
+    odd = [f for f in found if not USUAL[0] <= f <= USUAL[1]]
+    if not odd:
+        return []
+    listed = ", ".join(f"{f:.3g}" for f in odd[:4])
+    return [
+        f"is every value in SI units (kg, m, N/m)? Without damping the vehicle has frequencies of {listed} Hz; "
+        f"those of road vehicles lie from {USUAL[0]:g} to {USUAL[1]:g} Hz"
+    ]
+
+
+def _speed(scene: RideScene) -> str:
+    if scene.drive is not None:
+        points = zip(scene.drive.time, scene.drive.speed, strict=True)
+        return ", ".join(f"{speed:g} m/s at {time:g} s" for time, speed in points) + ", straight between"
+    assert scene.speeds is not None
+    values = scene.speeds.all()
+    return f"{len(values)} from {values.min():g} to {values.max():g} m/s"

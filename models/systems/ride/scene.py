@@ -1,0 +1,130 @@
+"""Scenes of ride: a vehicle, the road under its tracks, speeds, and the outputs that are weighted for people."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.speeds import Speeds, check_speeds
+from models.core.strict import Query, Strict, accepted, quantity
+from models.ride.speed_profile import SpeedProfile
+from models.road import TRACK_WIDTH
+from models.road.two_track import LEVEL, MEAN_CORNER, ROLL_CORNER
+
+LeftRight = Literal["modelled", "uncorrelated", "equal"]
+FrontRear = Literal["delayed", "uncorrelated", "equal"]
+Places = Literal["own", "tracks"]
+
+
+class RideVehicle(Strict):
+    """[vehicle]: a vehicle file, and the point about which it is linear."""
+
+    file: str = Field(description="a vehicle that comes with twinrig, or a TOML file of your own")
+    small_motion: bool = Field(default=False, description="curves and friction of springs by their slopes at rest")
+    operating_point: Literal["unloaded", "loaded"] = Field(default="unloaded", description="loaded: gravity, preload")
+    accept: list[Query] = accepted()
+
+
+class Road(Strict):
+    """[road]: two tracks from a mean and a roll process, with the paper's values or fitted to a measured road."""
+
+    file: str | None = Field(default=None, description="OpenCRG, or CSV of two tracks, to which both are fitted")
+    track_width: float = quantity("m", "between the measured tracks", default=TRACK_WIDTH)
+    first: float | None = quantity("m", "where along the file to begin", default=None, zero=True)
+    last: float | None = quantity("m", "where along the file to end", default=None)
+
+    level: float = quantity("m", "S0: a track's spectrum tends to S0 / Omega^2, two-sided", default=LEVEL)
+    iso8608: Literal["A", "B", "C", "D", "E", "F", "G", "H"] | None = Field(
+        default=None, description="class instead of a level: its mean, one-sided as the standard has it"
+    )
+    q_mean: float | None = quantity("m", "intensity of the mean process instead of a level", default=None, zero=True)
+    q_roll: float | None = quantity("1/m", "intensity of the roll process", default=None, zero=True)
+    corner_mean: float = quantity("rad/m", "corner of the mean process", default=MEAN_CORNER)
+    corner_roll: float = quantity("rad/m", "corner of the roll process", default=ROLL_CORNER)
+    cutoff: float | None = quantity("rad/m", "second corner, where outputs see the road's rate", default=None)
+    half_track: float | None = quantity("m", "where the tracks have the level: half the front track", default=None)
+    left_right: LeftRight = Field(default="modelled", description="how the tracks go together")
+    front_rear: FrontRear = Field(default="delayed", description="how the axles' roads go together")
+    wheels: Places = Field(default="own", description="each at its own y, or in the front wheels' tracks")
+
+
+class Drive(Strict):
+    """[drive]: a speed that varies, from point to point along straight lines."""
+
+    time: list[float] = Field(description="times in s, rising")
+    speed: list[float] = Field(description="speeds in m/s at these times, 0 for standstill")
+
+    def profile(self, file: str = "") -> SpeedProfile:
+        """The drive itself; raises InputError for what is none."""
+        return SpeedProfile(self.time, self.speed, file)
+
+
+class RideScene(SceneFile):
+    """One scene of ride; it has either [speeds] or a [drive]."""
+
+    CHOOSING: ClassVar[str] = "ride_choice"
+
+    system: Literal["ride"] = "ride"
+    study: str = Field(default="ride", description="the study that runs the scene")
+    vehicle: RideVehicle
+    road: Road = Road()
+    speeds: Speeds | None = Field(default=None, description="constant speeds")
+    drive: Drive | None = Field(default=None, description="a speed that varies")
+    weighting: dict[str, Literal["Wk", "Wd"]] = Field(default_factory=dict, description="ISO 2631-1, output by output")
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+    def check_choice(self) -> None:
+        """A choice of effects wants quantities, a tolerance and constant speeds."""
+        super().check_choice()
+        if self.study == self.CHOOSING and self.speeds is None:
+            raise InputError(self.file, "drive", None, "effects are chosen at constant speeds: give [speeds]")
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> RideScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(RideScene, table, file, folder)
+    if (scene.speeds is None) == (scene.drive is None):
+        raise InputError(file, "speeds", None, "give either the table speeds or the table drive, and not both")
+    if scene.speeds is not None:
+        check_speeds(file, scene.speeds)
+    if scene.drive is not None:
+        scene.drive.profile(file)
+    _check_road(file, scene.road)
+    return with_own(scene)
+
+
+OF_FILE = ("track_width", "first", "last")
+"""Keys of [road] that belong to its file."""
+OF_FORMULA = ("level", "iso8608", "q_mean", "q_roll", "corner_mean", "corner_roll", "half_track")
+"""Keys of [road] that a file answers."""
+
+
+def _check_road(file: str, road: Road) -> None:
+    foreign = OF_FILE if road.file is None else OF_FORMULA
+    for name in foreign:
+        if name in road.model_fields_set:
+            allowed = "has no meaning without road.file" if road.file is None else "is fitted to road.file: drop it"
+            raise InputError(file, f"road.{name}", getattr(road, name), allowed)
+    _check_intensities(file, road)
+    for name in ("corner_mean", "corner_roll"):
+        if road.cutoff is not None and road.cutoff <= getattr(road, name):
+            allowed = f"must be above road.{name}, {getattr(road, name):g} rad/m"
+            raise InputError(file, "road.cutoff", road.cutoff, allowed)
+
+
+def _check_intensities(file: str, road: Road) -> None:
+    given = [name for name in ("q_mean", "q_roll") if getattr(road, name) is not None]
+    if len(given) == 1:
+        other = "q_roll" if given == ["q_mean"] else "q_mean"
+        raise InputError(file, f"road.{other}", None, f"is missing: it belongs to road.{given[0]}")
+    if given and not road.q_mean and not road.q_roll:
+        raise InputError(file, "road.q_mean", road.q_mean, "is 0, and road.q_roll, too: this is no road")
+    for name in ("level", "iso8608", "half_track") if given else ():
+        if name in road.model_fields_set:
+            raise InputError(file, f"road.{name}", getattr(road, name), "is not read beside q_mean and q_roll")
+    if road.iso8608 is not None and "level" in road.model_fields_set:
+        raise InputError(file, "road.level", road.level, f"is that of class {road.iso8608} already: drop one of them")

@@ -1,0 +1,3 @@
+"""A wheelset held on its rails at lateral displacements."""
+
+ENGINES: tuple[str, ...] = ()

@@ -1,0 +1,119 @@
+"""Scenes of a wheelset held on its rails at lateral displacements, as the Manchester contact benchmark holds it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from models.contact.material import Pair
+from models.core.errors import InputError
+from models.core.scene_file import SceneFile, checked
+from models.core.strict import Strict, quantity
+from models.rail.contact_table import Contact
+from models.rail.laid_profiles import Profiles
+from models.systems.contact.scene import Bodies
+
+
+class HeldWheelset(Strict):
+    """[wheelset]: two wheels on one axle, each with the same load."""
+
+    radius: float = quantity("m", "of the wheels at the taping line", default=0.46)
+    load: float = quantity("N", "vertical, on each wheel", default=1.0e4)
+    speed: float = quantity("m/s", "of the wheelset along the track", default=2.0)
+
+
+class Positions(Strict):
+    """[positions]: lateral displacements of the wheelset to the right, evenly spaced."""
+
+    start: float = quantity("m", "first displacement", default=0.0, signed=True)
+    stop: float = quantity("m", "last displacement", default=0.010, signed=True)
+    count: int = Field(default=21, ge=1, le=1000, description="number of displacements")
+
+    def values(self) -> np.ndarray:
+        """All displacements (m)."""
+        return np.linspace(self.start, self.stop, self.count)
+
+
+class Case(Strict):
+    """[cases.NAME]: how the wheelset stands and whether it rolls."""
+
+    yaw: float = quantity("rad/m", "yaw for each metre of displacement", default=0.0, signed=True)
+    friction: float = quantity(
+        "", "coefficient of friction; 0 for a wheelset that is pressed only", default=0.0, zero=True
+    )
+
+
+class WheelRailScene(SceneFile):
+    """One scene of a held wheelset: every case at every position."""
+
+    system: Literal["wheel-rail"] = "wheel-rail"
+    study: str = Field(default="manchester", description="the study that runs the scene")
+    bodies: Bodies = Bodies()
+    profiles: Profiles = Profiles()
+    wheelset: HeldWheelset = HeldWheelset()
+    positions: Positions = Positions()
+    cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
+
+    def contact(self, case: Case) -> Contact:
+        """Profiles, track and wheelset in touch; raises InputError for files that are no profiles."""
+        side = self.profiles.side(self.wheelset.radius)
+        return Contact(
+            side, self.wheelset.load, self.wheelset.speed, case.friction, Pair(self.bodies.wheel, self.bodies.rail)
+        )
+
+
+BOUNDS = {
+    "profiles.inclination": (-0.5, 0.5, "rad"),
+    "profiles.gauge": (0.1, 3.0, "m"),
+    "profiles.back_to_back": (0.1, 3.0, "m"),
+    "profiles.gauge_depth": (1e-3, 0.1, "m"),
+    "profiles.taping": (0.01, 0.2, "m"),
+    "wheelset.radius": (0.02, 5.0, "m"),
+    "wheelset.load": (1.0, 5e5, "N"),
+    "wheelset.speed": (0.01, 200.0, "m/s"),
+    "positions.start": (-0.03, 0.03, "m"),
+    "positions.stop": (-0.03, 0.03, "m"),
+}
+"""Smallest and largest values that are no slip of a unit."""
+LARGEST_YAW, LARGEST_FRICTION = 0.1, 1.0
+"""rad; coefficient."""
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelRailScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(WheelRailScene, table, file, folder)
+    for place, (least, most, unit) in BOUNDS.items():
+        owner, key = place.split(".")
+        value = getattr(getattr(scene, owner), key)
+        if not least <= value <= most:
+            raise InputError(file, place, value, f"must be from {least:g} to {most:g} {unit}")
+    for name, case in scene.cases.items():
+        _check_case(scene, name, case)
+    return _with_files(scene)
+
+
+def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
+    largest = float(np.abs(case.yaw * scene.positions.values()).max())
+    if largest > LARGEST_YAW:
+        raise InputError(
+            scene.file,
+            f"cases.{name}.yaw",
+            case.yaw,
+            f"turns the wheelset by {largest:.3g} rad, more "
+            f"than {LARGEST_YAW:g}: the yaw is in rad for each metre of displacement",
+        )
+    if case.friction > LARGEST_FRICTION:
+        raise InputError(scene.file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
+
+
+def _with_files(scene: WheelRailScene) -> WheelRailScene:
+    """The scene with the paths of its profiles' files."""
+    named = {kind: getattr(scene.profiles, kind) for kind in ("wheel", "rail")}
+    files = {kind: str(scene.path(name, f"profiles.{kind}")) for kind, name in named.items() if Path(name).suffix}
+    if scene.profiles.smoothing and not files:
+        raise InputError(
+            scene.file, "profiles.smoothing", scene.profiles.smoothing, "has no meaning for built-in profiles"
+        )
+    return scene.model_copy(update={"profiles": scene.profiles.model_copy(update=files)})

@@ -1,0 +1,3 @@
+"""A wheelset on straight track."""
+
+ENGINES = ("reference", "exudyn", "mujoco")

@@ -1,0 +1,100 @@
+"""What a scene of a wheelset will compute: printed by ``twinrig show``, checked before any run."""
+
+from models.core.errors import InputError
+from models.core.scene_effects import lines as effect_lines
+from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.wheelset import Wheelset
+from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
+from models.systems.wheelset.scene import WheelsetScene
+
+LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, {} cells along each strip"}
+
+
+def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
+    """Refuse, before any file is written, what reading alone does not find: a wheelset or a step that cannot be."""
+    wheelset_of(scene)
+    for speed in path_speeds(scene):
+        equations = equations_of(scene, "reference", speed)
+        try:
+            equations.run(equations.rest, scene.run.step, scene.run.step)
+        except InputError as error:
+            raise InputError(scene.file, "run.step", scene.run.step, f"{error.allowed} at {speed:g} m/s") from None
+
+
+def describe(scene: WheelsetScene) -> str:
+    """The scene's plan as text: wheelset, contact, suspension, speeds, and what is built in which engine."""
+    wheelset, own = wheelset_of(scene), scene.wheelset
+    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
+    ellipse, run, speeds = wheelset.ellipse, scene.run, scene.speeds.all()
+    lines = [
+        scene.title,
+        _line("scene", f"{scene.file}, study {scene.study}"),
+        _line("wheelset", own.parameters + (f", but {changed}" if changed else "")),
+        _line(
+            "",
+            f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, spin",
+        ),
+        _line("wheels", _wheels(wheelset)),
+        _line(
+            "contact",
+            f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
+            f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}",
+        ),
+        _line(
+            "flange",
+            "that of the profile"
+            if wheelset.profiles
+            else f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m",
+        ),
+        _line("held by", _suspension(wheelset)),
+        _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"),
+        _line("critical", _critical(wheelset)),
+        _line("speeds", f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s"),
+        _line(
+            "paths",
+            f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
+            f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
+        ),
+    ]
+    return "\n".join([*lines, *effect_lines(scene), "", *ENGINES])
+
+
+def _line(head: str, text: str) -> str:
+    return f"  {head:<10} {text}"
+
+
+def _wheels(wheelset: Wheelset) -> str:
+    w, p = wheelset, wheelset.profiles
+    cones = f"cones of conicity {w.conicity:g}, radius {w.radius:g} m, on heads of radius {w.head_radius:g} m"
+    if p is None:
+        return cones
+    rails = f"{p.rail} inclined by {p.inclination:g} rad, gauge {p.gauge:g} m"
+    return f"{p.wheel} of radius {w.radius:g} m on {rails}; closed forms for {cones}"
+
+
+def _suspension(wheelset: Wheelset) -> str:
+    """Springs and dampers of one side along each axis, in words."""
+    w = wheelset
+    parts = [
+        f"{axis} {spring:g} N/m and {damper:g} N s/m"
+        for axis, spring, damper in zip(
+            "xyz", (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z), strict=True
+        )
+        if spring or damper
+    ]
+    return f"on each side, {w.half_spacing:g} m from the middle: {', '.join(parts)}" if parts else "nothing: it is free"
+
+
+def _critical(wheelset: Wheelset) -> str:
+    try:
+        return f"{critical_speed(wheelset):.5g} m/s by the linear theory of two motions"
+    except NoCriticalSpeed as error:
+        return f"none: the wheelset {error.allowed}"
+
+
+ENGINES = (
+    "  reference  the equations written out, compiled, RK4",
+    "  exudyn     a kinematic tree of 5 links, native springs and dampers, both rails by one user function, RK44",
+    "  mujoco     one body of 5 joints, springs and dampers as actuators, both rails by one native callback, RK4",
+)
+"""What each implementation builds."""

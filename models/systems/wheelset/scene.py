@@ -1,0 +1,101 @@
+"""Scenes of a wheelset on straight track: the wheelset, the law of creep, speeds, and how a path begins."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from models.core.errors import InputError
+from models.core.scene_effects import with_own
+from models.core.scene_file import SceneFile, checked
+from models.core.speeds import Speeds, check_speeds
+from models.core.steps import MOST_STEPS, divides, fitting
+from models.core.strict import Strict, quantity
+from models.rail.laid_profiles import Profiles
+
+HIGHEST_SPEED = 200.0
+"""m/s"""
+LARGEST_SHIFT, LARGEST_YAW = 0.02, 0.05
+"""m, rad: beyond, no wheelset stands on its rails."""
+
+
+class WheelsetTable(Strict):
+    """[wheelset]: a parameter set or the user's own file, with overrides."""
+
+    parameters: str = Field(default="chosen", description="a parameter set, or a TOML file with every parameter")
+    override: dict[str, float] = Field(default_factory=dict, description="parameters that differ from the set")
+
+
+class Creep(Strict):
+    """[contact]: the law of creep forces on every path; linearisation and critical speed have the linear law."""
+
+    law: Literal["linear", "fastsim"] = Field(default="fastsim", description="Kalker's linear theory, or FASTSIM")
+    cells: int = Field(default=11, ge=3, le=200, description="of FASTSIM, along each strip")
+
+
+class RunTable(Strict):
+    """[run]: how paths begin, how long and how finely they are computed."""
+
+    duration: float = quantity("s", "length of a path", default=2.0)
+    step: float = quantity("s", "step of RK4 in every implementation", default=5e-4)
+    displacement: float = quantity("m", "lateral, at the beginning, to the right", default=5e-3, signed=True)
+    yaw: float = quantity("rad", "at the beginning, to the right", default=0.0, signed=True)
+    speeds: list[float] = Field(
+        default_factory=list, description="of the paths, m/s; 0.9 and 1.1 of the critical one if not given"
+    )
+
+
+class WheelsetScene(SceneFile):
+    """One scene of a wheelset."""
+
+    system: Literal["wheelset"] = "wheelset"
+    study: str = Field(default="wheelset", description="the study that runs the scene")
+    wheelset: WheelsetTable = WheelsetTable()
+    profiles: Profiles | None = Field(default=None, description="cross-sections in place of cones and round heads")
+    contact: Creep = Creep()
+    speeds: Speeds = Field(description="table with a range of speeds, or a list of them")
+    run: RunTable = RunTable()
+    effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+
+
+def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> WheelsetScene:
+    """A checked scene from nested tables; raises InputError for anything that is not understood."""
+    scene = checked(WheelsetScene, table, file, folder)
+    _check_speeds(scene)
+    _check_run(scene)
+    if scene.contact.law == "linear" and "cells" in scene.contact.model_fields_set:
+        raise InputError(file, "contact.cells", scene.contact.cells, "has no meaning for the linear law: drop it")
+    return with_own(scene)
+
+
+def _check_speeds(scene: WheelsetScene) -> None:
+    check_speeds(scene.file, scene.speeds)
+    start, stop = scene.speeds.start, scene.speeds.stop
+    if start is not None and stop is not None and start >= stop:
+        raise InputError(
+            scene.file,
+            "speeds.stop",
+            stop,
+            f"must be above speeds.start = {start:g} m/s; for one speed write speeds.values = [{start:g}]",
+        )
+    listed = {f"speeds.values.{i}": speed for i, speed in enumerate(scene.speeds.values)}
+    listed |= {"speeds.stop": stop or 0.0} | {f"run.speeds.{i}": speed for i, speed in enumerate(scene.run.speeds)}
+    for place, speed in listed.items():
+        if not speed <= HIGHEST_SPEED:
+            raise InputError(scene.file, place, speed, f"must be at most {HIGHEST_SPEED:g} m/s")
+        if place.startswith("run") and not speed > 0.0:
+            raise InputError(scene.file, place, speed, "must be above 0, in m/s")
+
+
+def _check_run(scene: WheelsetScene) -> None:
+    run = scene.run
+    for key, most, unit in (("displacement", LARGEST_SHIFT, "m"), ("yaw", LARGEST_YAW, "rad")):
+        if abs(getattr(run, key)) > most:
+            allowed = f"must be at most {most:g} {unit}, of either sign: beyond, it does not stand on its rails"
+            raise InputError(scene.file, f"run.{key}", getattr(run, key), allowed)
+    if run.duration / run.step > MOST_STEPS:
+        raise InputError(scene.file, "run.duration", run.duration, f"needs more than {MOST_STEPS:,} steps")
+    if not divides(run.step, run.duration):
+        allowed = f"must divide run.duration = {run.duration:g} s; use for example {fitting(run.step, run.duration)}"
+        raise InputError(scene.file, "run.step", run.step, allowed)

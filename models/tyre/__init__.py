@@ -1,0 +1,1 @@
+"""Tyres: bristles in an elliptic patch, friction by formula, from tables and from property files."""

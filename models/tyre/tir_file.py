@@ -1,0 +1,154 @@
+"""Tyre tables from property files of the magic formula (`.tir`, MF-Tyre 5.x and PAC2002).
+
+Read are the coefficients of pure slip over load; slipping in both directions goes by similarity, as in ``similarity``.
+Left out: camber, inflation pressure, shifts of the curves (a table is 0 at no slip), the difference of left and right,
+combined coefficients. Along the wheel the curve is that of braking. Slips beyond the file's range are the formula's.
+Source: H. B. Pacejka, Tyre and vehicle dynamics, sec. 4.3.2, Delft-Tyre '97 and its equations (4.E9) to (4.E28).
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.tables import whole_text
+from models.tyre.magic_formula import Curve
+from models.tyre.similarity import by_similarity
+from models.tyre.tyre_table import TyreTable
+
+UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}
+"""Units in which the formula is read; a file in others is refused."""
+VERSIONS = (5.0, 6.0, 50.0, 51.0, 52.0)
+"""FITTYP of the property files whose equations these are."""
+NEEDED = ("FNOMIN", "FZMIN", "FZMAX", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
+ONE = ("LFZO", "LCX", "LMUX", "LEX", "LKX", "LCY", "LMUY", "LEY", "LKY")
+"""Scaling factors, 1 where the file has none; all other coefficients are then 0."""
+COEFFICIENT = re.compile(r"P[CDEK][XY]\d")
+LOADS = 9
+"""Nodes of the load from FZMIN to FZMAX."""
+
+
+@dataclass(frozen=True)
+class Property:
+    """Value of a key as the file has it, and its line."""
+
+    text: str
+    line: int
+
+
+def tir_table(path: str | Path) -> TyreTable:
+    """Table of the tyre in a `.tir` file; raises InputError that names file, line, key, value and what is allowed."""
+    found = _properties(path)
+    _check(path, found)
+    c = {name: _number(path, found, name) for name in found if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name)}
+    least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
+    for name in ("FNOMIN", "FZMIN", "FZMAX"):
+        if not 0.0 < c[name] <= 1e7:
+            raise _wrong(path, found, name, "must be a load above 0 and at most 1e7 N")
+    if not least < most:
+        raise _wrong(path, found, "FZMAX", f"must be above FZMIN, {least:g}")
+    loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
+    curves = {load: (along(c, load), across(c, load)) for load in loads}
+    _check_curves(path, curves)
+    return by_similarity(
+        lambda k, load: curves[load][0](k), lambda k, load: curves[load][1](k), loads, name=Path(path).name
+    )
+
+
+def along(c: dict[str, float], load: float) -> Curve:
+    """Magic formula of braking under a load (N) from a file's coefficients."""
+    of = _Of(c)
+    _, off = of.excess(load)
+    peak = (of["PDX1"] + of["PDX2"] * off) * of["LMUX"]
+    shape = of["PCX1"] * of["LCX"]
+    bend = (of["PEX1"] + of["PEX2"] * off + of["PEX3"] * off**2) * (1.0 + of["PEX4"]) * of["LEX"]
+    stiffness = (of["PKX1"] + of["PKX2"] * off) * math.exp(of["PKX3"] * off) * of["LKX"]
+    return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
+
+
+def across(c: dict[str, float], load: float) -> Curve:
+    """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
+    of = _Of(c)
+    nominal, off = of.excess(load)
+    peak = abs(of["PDY1"] + of["PDY2"] * off) * of["LMUY"]
+    shape = of["PCY1"] * of["LCY"]
+    bend = (of["PEY1"] + of["PEY2"] * off) * of["LEY"]
+    turn = math.sin(2.0 * math.atan2(load, of["PKY2"] * nominal))
+    stiffness = abs(of["PKY1"]) * nominal * turn * of["LKY"] / load
+    return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
+
+
+class _Of:
+    """Coefficients by name, with what a file may leave out."""
+
+    def __init__(self, c: dict[str, float]) -> None:
+        self._c = c
+
+    def __getitem__(self, name: str) -> float:
+        return self._c.get(name, 1.0 if name in ONE else 0.0)
+
+    def excess(self, load: float) -> tuple[float, float]:
+        """Scaled nominal load (N), and by which share of it a load is above."""
+        nominal = self["FNOMIN"] * self["LFZO"]
+        return nominal, (load - nominal) / nominal
+
+
+def _properties(path: str | Path) -> dict[str, Property]:
+    """Keys of all sections, in capitals."""
+    found: dict[str, Property] = {}
+    for line, row in enumerate(whole_text(path).splitlines(), start=1):
+        plain = row.partition("$")[0].partition("!")[0].strip()
+        name, equals, value = plain.partition("=")
+        if equals:
+            key = name.strip().upper()
+            if key in found and key in (*NEEDED, *UNITS):
+                raise InputError(
+                    path, f"line {line}, {key}", value.strip(), f"stands in line {found[key].line} already"
+                )
+            found[key] = Property(value.strip().strip("'\""), line)
+    return found
+
+
+def _check(path: str | Path, found: dict[str, Property]) -> None:
+    for name, allowed in UNITS.items():
+        if name not in found:
+            raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
+        if found[name].text.lower() not in allowed:
+            raise _wrong(path, found, name, f"must be '{allowed[0]}'")
+    if "FITTYP" in found and _number(path, found, "FITTYP") not in VERSIONS:
+        raise _wrong(
+            path, found, "FITTYP", "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)"
+        )
+    for name in NEEDED:
+        if name not in found:
+            raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED))
+
+
+def _number(path: str | Path, found: dict[str, Property], name: str) -> float:
+    try:
+        value = float(found[name].text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise _wrong(path, found, name, "must be a finite number")
+    return value
+
+
+def _wrong(path: str | Path, found: dict[str, Property], name: str, allowed: str) -> InputError:
+    return InputError(path, f"line {found[name].line}, {name}", found[name].text, allowed)
+
+
+def _check_curves(path: str | Path, curves: dict[float, tuple[Curve, Curve]]) -> None:
+    """Refuse coefficients that give no friction, or one that turns round."""
+    for load, pair in curves.items():
+        for letter, curve in zip("XY", pair, strict=True):
+            if not (0.0 < curve.D <= 3.0 and 0.0 < curve.C <= 2.0 and 0.0 < curve.B < 1e4):
+                raise InputError(
+                    path,
+                    f"P*{letter}* at {load:g} N",
+                    [curve.D, curve.B, curve.C],
+                    "give no friction: peak from 0 to 3, B above 0, C from 0 to 2",
+                )

@@ -1,0 +1,119 @@
+"""A user's own tyre table as CSV: a row for each slip angle, load and slip, with mu_x and mu_y.
+
+Columns ``slip angle [deg], load [kN], slip [-], mu_x [-], mu_y [-]`` in any order, each with one of its units (rad, N,
+%), all combinations once, rows in any order; without the column of the load friction is that of every load. mu_y is
+brought to the product g h, which must meet it to ``PRODUCT``.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.core.table_stream import Block, blocks
+from models.core.tables import NEWTONS, RADIANS, SHARES, Columns
+from models.tyre.similarity import factors
+from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
+
+FRICTION: Columns = {"slip angle": {"deg": RADIANS["deg"], "rad": 1.0}, "slip": SHARES, "mu_x": SHARES, "mu_y": SHARES}
+COLUMNS: tuple[Columns, ...] = (FRICTION, {**FRICTION, "load": {"kN": NEWTONS["kN"], "N": 1.0}})
+ANY_LOAD = 1e4
+"""Load (N) of the only node where a file has none."""
+PRODUCT = 0.03
+"""Share of the largest friction to which g h must meet mu_y."""
+MOST_NODES = 3_000_000
+
+
+def tyre_table(path: str | Path) -> TyreTable:
+    """Table from a CSV file; raises InputError that names file, line, column, value and what is allowed."""
+    lines, columns = _columns(Path(path))
+    columns.setdefault("load", np.full(len(lines), ANY_LOAD))
+    _check_ranges(path, lines, columns)
+    axes = [np.unique(columns[name], return_inverse=True) for name in ("slip angle", "load", "slip")]
+    angles, loads, slips = (nodes for nodes, _ in axes)
+    shape = angles.size, loads.size, slips.size
+    if np.prod(shape) > MOST_NODES:
+        raise InputError(
+            path,
+            "rows",
+            int(np.prod(shape)),
+            "combinations of slip angle, load and slip are too many: are the same values repeated with other digits?",
+        )
+    row = _row_of_each(path, lines, np.ravel_multi_index([place for _, place in axes], shape), axes)
+    mu_x, mu_y = (columns[name][row].reshape(shape) for name in ("mu_x", "mu_y"))
+    g, h = factors(mu_y)
+    _check_product(path, lines, row.reshape(shape), mu_x, mu_y, g[:, None, :] * h[:, :, None])
+    return TyreTable(angles, slips, loads, mu_x, g, h, Path(path).name)
+
+
+def _columns(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Line (n,) of every row, and the columns (n,) in SI; raises InputError for the first row that is wrong."""
+    parts: list[Block] = []
+    for block in blocks(path, COLUMNS):
+        for row, wrong in block.wrong.items():
+            raise InputError(path, f"line {block.lines[row]}", None, wrong)
+        parts.append(block)
+    if not parts:
+        raise InputError(path, "rows", 0, "at least one row of numbers is needed")
+    columns = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
+    return np.concatenate([part.lines for part in parts]), columns
+
+
+def _check_ranges(path: str | Path, lines: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+    for name, least, most, allowed in (
+        ("slip angle", 0.0, np.pi / 2.0, "must be from 0 to 90 deg"),
+        ("slip", 0.0, 1.0, "must be from 0 to 1"),
+        ("load", 1.0, 1e6, "must be from 1 N to 1000 kN"),
+        ("mu_x", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
+        ("mu_y", 0.0, LARGEST_FRICTION, "must be from 0 to 3"),
+    ):
+        wrong = np.flatnonzero(~((columns[name] >= least) & (columns[name] <= most * (1.0 + 1e-12))))
+        if wrong.size:
+            raise _at(path, lines, name, wrong[0], columns[name][wrong[0]], allowed)
+    for name, zero in (("mu_x", "slip"), ("mu_y", "slip angle")):
+        wrong = np.flatnonzero((columns[zero] == 0.0) & (columns[name] != 0.0))
+        if wrong.size:
+            raise _at(path, lines, name, wrong[0], columns[name][wrong[0]], f"must be 0 where {zero} is 0")
+
+
+def _at(path: str | Path, lines: np.ndarray, name: str, row: int, value: float, allowed: str) -> InputError:
+    return InputError(path, f"line {lines[row]}, column {name!r}", float(value), f"{allowed} (in SI units)")
+
+
+def _row_of_each(path: str | Path, lines: np.ndarray, number: np.ndarray, axes: list) -> np.ndarray:
+    """Row of every combination of nodes; each must be there once."""
+    shape = tuple(nodes.size for nodes, _ in axes)
+    order = np.argsort(number, kind="stable")
+    twice = np.flatnonzero(np.diff(number[order]) == 0)
+    if twice.size:
+        first, again = lines[order[twice[0]]], lines[order[twice[0] + 1]]
+        raise InputError(path, f"line {again}", None, f"has the slip angle, load and slip of line {first}")
+    missing = np.flatnonzero(np.bincount(number, minlength=int(np.prod(shape))) == 0)
+    if missing.size:
+        angle, load, slip = (nodes[i] for (nodes, _), i in zip(axes, np.unravel_index(missing[0], shape), strict=True))
+        raise InputError(
+            path,
+            "rows",
+            None,
+            f"{missing.size} of {np.prod(shape)} combinations are missing, the first: "
+            f"slip angle {np.rad2deg(angle):g} deg, load {load / 1e3:g} kN, slip {slip:g}",
+        )
+    return order
+
+
+def _check_product(
+    path: str | Path, lines: np.ndarray, row: np.ndarray, mu_x: np.ndarray, mu_y: np.ndarray, product: np.ndarray
+) -> None:
+    off = np.abs(product - mu_y)
+    worst = int(off.argmax())
+    if off.flat[worst] > PRODUCT * max(mu_x.max(), mu_y.max()):
+        raise _at(
+            path,
+            lines,
+            "mu_y",
+            row.flat[worst],
+            mu_y.flat[worst],
+            "is no product of g(slip angle, slip) and "
+            f"h(slip angle, load): the best has {product.flat[worst]:.4g} here, more than {PRODUCT:.0%} of the "
+            "largest away",
+        )

@@ -1,0 +1,30 @@
+"""Where a tyre table comes from: a surface that has a name, or a file of the user's."""
+
+from pathlib import Path
+
+from models.core.errors import InputError
+from models.tyre.magic_formula import PACEJKA, SURFACES, surface
+from models.tyre.tir_file import tir_table
+from models.tyre.tyre_file import tyre_table
+from models.tyre.tyre_table import TyreTable
+
+READERS = {".csv": tyre_table, ".tir": tir_table}
+SCALES = (0.0, 2.0)
+"""Factors on friction lie above the first and up to the second."""
+
+
+def from_file(path: Path) -> TyreTable:
+    """Table in a file, by its ending; raises InputError for what it does not hold."""
+    if path.suffix.lower() not in READERS:
+        raise InputError(path.name, "", path.suffix, "is no file of a tyre", tuple(READERS))
+    return READERS[path.suffix.lower()](path)
+
+
+def named(name: str, rear: bool = False) -> TyreTable:
+    """Table of a surface; the one of the rear tyre if there is one of its own and it is wanted."""
+    own = f"{name}/rear"
+    return surface(own if rear and own in PACEJKA else name)
+
+
+NAMES = tuple(name for name in SURFACES if "/" not in name)
+"""Surfaces that have a name."""

@@ -1,0 +1,197 @@
+"""Friction of a tyre by tables: mu_x(slip angle, slip, load) and mu_y = g(slip angle, slip) h(slip angle, load).
+
+Between the nodes each is linear in every variable, at the nodes exact, beyond the last node constant; slopes are those
+of the cell. Their resultant does not exceed the largest of either. Source: G.
+Palmkvist and O. Nordstrom, A hybrid laboratory test method for anti-lock systems (IAVSD extensive summaries): friction
+is "defined at distinct points and by linear interpolation".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.core.errors import InputError
+from models.machine.compiled import lean
+
+LARGEST_FRICTION = 3.0
+"""No tyre on any road has more."""
+ROUNDED = 0.01
+"""Share by which friction in both directions together may be above the largest in one: figures are rounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class TyreTable:
+    """Tables of one tyre on one surface.
+
+    angles (a,) : slip angles in rad, rising from 0; slips (s,) : rising from 0 to 1; loads (f,) : N, rising, above 0;
+    mu_x (a, f, s) : along the wheel; g (a, s), h (a, f) : mu_y = g h across it, as a magnitude.
+    """
+
+    angles: np.ndarray
+    slips: np.ndarray
+    loads: np.ndarray
+    mu_x: np.ndarray
+    g: np.ndarray
+    h: np.ndarray
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("angles", "slips", "loads", "mu_x", "g", "h"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=float))
+        self._check_nodes()
+        self._check_values()
+
+    def _check_nodes(self) -> None:
+        for name in ("angles", "slips", "loads"):
+            nodes = getattr(self, name)
+            if nodes.ndim != 1 or nodes.size == 0 or not np.isfinite(nodes).all() or (np.diff(nodes) <= 0.0).any():
+                raise InputError(self.name, name, nodes.tolist()[:8], "must be finite numbers that rise strictly")
+        if self.angles[0] != 0.0 or self.angles[-1] > np.pi / 2.0:
+            raise InputError(self.name, "angles", float(self.angles[0]), "must begin at 0 and end at pi/2 or before")
+        if self.slips[0] != 0.0 or self.slips[-1] != 1.0:
+            raise InputError(self.name, "slips", float(self.slips[-1]), "must begin at 0 and end at 1 (locked)")
+        if self.loads[0] <= 0.0:
+            raise InputError(self.name, "loads", float(self.loads[0]), "must be above 0")
+
+    def _check_values(self) -> None:
+        a, s, f = self.angles.size, self.slips.size, self.loads.size
+        for name, shape in (("mu_x", (a, f, s)), ("g", (a, s)), ("h", (a, f))):
+            values = getattr(self, name)
+            if values.shape != shape:
+                raise InputError(self.name, name, values.shape, f"must have the shape {shape} of its nodes")
+            if not np.isfinite(values).all() or values.min() < 0.0 or values.max() > LARGEST_FRICTION:
+                raise InputError(
+                    self.name, name, float(np.abs(values).max()), f"must be numbers from 0 to {LARGEST_FRICTION:g}"
+                )
+        if self.mu_x[:, :, 0].any():
+            raise InputError(self.name, "mu_x", float(self.mu_x[:, :, 0].max()), "must be 0 at slip 0")
+        if self.h[0].any():
+            raise InputError(self.name, "h", float(self.h[0].max()), "must be 0 at slip angle 0")
+        self._check_resultant()
+
+    def _check_resultant(self) -> None:
+        """Both together not above the largest mu_x or mu_y: linear in slip and load, so only angles lie between."""
+        peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
+        for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
+            x, g, h = (
+                values + share * np.diff(values, axis=0, append=values[-1:]) for values in (self.mu_x, self.g, self.h)
+            )
+            total = np.hypot(x, g[:, None, :] * h[:, :, None])
+            if total.max() > peak * (1.0 + ROUNDED):
+                i, j, k = np.unravel_index(total.argmax(), total.shape)
+                place = (
+                    f"slip angle {np.rad2deg(self.angles[i]):.4g} deg, load {self.loads[j]:g} N, slip {self.slips[k]:g}"
+                )
+                raise InputError(
+                    self.name,
+                    place,
+                    float(total[i, j, k]),
+                    "both together must not be above the largest "
+                    f"of either alone, {peak:.6g}, by more than {ROUNDED:.0%}",
+                )
+
+    @property
+    def cornering(self) -> float:
+        """Largest slope (1/rad) of mu_y by slip angle at none."""
+        if self.angles.size == 1:
+            return 0.0
+        return float((self.g[1].max() * self.h[1].max()) / self.angles[1])
+
+    def refined(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> "TyreTable":
+        """The same functions on nodes that include these tables' own: linear interpolation loses nothing."""
+        mu_x, g, h = self._at(angles, slips, loads)
+        return TyreTable(angles, slips, loads, mu_x, g, h, self.name)
+
+    def scaled(self, factor: float) -> "TyreTable":
+        """The same tyre where friction is ``factor`` times as large."""
+        return replace(self, mu_x=factor * self.mu_x, h=factor * self.h)
+
+    def friction(self, angles: np.ndarray, slips: np.ndarray, load: float) -> tuple[np.ndarray, np.ndarray]:
+        """mu_x and mu_y (a, s) at slip angles (rad, from 0), slips from 0 to 1 and a load (N)."""
+        mu_x, g, h = self._at(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
+        return mu_x[:, 0, :], g * h
+
+    def _at(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
+        """mu_x, g and h at other nodes."""
+        mu_x = _along(_along(_along(self.mu_x, 0, self.angles, angles), 1, self.loads, loads), 2, self.slips, slips)
+        g = _along(_along(self.g, 0, self.angles, angles), 1, self.slips, slips)
+        return [mu_x, g, _along(_along(self.h, 0, self.angles, angles), 1, self.loads, loads)]
+
+
+def _along(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Values at new nodes along one axis, linear between the old ones and constant beyond."""
+    if np.array_equal(old, new):
+        return values
+    cell = np.interp(new, old, np.arange(old.size))
+    low = np.minimum(cell.astype(int), max(old.size - 2, 0))
+    share = np.expand_dims(cell - low, tuple(range(1, values.ndim - axis)))
+    below, above = values.take(low, axis), values.take(np.minimum(low + 1, old.size - 1), axis)
+    return (1.0 - share) * below + share * above
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Several tables on common nodes, for compiled functions: mu_x (t, a, f, s), g (t, a, s), h (t, a, f)."""
+
+    angles: np.ndarray
+    slips: np.ndarray
+    loads: np.ndarray
+    mu_x: np.ndarray
+    g: np.ndarray
+    h: np.ndarray
+
+    @property
+    def packed(self) -> tuple[np.ndarray, ...]:
+        """All six arrays, in the order in which compiled functions take them."""
+        return self.angles, self.slips, self.loads, self.mu_x, self.g, self.h
+
+
+def stacked(tables: Sequence[TyreTable]) -> Tables:
+    """Tables brought to the union of their nodes, which changes no value of theirs."""
+    if not tables:
+        raise InputError("", "tyres", [], "needs at least one table")
+    nodes = [np.unique(np.concatenate([getattr(t, name) for t in tables])) for name in ("angles", "slips", "loads")]
+    fine = [t.refined(*nodes) for t in tables]
+    return Tables(*nodes, *(np.stack([getattr(t, name) for t in fine]) for name in ("mu_x", "g", "h")))
+
+
+@lean
+def place(nodes, value):
+    """Cell at which a value lies, and the share of that cell below it; held at the ends."""
+    last = nodes.size - 1
+    if last == 0 or value <= nodes[0]:
+        return 0, 0.0
+    if value >= nodes[last]:
+        return last - 1, 1.0
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if nodes[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low, (value - nodes[low]) / (nodes[low + 1] - nodes[low])
+
+
+@lean
+def across(table, i, p, j, q, k, w, g, h):
+    """mu_y of one table in cells i, j and k of slip angle, load and slip with shares p, q and w."""
+    i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
+    by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
+    by_slip += p * ((1.0 - w) * g[table, i1, k] + w * g[table, i1, k1])
+    if q == 0.0:  # at a node, as everywhere in a table of one load
+        return by_slip * ((1.0 - p) * h[table, i, j] + p * h[table, i1, j])
+    by_load = (1.0 - p) * ((1.0 - q) * h[table, i, j] + q * h[table, i, j1])
+    by_load += p * ((1.0 - q) * h[table, i1, j] + q * h[table, i1, j1])
+    return by_slip * by_load
+
+
+@lean
+def along(table, i, p, j, q, k, mu_x):
+    """mu_x of one table at slip node k, in cells i and j of slip angle and load with shares p and q."""
+    i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
+    if q == 0.0:
+        return (1.0 - p) * mu_x[table, i, j, k] + p * mu_x[table, i1, j, k]
+    low = (1.0 - q) * mu_x[table, i, j, k] + q * mu_x[table, i, j1, k]
+    return (1.0 - p) * low + p * ((1.0 - q) * mu_x[table, i1, j, k] + q * mu_x[table, i1, j1, k])

@@ -1,0 +1,1 @@
+"""What all cases share: rows and their verdicts, bands, timing, scenes, kept results."""

@@ -1,0 +1,105 @@
+"""A vehicle that bounces on the flat road, exact: piece by piece, by matrix exponentials.
+
+With geometry linear in the pitch and the tyres of the effect ``lift_off`` the motion is linear as long as each tyre
+stays in one of three states: in the air (no force), pressed (k e + d e') or hit so fast that the damper is limited by
+the spring (2 k e). Where a tyre goes from one to another is found by bisection to the last bits of time. Nothing here
+is shared with the implementations but the mass, damping and stiffness of the vehicle without tyres.
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.engines.assembly import Assembly
+from models.vehicles.linear import matrices
+from models.vehicles.pitch_plane import Parameters
+
+AIR, PRESSED, HIT = range(3)
+BISECTIONS = 52
+Pair = tuple[int, int]
+
+
+class Bounces:
+    """One vehicle; ``step`` (s) between the rows of a path, in which no tyre changes its state twice."""
+
+    def __init__(self, assembly: Assembly, step: float) -> None:
+        vehicle, self.p, self.step = assembly.vehicle, assembly.parameters, step
+        bare = replace(vehicle, struts=tuple(strut for strut in vehicle.struts if strut.lower.body is not None))
+        mass, damping, stiffness = matrices(bare)
+        weight = np.array([*(body.mass * vehicle.gravity for body in vehicle.bodies), 0.0])
+        self.rates = {
+            (i, j): _rates(mass, damping, stiffness, weight, _laws(self.p, (i, j)))
+            for i, j in product(range(3), range(3))
+        }
+        self.moves = {states: expm(rate * step) for states, rate in self.rates.items()}
+
+    def path(self, start: np.ndarray, count: int) -> np.ndarray:
+        """States (count + 1, 8) from the first (8,), every ``step`` seconds."""
+        found = [np.append(start, 1.0)]
+        for _ in range(count):
+            found.append(self._over(found[-1]))
+        return np.array(found)[:, :8]
+
+    def _over(self, x: np.ndarray) -> np.ndarray:
+        """The state (9,) a step later."""
+        left, states = self.step, self._states(x)
+        while True:
+            after = (self.moves[states] if left == self.step else expm(self.rates[states] * left)) @ x
+            if self._states(after) == states:
+                return after
+            passed, x = self._switch(x, states, left)
+            left, states = left - passed, self._states(x)
+
+    def _switch(self, x: np.ndarray, states: Pair, longest: float) -> tuple[float, np.ndarray]:
+        """Time (s) after which a tyre leaves its state, and the state of the vehicle just then."""
+        before, after = 0.0, longest
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (before + after)
+            if self._states(expm(self.rates[states] * middle) @ x) == states:
+                before = middle
+            else:
+                after = middle
+        return after, expm(self.rates[states] * after) @ x
+
+    def _states(self, x: np.ndarray) -> Pair:
+        """What each tyre does."""
+        p = self.p
+        return _state(p.k1 * x[0], p.d1 * x[4]), _state(p.k2 * x[1], p.d2 * x[5])
+
+
+def _state(spring: float, damper: float) -> int:
+    if spring <= 0.0 or spring + damper <= 0.0:
+        return AIR
+    return HIT if damper > spring else PRESSED
+
+
+def _laws(p: Parameters, states: Pair) -> list[tuple[float, float]]:
+    """Stiffness (N/m) and damping (N s/m) of both tyres in these states."""
+    laws = [((0.0, 0.0), (k, d), (2.0 * k, 0.0)) for k, d in ((p.k1, p.d1), (p.k2, p.d2))]
+    return [law[state] for law, state in zip(laws, states, strict=True)]
+
+
+def _rates(
+    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, weight: np.ndarray, laws: list[tuple[float, float]]
+) -> np.ndarray:
+    """A (9, 9) of x' = A x, x the state with a last entry of 1."""
+    a, inverse = np.zeros((9, 9)), 1.0 / mass.diagonal()
+    extra_k, extra_d = (np.diag([*(law[i] for law in laws), 0.0, 0.0]) for i in range(2))
+    a[:4, 4:8] = np.eye(4)
+    a[4:8, :4], a[4:8, 4:8] = -inverse[:, None] * (stiffness + extra_k), -inverse[:, None] * (damping + extra_d)
+    a[4:8, 8] = inverse * weight
+    return a
+
+
+def energy(assembly: Assembly, states: np.ndarray) -> np.ndarray:
+    """Energy (m,) in J of states (m, 8) on the flat road: of motion, weight, suspension and pressed tyres."""
+    p, vehicle = assembly.parameters, assembly.vehicle
+    z, v = states[:, :3], states[:, 4:]
+    pitch = np.sin(states[:, 3]) if vehicle.geometry == "exact" else states[:, 3]
+    kinetic = 0.5 * v**2 @ np.array([p.m1, p.m2, p.m3, p.I])
+    weight = -p.g * z @ np.array([p.m1, p.m2, p.m3])
+    front, rear = z[:, 2] - z[:, 0] - p.b * pitch, z[:, 2] - z[:, 1] + p.a * pitch
+    tyres = 0.5 * np.maximum(z[:, :2], 0.0) ** 2 @ np.array([p.k1, p.k2])
+    return np.asarray(kinetic + weight + tyres + 0.5 * (p.k3 * front**2 + p.k4 * rear**2))

@@ -1,0 +1,166 @@
+"""What changed between two reports: rows that are new, gone, or found something else than before."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from models.core.errors import InputError
+from validation.common.rows import STATUSES, Row, of_saved
+
+ROUNDING = 1e-9
+"""Relative change that rounding explains."""
+NEGLIGIBLE = 1e-3
+"""Share of its tolerance by which an error (expected 0) may change unmentioned: its digits are those of rounding."""
+KINDS = ("status", "gone", "new", "expected", "value")
+"""In the order in which they are told: what passes or fails now, then what is judged otherwise, then values."""
+
+Change = dict[str, Any]
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
+    file = path / "results.json" if path.is_dir() else path
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        return {"file": str(file), "provenance": _provenance(content), "rows": _rows(content)}
+    except FileNotFoundError:
+        raise InputError("--against", "", str(file), "no such file: name the results.json of a report") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("--against", "", str(file), f"cannot be read: {error}") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        allowed = f"is not the results of a validation ({type(error).__name__}: {error})"
+        raise InputError("--against", "", str(file), allowed) from None
+
+
+def _rows(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
+    rows = {row["id"]: of_saved({name: row[name] for name in Row.__dataclass_fields__}) for row in content["rows"]}
+    if len(rows) < len(content["rows"]):
+        raise ValueError("an id stands there twice")
+    return rows
+
+
+def _provenance(content: dict[str, Any]) -> dict[str, Any]:
+    """Where the rows are from, its tables as tables."""
+    found = dict(content["provenance"])
+    return found | {name: dict(found.get(name) or {}) for name in ("versions", "seeds")}
+
+
+def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[str, Any]) -> dict[str, Any]:
+    """What ``results.json`` keeps of the comparison: with what, notes, all changes.
+
+    source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
+    """
+    was = earlier["provenance"]
+    old, new = (("quick" if one.get("quick") else "full") for one in (was, source))
+    notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
+    notes += [f"{name} {before} -> {now}" for name, before, now in _other(was, source)]
+    return {
+        "file": earlier["file"],
+        "commit": str(was.get("commit", "unknown")),
+        "note": "; ".join(notes),
+        "changes": changes(earlier["rows"], {row["id"]: row for row in rows}),
+    }
+
+
+def _other(was: dict[str, Any], source: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
+    for name in ("versions", "seeds"):
+        old, new = was.get(name) or {}, source.get(name) or {}
+        yield from (
+            (f"{name[:-1]} of {key}", old.get(key), new.get(key))
+            for key in {**old, **new}
+            if old.get(key) != new.get(key)
+        )
+    yield from (
+        (name, was.get(name), source.get(name))
+        for name in ("python", "machine", "system")
+        if was.get(name) != source.get(name)
+    )
+
+
+def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[Change]:
+    """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
+    found = [
+        change
+        for id in (*before, *(id for id in after if id not in before))
+        for change in _of(id, before.get(id), after.get(id))
+    ]
+    return sorted(found, key=lambda one: (KINDS.index(one["kind"]), _rank(one["after"]), -one["size"]))
+
+
+def _rank(status: Any) -> int:
+    """What is worse now is told first; a value that is no status has no rank."""
+    return STATUSES.index(status) if status in STATUSES else 0
+
+
+def _of(id: str, old: dict[str, Any] | None, new: dict[str, Any] | None) -> Iterator[Change]:
+    row = new or old or {}
+
+    def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
+        return {
+            "id": id,
+            "kind": kind,
+            "quantity": row["quantity"],
+            "unit": row["unit"],
+            "before": before,
+            "after": after,
+            "size": size,
+            "reason": row["reason"] if kind in ("status", "new") else "",
+        }
+
+    if old is None or new is None:
+        yield change("new" if old is None else "gone", old and old["status"], new and new["status"])
+        return
+    if old["status"] != new["status"]:
+        yield change("status", old["status"], new["status"])
+    for name in ("expected", "tolerance"):
+        if _differ(old[name], new[name]):
+            yield change("expected", f"{name} {old[name]}", f"{name} {new[name]}")
+    size = _size(old, new)
+    if size > 0.0:
+        yield change("value", old["value"], new["value"], size)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _differ(old: Any, new: Any) -> bool:
+    if not (_number(old) and _number(new)):
+        return old != new
+    both_none = old != old and new != new  # neither is a number
+    return not (both_none or old == new or abs(new - old) <= ROUNDING * max(abs(old), abs(new)))
+
+
+def _size(old: dict[str, Any], new: dict[str, Any]) -> float:
+    """Change of the value as a share of the tolerance, or of the value where there is none; 0 if only rounding."""
+    was, now, tolerance = old["value"], new["value"], new["tolerance"]
+    if not _differ(was, now):
+        return 0.0
+    if not (_number(was) and _number(now)) or not abs(now - was) < float("inf"):
+        return float("inf")
+    if tolerance and _number(tolerance):
+        share = abs(now - was) / tolerance
+        return 0.0 if new["expected"] == 0 and share < NEGLIGIBLE else share
+    return abs(now - was) / max(abs(was), abs(now))
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """The comparison as text, changed rows first."""
+    own = found["changes"]
+    names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
+    counts = ", ".join(f"{sum(one['kind'] == kind for one in own)} {text}" for kind, text in names)
+    head = f"against {found['file']} (commit {found['commit']}): {len(own)} changes: {counts}"
+    told = [
+        f"  {one['kind']}: {one['id']}: {one['quantity']}: {_shown(one['before'])} -> {_shown(one['after'])}"
+        f"{' ' + one['unit'] if one['kind'] == 'value' and one['unit'] else ''}"
+        f"{': ' + one['reason'] if one['reason'] else ''}"
+        for one in own
+    ]
+    return [head, *([f"  note: {found['note']}"] if found["note"] else []), *told]
+
+
+def _shown(value: Any) -> str:
+    return "-" if value is None else f"{value:.6g}" if _number(value) else str(value)

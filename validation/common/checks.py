@@ -1,0 +1,147 @@
+"""Checks that cases and planted faults share: how far a built model is from the equations and from invariants.
+
+Each takes ``make``, a function (assembly, settings) -> model, so that the same check judges an engine as
+it is (``engine("mujoco")``) and one with a fault in it. A run that is refused or fails is infinitely far.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from models.core.errors import InputError, RunFailed
+from models.engines.assembly import Assembly
+from models.engines.catalogue import CATALOGUE, RECOMMENDED
+from models.engines.protocol import Model, Settings, Trajectory, build
+from models.vehicles import pitch_plane
+
+Make = Callable[[Assembly, Settings], Model]
+SEED = 20
+"""Of the random states."""
+SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
+"""Half-width of the random states (m, rad, m/s, rad/s): pitch up to 34 degrees, far beyond any road."""
+
+
+def engine(name: str) -> Make:
+    """The engine as it is."""
+    return partial(build, name)
+
+
+def random_states(count: int = 100) -> np.ndarray:
+    """The states (count, 8) of the audit, the same ones every time."""
+    return np.random.default_rng(SEED).uniform(-1, 1, (count, 8)) * SPREAD
+
+
+def accelerations(make: Make, assembly: Assembly, settings: Settings, states: np.ndarray) -> np.ndarray:
+    """Accelerations (n, 4) at states (n, 8), at times spread over the run's steps."""
+    model = make(assembly, settings)
+    steps = np.rint(np.linspace(0.05, 0.95, len(states)) * settings.steps)
+    return np.array([model.acceleration(i * settings.step, y) for i, y in zip(steps, states, strict=True)])
+
+
+def acceleration_gap(make: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:
+    """Largest difference to the equations of the paper, relative to the largest acceleration."""
+    states = random_states(count)
+    hand = accelerations(engine("reference"), assembly, by_hand(settings), states)
+    return relative(accelerations(make, assembly, settings, states), hand)
+
+
+def relative(found: np.ndarray, hand: np.ndarray) -> float:
+    """Largest difference by the largest magnitude."""
+    return float(np.abs(found - hand).max() / np.abs(hand).max())
+
+
+def run(make: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
+    """The trajectory, None where the run was refused or failed."""
+    try:
+        return make(assembly, settings).run()
+    except (InputError, RunFailed):
+        return None
+
+
+def trajectory_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+    """Largest difference of any state (m, rad, m/s, rad/s) to the reference with the same tableau and step.
+
+    The reference integrates with RK4, so this is a check to rounding for engines that do the same.
+    """
+    hand = engine("reference")(assembly, by_hand(settings)).run()
+    return state_gap(run(make, assembly, settings), hand)
+
+
+def state_gap(found: Trajectory | None, other: Trajectory) -> float:
+    """Largest difference of any state at the times that both hold; ``other`` may be finer by a whole factor."""
+    if found is None:
+        return float("inf")
+    every = (len(other.times) - 1) // (len(found.times) - 1)
+    return float(np.abs(found.states - other.states[::every]).max())
+
+
+def order_gap(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+    """How far the observed order is from the declared one, from the settings' step and its half.
+
+    ``truth`` is a path of the reference over the same time at a step finer by a whole factor.
+    """
+    name = settings.integrator
+    declared = next(entries[name].order for entries in CATALOGUE.values() if name in entries)
+    return abs(observed_order(make, assembly, settings, truth) - declared)
+
+
+def observed_order(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+    """log2 of the ratio of the largest state errors at the settings' step and its half."""
+    halved = replace(settings, step=settings.step / 2)
+    coarse, fine = (state_gap(run(make, assembly, own), truth) for own in (settings, halved))
+    return float(np.log2(coarse / fine)) if np.isfinite([coarse, fine]).all() and fine > 0 else float("-inf")
+
+
+def equilibrium_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+    """How far any state moves away from the closed form of the static equilibrium on a flat road.
+
+    ``assembly`` is the vehicle on its tyres with nothing that drives it.
+    """
+    trajectory = run(make, assembly, settings)
+    if trajectory is None:
+        return float("inf")
+    rest = pitch_plane.equilibrium(assembly.parameters, assembly.vehicle.geometry)
+    return float(np.abs(trajectory.states - rest).max())
+
+
+def momentum_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+    """Change of the vertical momentum against weight minus wheel forces over time, relative to weight times time.
+
+    An invariant of any vehicle under prescribed wheel forces, whatever its suspension does; exact under
+    RK4 for forces that are constant or linear over each step. Needs no second implementation.
+    """
+    trajectory = run(make, assembly, settings)
+    if trajectory is None:
+        return float("inf")
+    p = assembly.parameters
+    masses = np.array([p.m1, p.m2, p.m3])
+    momentum = trajectory.states[:, 4:7] @ masses
+    weight = masses.sum() * p.g
+    expected = weight * trajectory.times - _impulse(assembly, settings)
+    return float(np.abs(momentum - momentum[0] - expected).max() / (weight * settings.duration))
+
+
+def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
+    """Integral of both wheel forces from 0 to each step's end, shape (n + 1,), N s."""
+    signal, h, n = assembly.input, settings.step, settings.steps
+    assert signal is not None
+    force = signal.sample(0.0, h, n + 1)[:, :2].sum(axis=1)
+    part = force[:-1] if signal.held else 0.5 * (force[:-1] + force[1:])
+    return np.concatenate(([0.0], np.cumsum(h * part)))
+
+
+def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
+    """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
+    found = run(make, assembly, settings)
+    if found is None or found.enforced is None:
+        return float("inf")
+    hand = engine("reference")(assembly, by_hand(settings)).run().enforced
+    assert hand is not None
+    return float(np.sqrt(np.mean((found.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
+
+
+def by_hand(settings: Settings) -> Settings:
+    """The same step and duration for the reference's Runge-Kutta."""
+    return replace(settings, integrator=RECOMMENDED["reference"])

@@ -1,0 +1,61 @@
+"""What a full disk leaves of the files of a run, tried at moments from before the first byte to after the last one.
+
+A limit on the size of the files of this process stands for the disk: the system answers a write beyond it as it
+answers one on a full disk.
+"""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from models.core.result import Result
+from models.core.tables import write_table
+from models.core.whole_files import FULL
+from models.systems.pitch_plane.run import run as simulate
+from validation.common.scenes import road_scene
+
+MOMENTS = 20
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """No file of this process grows beyond ``size`` bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def damage(folder: Path) -> int:
+    """How many of the moments left a file that is not whole, or passed without the system's own word."""
+    result = simulate(road_scene(duration=0.05), "reference")
+    (folder / "whole").mkdir()
+    _save(result, folder / "whole")
+    whole = sizes(folder / "whole")
+    shares = np.linspace(0.0, 0.99, MOMENTS)
+    return sum(_damaged(result, folder / f"{i}", share, whole) for i, share in enumerate(shares))
+
+
+def sizes(folder: Path) -> dict[str, int]:
+    """Bytes of every file in a folder, by name."""
+    return {path.name: path.stat().st_size for path in folder.iterdir()}
+
+
+def _damaged(result: Result, folder: Path, share: float, whole: dict[str, int]) -> bool:
+    folder.mkdir()
+    try:
+        with files_of_at_most(int(share * max(whole.values()))):
+            _save(result, folder)
+    except OSError as error:
+        return error.errno not in FULL or not sizes(folder).items() <= whole.items()
+    return True
+
+
+def _save(result: Result, folder: Path) -> None:
+    write_table(folder / "table.csv", {"time": ("s", result.times[::4]), "z3": ("m", result["z3"][::4])})
+    result.save(folder / "result.nc")

@@ -1,0 +1,80 @@
+"""Scenes that the cases share, and the measured road where there is one."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.result import Result
+from models.core.time_series import write_time_series
+from models.systems.pitch_plane.scene import Scene, build
+
+VEHICLES = ("itwm_drift", "asymmetric_twin")
+STUDY_ROAD = {"source": "study", "speed": 20.0}
+COURSE = "detrended_rms_course_2in.crg"
+"""The 504 m measured course; it is not part of the repository."""
+
+
+def road_scene(
+    parameters: str = "itwm_drift",
+    step: float = 1e-3,
+    duration: float = 2.0,
+    road: dict[str, Any] | None = None,
+    folder: Path = Path(),
+) -> Scene:
+    """The vehicle on a road, the study road unless another is given."""
+    return build(
+        {
+            "title": "validation",
+            "vehicle": {"parameters": parameters},
+            "run": {"duration": duration, "step": step},
+            "effects": {"road": road or STUDY_ROAD},
+        },
+        "",
+        folder,
+    )
+
+
+def force_scene(
+    folder: Path,
+    parameters: str = "itwm_drift",
+    step: float = 1e-3,
+    duration: float = 2.0,
+    interpolation: str = "linear",
+    override: dict[str, float] | None = None,
+    effects: dict[str, Any] | None = None,
+) -> Scene:
+    """The vehicle driven by the forces that ``write_forces`` left in the folder."""
+    forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
+    return build(
+        {
+            "title": "validation",
+            "vehicle": {"parameters": parameters, "override": override or {}},
+            "run": {"duration": duration, "step": step},
+            "effects": forces | (effects or {}),
+        },
+        "",
+        folder,
+    )
+
+
+def write_forces(measured: Result, folder: Path, period: float) -> None:
+    """Wheel forces and pitch of a road-excited run as the files that force-excited scenes read."""
+    every = round(period / float(measured.times[1] - measured.times[0]))
+    columns = {name: measured[name][::every] for name in ("f1", "f2", "pitch")}
+    write_time_series(
+        folder / "wheel_forces.csv", {"front": ("N", columns["f1"]), "rear": ("N", columns["f2"])}, period
+    )
+    write_time_series(folder / "pitch.csv", {"pitch": ("rad", columns["pitch"])}, period)
+
+
+def data_folder() -> Path | None:
+    """Folder of measured files, named by TWINRIG_DATA; None where it is not set or not there."""
+    named = os.environ.get("TWINRIG_DATA")
+    return Path(named) if named and Path(named).is_dir() else None
+
+
+def gap(one: Result, other: Result) -> float:
+    """Largest difference of any state (m, rad, m/s, rad/s) of two runs on the same times."""
+    return float(np.abs(one.states - other.states).max())

@@ -1,0 +1,260 @@
+"""Scenes that the price of accuracy has never seen, drawn at random, and a verdict on what it recommends for them.
+
+The verdict's truth is of another kind than the search's: scipy's DOP853 at a tolerance of 1e-11, restarted wherever
+the input has a kink, on the instants of the setting that was recommended.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.advice.price import Answer
+from models.advice.price.pitch_plane import OwnPitchPlane, own
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, recommend
+from models.advice.price.search import Tried
+from models.advice.price.truth import Truth
+from models.core.time_series import write_time_series
+from models.engines.protocol import Settings
+from models.engines.protocol import build as build_model
+from models.machine.timing import interleave, paired_ratio
+from models.systems.pitch_plane.scene import Scene, build
+from models.vehicles.parameters.itwm_drift import PARAMETERS
+
+SEED = 907
+ENGINES = ("reference", "exudyn", "mujoco")
+TIGHT = 1e-11
+LONGEST, SHORTEST = 5e-5, 2e-5
+"""Spacing (s) of the verdict's truth."""
+ROUNDS = 9, 25
+"""Interleaved rounds of a contest, and of the one that must say the same again; turns are as long as in the race."""
+CONTEST = 3.0
+"""A default that took so many times the seconds is not timed again: that is beyond what seconds wander."""
+SCALES = {"f1,f2": 1e3, "pitch": 1e-2, "z3": 1e-2, "f3,f4": 1e3, "suspension_moment": 1e3, "enforced_moment": 1e3}
+"""Usual size of a quantity, of which tolerances are parts."""
+PARTS = (-5.0, -1.5)
+"""Tolerances by that size, powers of ten."""
+CHANGED = ("m1", "m3", "I", "k1", "k2", "k3", "k4", "d1", "d3", "d4", "a")
+"""Parameters of which four are changed, by up to e to the half."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A scene with a question about it."""
+
+    scene: Scene
+    quantity: str
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Of one recommended setting. errors in the quantity's unit; floor : how well the search knew the truth; slower :
+    than the engine's default that meets the tolerance, in force calls, or beyond doubt in seconds, as ``kind`` says."""
+
+    title: str
+    curve: str
+    label: str
+    tolerance: float
+    predicted: float
+    true: float
+    floor: float
+    slower: bool
+    kind: str = "calls"
+
+    @property
+    def meets(self) -> bool:
+        """Whether the tolerance is held."""
+        return self.true <= self.tolerance
+
+    @property
+    def factor(self) -> float:
+        """Predicted by true error, or its inverse, whichever is above 1; errors below the floor count as the floor."""
+        one, other = max(self.predicted, self.floor), max(self.true, self.floor)
+        if one == other:
+            return 1.0
+        return max(one, other) / min(one, other) if min(one, other) > 0.0 else math.inf
+
+
+def drawn(number: int, folder: Path) -> Drawn:
+    """Scene ``number``; its files go into ``folder``."""
+    rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
+    kind = KINDS[number % len(KINDS)]
+    name, effects, more = kind(rng, folder, number)
+    override = {
+        key: float(np.exp(rng.uniform(-0.5, 0.5))) * getattr(PARAMETERS, key)
+        for key in map(str, rng.choice(CHANGED, 4, replace=False))
+    }
+    table = {
+        "title": f"scene {number}, {name}",
+        "vehicle": {"geometry": str(rng.choice(["exact", "linear"])), "override": override},
+        "run": {"duration": float(more.pop("duration", round(rng.uniform(0.1, 0.3), 2))), "step": 1e-3},
+        "effects": effects,
+        **more,
+    }
+    quantity = (
+        "enforced_moment"
+        if "prescribed_pitch" in effects
+        else str(
+            rng.choice(["f1,f2", "pitch", "z3", "f3,f4"] if "wheel_forces" not in effects else ["pitch", "z3", "f3,f4"])
+        )
+    )
+    return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*PARTS))
+
+
+Kind = Callable[[np.random.Generator, Path, int], tuple[str, dict[str, Any], dict[str, Any]]]
+
+
+def _iso_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    road = {
+        "source": "iso8608",
+        "road_class": str(rng.choice(list("ABCDE"))),
+        "seed": number,
+        "speed": float(round(rng.uniform(5.0, 35.0), 1)),
+    }
+    return "rough road", {"road": road}, {}
+
+
+def _study_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    source = str(rng.choice(["study", "hills"]))
+    return f"{source} road", {"road": {"source": source, "speed": float(round(rng.uniform(5.0, 35.0), 1))}}, {}
+
+
+def _release(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
+    return (
+        "release",
+        {},
+        {
+            "start": {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()},
+            "duration": float(rng.choice([0.2, 0.4, 2.5])),
+        },
+    )
+
+
+def _forces(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    how, period = str(rng.choice(["linear", "held", "smooth"])), float(rng.choice([1e-2, 5e-3, 2e-3]))
+    file = _written(rng, folder, number, period)
+    return f"{how} forces", {"wheel_forces": {"file": file, "interpolation": how}}, {"duration": 0.2}
+
+
+def _guided(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    file, pitch = _written(rng, folder, number, 5e-3), f"pitch{number}.csv"
+    times = 5e-3 * np.arange(101)
+    wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
+    write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
+    return (
+        "prescribed pitch",
+        {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}},
+        {"duration": 0.2},
+    )
+
+
+KINDS: tuple[Kind, ...] = (
+    _iso_road,
+    _forces,
+    _release,
+    _iso_road,
+    _guided,
+    _study_road,
+    _forces,
+    _iso_road,
+    _release,
+    _forces,
+)
+
+
+def _written(rng: np.random.Generator, folder: Path, number: int, period: float) -> str:
+    """A file of wheel forces: the weight, two waves and noise of each sample."""
+    times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
+    forces = {
+        wheel: (
+            "N",
+            3825.9
+            + 500 * np.sin(2 * np.pi * rng.uniform(1, 10) * times + rng.uniform(0, 6))
+            + 200 * rng.standard_normal(len(times)),
+        )
+        for wheel in ("front", "rear")
+    }
+    write_time_series(folder / name, forces, period)
+    return name
+
+
+def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
+    """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
+    scene = own(one.scene, one.quantity, engines)
+    found = recommend(scene, one.tolerance)
+    errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
+    return [
+        Verdict(
+            one.scene.title,
+            choice.tried.setting.curve,
+            choice.tried.setting.label(),
+            one.tolerance,
+            choice.error,
+            errors[choice.tried.setting],
+            found.truth.uncertainty,
+            slower(found, key, choice),
+            key[1],
+        )
+        for key, choice in found.winners.items()
+    ]
+
+
+def true_errors(scene: OwnPitchPlane, settings: list[Setting]) -> dict[Setting, float]:
+    """Largest error of each setting over the whole run, beside DOP853 on instants that all steps share if they can."""
+    runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in dict.fromkeys(settings)}
+    parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
+    common = _fine(scene, math.lcm(*parts.values()))
+    if scene.base / common < SHORTEST:
+        parts = {setting: _fine(scene, n) for setting, n in parts.items()}
+    else:
+        parts = dict.fromkeys(runs, common)
+    exact = {n: Truth(_exact(scene, scene.base / n), 0.0, "", 0, scene.cell) for n in set(parts.values())}
+    return {setting: exact[parts[setting]].error(run) for setting, run in runs.items()}
+
+
+def _fine(scene: OwnPitchPlane, parts: int) -> int:
+    """A multiple of ``parts`` in which rows lie no further apart than LONGEST."""
+    return parts * math.ceil(scene.base / parts / LONGEST * (1 - 1e-9))
+
+
+def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
+    model = build_model("reference", scene.assembly, Settings("DOP853", spacing, scene.whole, TIGHT))
+    return scene.answer((model, model.run()))
+
+
+def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
+    """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
+    engine, kind = key
+    rivals = [one for one in _defaults(found) if one.setting.engine.startswith(engine)]
+    if kind == "calls":
+        return any(rival.calls < choice.calls for rival in rivals)
+    return any(_loses(found, choice, rival) for rival in rivals)
+
+
+def _defaults(found: Recommendation) -> list[Tried]:
+    """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
+    was searched: what is recommended may have forgotten one."""
+    if found.scene.whole > found.scene.first * (1 + 1e-9):
+        return [
+            one.refined.tried for one in found.defaults.values() if one.refined is not None and not one.extrapolated
+        ]
+    held = found.tolerance - found.searched.uncertainty
+    able = sorted(
+        (one for one in found.tried if one.setting.default and one.error <= held), key=lambda one: one.setting.value
+    )
+    return list({one.setting.curve: one for one in able}.values())
+
+
+def _loses(found: Recommendation, choice: Choice, rival: Tried) -> bool:
+    if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
+        return False
+    jobs = [partial(found.scene.solve, one.setting, found.scene.first) for one in (choice.tried, rival)]
+    return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER for rounds in ROUNDS)

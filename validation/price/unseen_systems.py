@@ -1,0 +1,139 @@
+"""Scenes of a wheelset, of handling and of braking that the price of accuracy has never seen, and a verdict on each.
+
+The verdict's truth has four times the cells that were recommended, or more, and steps of DOP853's own. A stop with
+valves in the loop has one method alone: its truth has thrice the steps of the search's.
+"""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.advice.price import Answer, Ladder
+from models.advice.price.meshed import Meshed
+from models.advice.price.problem import Setting
+from models.advice.price.recommendation import SYSTEMS as PRICED
+from models.advice.price.recommendation import Recommendation, recommend
+from models.advice.price.truth import Truth
+from models.core.systems import SYSTEMS
+from validation.price.unseen import Drawn, Verdict, slower
+
+SEED = 908
+ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
+"""Engines that are asked about."""
+FINER, LEAST, MOST = 4, 60, 200
+"""Times the cells recommended, and the fewest and most cells of a contact."""
+MORE = 3
+"""Times the steps of the search's own truth."""
+TOLERANCES = {
+    "y": (1e-6, 1e-4),
+    "fy": (20.0, 500.0),
+    "yaw_rate": (1e-4, 3e-3),
+    "load": (1.0, 50.0),
+    "stopping_distance": (1e-5, 0.05),
+    "yaw": (1e-4, 1e-2),
+}
+
+
+def drawn(system: str, number: int) -> Drawn:
+    """Scene ``number`` of a system, with a quantity and a tolerance."""
+    rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
+    table, quantities = {"wheelset": _wheelset, "handling": _handling, "braking": _braking}[system](rng)
+    table |= {"title": f"{system} {number}", "system": system}
+    quantity = str(rng.choice(quantities))
+    low, high = np.log(TOLERANCES[quantity])
+    scene = import_module(SYSTEMS[system].scene).build(table, "", Path())
+    return Drawn(scene, quantity, float(np.exp(rng.uniform(low, high))))
+
+
+def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+    override = {
+        "conicity": float(rng.uniform(0.02, 0.2)),
+        "stiffness_x": float(rng.uniform(1e5, 1e6)),
+        "friction": float(rng.uniform(0.1, 0.5)),
+    }
+    run = {
+        "duration": 0.1,
+        "step": 5e-4,
+        "displacement": float(rng.uniform(1e-3, 5e-3)),
+        "speeds": [float(round(rng.uniform(10.0, 60.0), 1))],
+    }
+    law = str(rng.choice(["fastsim", "fastsim", "linear"]))
+    return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": {"values": [10.0]}}, [
+        "y",
+        "fy",
+    ]
+
+
+def _handling(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+    own = {
+        "speed": float(rng.uniform(12.0, 30.0)),
+        "duration": 0.5,
+        "rough": bool(rng.integers(2)),
+        "steer": [[0.05, 0.0], [float(rng.uniform(0.2, 0.4)), float(rng.uniform(-0.06, 0.06))]],
+    }
+    tyres = {"friction": float(rng.uniform(0.4, 1.0))}
+    return {"tyres": tyres, "manoeuvres": {"drawn": own}}, ["yaw_rate", "load"]
+
+
+def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+    kind, surface = str(rng.choice(["straight", "j_turn", "split"])), str(rng.choice(["snow", "wet", "ice"]))
+    own: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
+    if kind == "j_turn":
+        own["steer"] = float(rng.uniform(0.01, 0.05))
+    if kind == "split":
+        own["right"] = "ice"
+    controller = {"kind": str(rng.choice(["none", "slip_bang_bang", "slip_pi"]))}
+    quantities = ["stopping_distance"] if kind == "straight" else ["stopping_distance", "yaw"]
+    return {
+        "controller": controller,
+        "pressure": {},
+        "load_transfer": {},
+        "procedures": {"drawn": own},
+        "road": {"stretches": [{"left": surface}]},
+    }, quantities
+
+
+def judge(one: Drawn) -> list[Verdict]:
+    """A verdict on every setting that is recommended for a scene."""
+    system = one.scene.system
+    scene = import_module(PRICED[system]).own(one.scene, one.quantity, ENGINES[system])
+    found = recommend(scene, one.tolerance)
+    errors = {
+        setting: _error(scene, found, setting)
+        for setting in dict.fromkeys(choice.tried.setting for choice in found.winners.values())
+    }
+    return [
+        Verdict(
+            one.scene.title,
+            choice.tried.setting.curve,
+            choice.tried.setting.label(),
+            one.tolerance,
+            choice.error,
+            errors[choice.tried.setting],
+            found.truth.uncertainty,
+            slower(found, key, choice),
+            key[1],
+        )
+        for key, choice in found.winners.items()
+    ]
+
+
+def _error(scene: Any, found: Recommendation, setting: Setting) -> float:
+    """Largest error of a setting over the whole run, beside a truth of another kind than the search's."""
+    rung, ladder = found.truth.rung, scene.reference()
+    exact = _exact(scene, setting) if isinstance(scene, Meshed) else _stopped(scene, ladder, rung)
+    return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
+
+
+def _exact(scene: Meshed, setting: Setting) -> Answer:
+    cells = min(MOST, max(LEAST, FINER * round(1.0 / setting.value))) if scene.cells else 0
+    step = min(scene.steps.values()) if scene.cells else setting.value
+    return scene.answer((cells, scene.exact(cells, step, scene.whole)))
+
+
+def _stopped(scene: Any, ladder: Ladder, rung: int) -> Answer:
+    setting = Setting(ladder.engine, ladder.method, ladder.values[rung] / MORE, ladder.order)
+    answer: Answer = scene.answer(scene.solve(setting, scene.whole))
+    return answer
