@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.tables import write_table
 from models.core.whole_files import write_whole
 
 if TYPE_CHECKING:
@@ -95,6 +94,8 @@ class Result:
 
     def save_table(self, path: Path, *channels: str) -> None:
         """Write channels that share one axis, or all of them, as columns of a CSV."""
+        from models.core.tables import write_table
+
         names = channels or [str(name) for name in (*self.data.coords, *self.data.data_vars)]
         write_table(path, {name: (self.data[name].attrs.get("units", "-"), self[name]) for name in names})
 
