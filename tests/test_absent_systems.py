@@ -1,5 +1,7 @@
 """What a scene of any system does not name is not there, and what it names adds what its file says and no more."""
 
+from dataclasses import replace
+
 import pytest
 
 from models.core.errors import InputError
@@ -16,6 +18,7 @@ from models.core.scene_effects import (
     without,
 )
 from models.core.systems import DEFAULT, SYSTEMS, load
+from models.systems.braking.effects import TABLE
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
 from studies.asked import SCENES, plan_of
@@ -51,9 +54,7 @@ def test_a_bare_scene_names_nothing():
 
 def test_the_counts_see_an_effect_that_says_nothing_of_itself(monkeypatch):
     """Positive control of the comparison: a file that declares too little is found out."""
-    from models.systems.braking.effects import load_transfer
-
-    monkeypatch.setattr(load_transfer, "COUNTS", {})
+    monkeypatch.setitem(TABLE, "load_transfer", replace(TABLE["load_transfer"], counts={}))
     found = added("braking", "load_transfer", quick=True)
     assert found == {"reference": {"moving loads": 4}} != declared("braking", "load_transfer", found)
 

@@ -1,5 +1,319 @@
-"""Effects of scenes of braking, one file each: see ``models.core.scene_effects``.
+"""Effects of scenes of braking: see ``models.core.scene_effects``.
 
 Counts are those of one stop: coordinates and wheels of the vehicle, what its brakes, chambers and tyres keep, and how
 many hold the controller in the loop.
 """
+
+from typing import Any
+
+from models.core.scene_effects import Entry, Table
+
+AXLES = ("front", "rear", "trailer")
+NOISE, BITS, SCALE = ("noise",), ("bits", "range"), ("gain", "offset")
+"""Keys of white noise, of the steps of a converter, and of a sensor that is not set right."""
+
+
+def _differs(part: Any, keys: tuple[str, ...]) -> bool:
+    """Whether any of these keys of a table of the scene is other than by default."""
+    return any(getattr(part, key) != type(part).model_fields[key].default for key in keys)
+
+
+def _of_sensor(kind: str, keys: tuple[str, ...], says: str, cost: str, count: str, usual: dict[str, float]) -> Entry:
+    """An effect of the sensors behind a port: keys of [port.signals] or [port.pressures] other than a perfect one's."""
+
+    def there(scene: Any) -> bool:
+        return scene.port is not None and _differs(getattr(scene.port, kind), keys)
+
+    def leave_out(table: Table, scene: Any) -> None:
+        for key in (*keys, *(("seed",) if keys == NOISE else ())):
+            table["port"][kind].pop(key, None)
+
+    def put_in(table: Table, scene: Any) -> None:
+        table.setdefault("port", {}).setdefault(kind, {}).update(usual)
+
+    counts = {"asked": 1, count: 4}
+    place = f"port.{kind}.{keys[0]}"
+    return Entry(says, place, cost, counts, ("port",), there=there, leave_out=leave_out, put_in=put_in)
+
+
+def _of_brakes(
+    keys: tuple[str, ...], freed: tuple[str, ...], says: str, place: str, cost: str, count: str, usual: Any
+) -> Entry:
+    """An effect of the brakes: keys of their tables, those that go with it, and ``usual(axle, brake)``: what changes of
+    a brake of the front or the rear axle."""
+
+    def there(scene: Any) -> bool:
+        return any(_differs(getattr(scene.brakes, axle), keys) for axle in AXLES)
+
+    def leave_out(table: Table, scene: Any) -> None:
+        for axle in {*AXLES} & {*table["brakes"]}:
+            for key in freed:
+                table["brakes"][axle].pop(key, None)
+
+    def put_in(table: Table, scene: Any) -> None:
+        for axle in AXLES[:2]:
+            plain = getattr(scene.brakes, axle).model_dump(exclude_none=True)
+            brake = table.setdefault("brakes", {}).setdefault(axle, plain)
+            brake.update(usual(axle, brake))
+
+    return Entry(says, place, cost, {count: 4}, there=there, leave_out=leave_out, put_in=put_in)
+
+
+def _without_reservoir(table: Table, scene: Any) -> None:
+    """The supply's pressure stays."""
+    for key in ("reservoir", "volume"):
+        table["pressure"].pop(key, None)
+
+
+def _without_slow_apply(table: Table, scene: Any) -> None:
+    """Valves apply, hold and release; a controller of the scene that applies slowly goes back to its steps."""
+    del table["pressure"]["slow"]
+    table.get("controller", {}).get("parameters", {}).pop("slow", None)
+
+
+def _with_slow_apply(table: Table, scene: Any) -> None:
+    """A throttle that fills eight times as slowly."""
+    fill = 0.15 if scene.pressure is None else scene.pressure.fill
+    table.setdefault("pressure", {})["slow"] = 8.0 * fill
+
+
+def _with_delay(table: Table, scene: Any) -> None:
+    """Two samples of delay."""
+    table.setdefault("pressure", {})["delay"] = 2.0 * scene.run.sample
+
+
+def _of_two_surfaces(scene: Any) -> bool:
+    stretches = scene.road.stretches
+    return any(
+        len({s.left for s in stretches} | {procedure.right or s.right or s.left for s in stretches}) > 1
+        for procedure in scene.procedures.values()
+    )
+
+
+def _on_one_surface(table: Table, scene: Any) -> None:
+    """Everywhere the surface that is left of the line at the start."""
+    first = scene.road.stretches[0].left
+    table["road"] = {"stretches": [{"left": first}]}
+    for procedure in table["procedures"].values():
+        if "right" in procedure:
+            procedure["right"] = first
+
+
+def _on_another_surface(table: Table, scene: Any) -> None:
+    """Dry road after 10 m, or ice after a dry one."""
+    last = scene.road.stretches[-1]
+    stretches = table.setdefault("road", {}).setdefault("stretches", [{"left": "ice"}])
+    stretches.append({"x": last.x + 10.0, "left": "ice" if last.left == "dry" else "dry"})
+
+
+def _in_the_plane(table: Table, scene: Any) -> None:
+    """The same masses, axles and wheels in the plane."""
+    from models.systems.braking.of_scene import vehicle_of
+
+    table["vehicle"] = {"override": vehicle_of(scene).model_dump()}
+
+
+def _with_trailer(table: Table, scene: Any) -> None:
+    """The chosen one, unladen."""
+    from models.brake.trailer import CHOSEN
+
+    table["trailer"] = CHOSEN.model_dump(exclude_unset=True)
+
+
+MEASURED, SUSPENSION = ("measured_pressures",), ("suspension",)
+TABLE = {
+    "anti_lock": Entry(
+        "A controller that opens and closes the valves of every wheel",
+        "controller",
+        "one answer of the controller per sample",
+        {"controllers": 1},
+        excludes=MEASURED,
+        why="which leave nothing to a controller",
+        usual={"kind": "slip_bang_bang"},
+        there=lambda scene: scene.controller.kind != "none",
+    ),
+    "faults": Entry(
+        "Lost, delayed or wrong samples, and valves that are stuck, on demand",
+        "port.faults",
+        "one look at each fault per sample",
+        {"asked": 1},
+        ("port",),
+        usual=[{"kind": "lost", "start": 0.1, "end": 0.2}],
+        there=lambda scene: scene.port is not None and bool(scene.port.faults),
+    ),
+    "hysteresis": _of_brakes(
+        ("release", "falling"),
+        ("release", "falling"),
+        "Brakes whose torque falls along another line than it rises",
+        "brakes.front.release",
+        "nothing: the same law of torque by pressure, its two lines apart",
+        "loops",
+        lambda axle, brake: {"falling": 1.1 * brake["gradient"]},  # chosen
+    ),
+    "load_transfer": Entry(
+        "Loads that move between the wheels with the accelerations of the body, semi-static",
+        "load_transfer",
+        "two products per wheel and step",
+        {"moving loads": 4},
+        excludes=SUSPENSION,
+        why="whose springs carry the loads",
+        usual={},
+    ),
+    "measured_pressures": Entry(
+        "Pressures from a file in place of pedal and controller",
+        "measured",
+        "a row of a table per sample",
+        {"files": 1},
+    ),
+    "port": Entry(
+        "A port between vehicle and controller, each exchange checked, behind which anything may stand",
+        "port",
+        "one exchange per sample, and what stands behind it",
+        {"asked": 1},
+        excludes=MEASURED,
+        why="which leave nothing to ask",
+        usual={},
+    ),
+    "pressure_calibration": _of_sensor(
+        "pressures",
+        SCALE,
+        "Pressures that come out too large or shifted",
+        "a product and a sum per brake and sample",
+        "wrong signals",
+        {"gain": 1.01},
+    ),
+    "pressure_dynamics": Entry(
+        "Chambers that fill and empty with time constants behind their valves",
+        "pressure",
+        "two exponentials per wheel and sample",
+        {"time constants": 8},
+        excludes=MEASURED,
+        why="which are the chambers'",
+        usual={},
+    ),
+    "pressure_noise": _of_sensor(
+        "pressures",
+        NOISE,
+        "White noise on the pressures that a controller asks for",
+        "a random number per brake and sample",
+        "noisy signals",
+        {"noise": 0.02},
+    ),
+    "pressure_quantisation": _of_sensor(
+        "pressures",
+        BITS,
+        "Pressures that a controller asks for, in the steps of a converter",
+        "a rounding per brake and sample",
+        "converted signals",
+        {"bits": 12, "range": 16.0},
+    ),
+    "push_out": _of_brakes(
+        ("push_out",),
+        ("push_out", "release"),
+        "Pressure that the brakes need before any torque comes",
+        "brakes.front.push_out",
+        "nothing: the same law of torque by pressure",
+        "push-outs",
+        lambda axle, brake: {"push_out": 0.75 if axle == "front" else 0.25},  # of the paper's brakes
+    ),
+    "rear_tyres": Entry(
+        "Rear tyres with figures of their own",
+        "tyres.own_rear",
+        "a second table of friction per surface",
+        {"tables": 1},
+        usual=True,
+    ),
+    "relaxation": Entry(
+        "Slip angles that lag behind the motion by a relaxation length",
+        "relaxation",
+        "a state per wheel, exact within a step",
+        {"lags": 4},
+        excludes=SUSPENSION,
+        why="whose tyres answer at once",
+        modules=("models.brake.relaxation",),
+        usual={"front": 0.3, "rear": 0.3},  # m, chosen
+    ),
+    "reservoir": Entry(
+        "A reservoir whose pressure falls as chambers fill from it",
+        "pressure.reservoir",
+        "a sum over the chambers per sample",
+        {"volumes": 4},
+        ("pressure_dynamics",),
+        usual=40.0,  # l, of a truck
+        leave_out=_without_reservoir,
+    ),
+    "second_surface": Entry(
+        "A road of more than one surface, along it or across",
+        "road.stretches",
+        "the surface under each wheel is looked up at every step",
+        {"surfaces": 1, "tables": 1},
+        there=_of_two_surfaces,
+        leave_out=_on_one_surface,
+        put_in=_on_another_surface,
+    ),
+    "signal_calibration": _of_sensor(
+        "signals",
+        SCALE,
+        "Wheel speeds that are read too large or shifted",
+        "a product and a sum per wheel and sample",
+        "wrong signals",
+        {"gain": 1.01},
+    ),
+    "signal_noise": _of_sensor(
+        "signals",
+        NOISE,
+        "White noise on the wheel speeds that the controller is given",
+        "a random number per wheel and sample",
+        "noisy signals",
+        {"noise": 0.05},
+    ),
+    "signal_quantisation": _of_sensor(
+        "signals",
+        BITS,
+        "Wheel speeds in the steps of a converter",
+        "a rounding per wheel and sample",
+        "converted signals",
+        {"bits": 12, "range": 40.0},
+    ),
+    "slow_apply": Entry(
+        "Valves with a fourth state beside apply, hold and release: they apply slowly",
+        "pressure.slow",
+        "one comparison per wheel and step",
+        {"slow fillings": 4},
+        ("pressure_dynamics",),
+        leave_out=_without_slow_apply,
+        put_in=_with_slow_apply,
+    ),
+    "suspension": Entry(
+        "A vehicle from a file on its springs, whose body rolls and pitches as it brakes",
+        "vehicle.file",
+        "every freedom of its file, and a step of an engine around the compiled tyres",
+        modules=("models.brake.sprung", "models.engines.braking_sprung"),
+        leave_out=_in_the_plane,
+    ),
+    "teeth": Entry(
+        "Wheel speeds that are counted from the teeth of a wheel by a timer",
+        "port.teeth",
+        "the edges of every wheel within each sample",
+        {"asked": 1},
+        ("port",),
+        usual={},
+    ),
+    "trailer": Entry(
+        "A drawbar trailer of two axles behind the truck",
+        "trailer",
+        "two coordinates and four wheels more",
+        {"coordinates": 2, "wheels": 4},
+        excludes=SUSPENSION,
+        why="whose springs carry that vehicle, alone",
+        put_in=_with_trailer,
+    ),
+    "valve_delay": Entry(
+        "Valves that answer a while after their command",
+        "pressure.delay",
+        "commands that are kept for as many samples",
+        {"kept commands": 8},
+        ("pressure_dynamics",),
+        put_in=_with_delay,
+    ),
+}
