@@ -10,12 +10,13 @@ from typing import Any
 from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
+from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
 from models.systems.braking.plan import check_reference
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 from models.systems.braking.stops import Scatter, Stops, scatter
@@ -30,6 +31,8 @@ PAPER = {
     "yaw": ("final yaw [deg]", "21.3 in one run, a guessed reading", "", "compared"),
 }
 """What the paper prints of its simulation and its measurements. "0.4" stands in print, where 0.04 would fit."""
+ROUNDS = {"scale": "", "steer": "rad", "deceleration": "m/s^2", "aside": "m"}
+"""What is told of every round of the fit, and its unit."""
 WANTED = {"deceleration": 1.36, "aside": 7.5}
 
 
@@ -62,8 +65,8 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Fit, then run once more; saves ``calibration.csv`` and ``calibration.png``, a stop as fitted."""
-    from studies.braking import save
+    """Fit, then run once more; saves the fit as ``rounds.nc`` and ``calibration.csv``, and a stop as fitted as
+    ``calibration.nc`` and ``calibration.png``."""
     from studies.braking_figures import stop_figure
 
     check(scene, engines)
@@ -72,7 +75,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     assert steer is not None
     scale, steps = scene.tyres.scale.get(options.surface, 1.0), []
     progress("loading", 0.0)
-    drive(scene, options.procedure)  # compiles what is not compiled yet, once and not in every worker
+    drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with processes(options.workers) as pool:
         for i in range(options.rounds):
             progress(f"fit, round {i + 1}", i / (options.rounds + 2))
@@ -83,12 +86,16 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         progress("as fitted", options.rounds / (options.rounds + 2))
         last = fitted(scene, options, scale, steer)
         found = _means(last, options, options.last, pool, options.seed + 1)
-    rows = ["scale,steer [rad],deceleration [m/s^2],aside [m]"]
-    rows += [",".join(f"{value:.9g}" for value in step) for step in steps]
+    rounds = [
+        Channel("round", values, unit) for values, unit in zip(zip(*steps, strict=True), ROUNDS.values(), strict=True)
+    ]
+    result(scene, dict(zip(ROUNDS, rounds, strict=True)), {}, engine="reference").save(folder / "rounds.nc")
+    heads = (f"{name} [{unit}]" if unit else name for name, unit in ROUNDS.items())
+    rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
-    stop = Stop(drive(last, options.procedure))
-    save(last, options.procedure, stop.path, folder / "calibration.nc")
-    stop_figure(last, options.procedure, stop, folder / "calibration.png")
+    stop = drive(last, procedure=options.procedure)
+    stop.save(folder / "calibration.nc")
+    stop_figure(last, options.procedure, Stop(stop.detail), folder / "calibration.png")
     return {
         "scene": scene.title,
         "folder": str(folder),

@@ -9,11 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import RunFailed
+from models.core.result import Channel, result
 from models.core.strict import Strict, read
 from models.core.whole_files import write_whole
 from models.systems.braking.plan import check as check_scene
 from models.systems.braking.plan import check_reference
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, ControllerTable, RoadTable, Stretch
 from models.systems.braking.stop_report import Stop
 
@@ -99,12 +100,12 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Drive all; saves ``controllers.csv`` and ``controllers.png``."""
+    """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
     every, found, failed = cases(scene), list[tuple[Case, dict[str, float]]](), dict[str, str]()
     for i, case in enumerate(every):
         progress(f"{case.surface}, {case.procedure}, {case.controller}", i / len(every))
         try:
-            path = drive(case.scene, case.procedure)
+            path = drive(case.scene).detail
         except RunFailed as error:
             failed[f"{case.surface}, {case.procedure}, {case.controller}"] = str(error)
             continue
@@ -116,7 +117,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         found.append(
             (case, {key: values[name] for key, name in SHOWN.items()} | {"locked [s]": float(stop.locks().time.max())})
         )
-    _save(found, folder / "controllers.csv")
+    _save(scene, found, folder)
     _figure(scene, found, folder / "controllers.png")
     answer = [
         {"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
@@ -138,14 +139,19 @@ def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
     return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in found)
 
 
-def _save(found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
-    heads = list(found[0][1]) if found else []
-    rows = [",".join(["surface", "procedure", "controller", *heads])]
-    rows += [
-        ",".join([case.surface, case.procedure, case.controller, *(f"{values[head]:.17g}" for head in heads)])
-        for case, values in found
-    ]
-    write_whole(file, "\n".join(rows) + "\n")
+def _save(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], folder: Path) -> None:
+    """A stop per line, or along the axis of the result."""
+    names, heads = ("surface", "procedure", "controller"), list(found[0][1]) if found else []
+    cases = [[getattr(case, name) for name in names] for case, _ in found]
+    values = [[stop[head] for head in heads] for _, stop in found]
+    channels = {
+        head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
+        for head, column in zip(heads, zip(*values, strict=True), strict=True)
+    }
+    texts = {name: Channel("stop", list(column)) for name, column in zip(names, zip(*cases, strict=True), strict=False)}
+    result(scene, channels, texts, engine="reference").save(folder / "controllers.nc")
+    rows = [",".join((*case, *(f"{value:.17g}" for value in row))) for case, row in zip(cases, values, strict=True)]
+    write_whole(folder / "controllers.csv", "\n".join([",".join((*names, *heads)), *rows]) + "\n")
 
 
 PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}

@@ -1,6 +1,6 @@
 """How anti-lock braking scatters run by run: two ensembles of stops, their means, scatter and a test between them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -9,13 +9,14 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
+from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
-from models.core.tables import write_table
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
+from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, build
 from models.systems.braking.stops import Scatter, Stops, Welch, scatter, welch
 
@@ -57,24 +58,14 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     build(merged(scene.table(), options.other), f"{scene.file} with options.other", Path(scene.folder))
 
 
-def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables with some of their values changed; a table that gives another ``kind`` replaces the old one."""
-    out = dict(table)
-    for key, value in changes.items():
-        old = table.get(key)
-        both = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
-        out[key] = merged(old, value) if both else value  # type: ignore[arg-type]
-    return out
-
-
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Two ensembles; saves ``stops.csv`` and ``ensemble.png``."""
+    """Two ensembles; saves each by its name, as netCDF and as CSV, and ``ensemble.png``."""
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
     found = []
     progress("loading", 0.0)
-    drive(scene, options.procedure)  # compiles what is not compiled yet, once and not in every worker
+    drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
@@ -83,10 +74,12 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
                 progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
 
             found.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
-    for name, arrays in zip(options.names, found, strict=False):
-        columns = {"speed": ("m/s", arrays["speed"])}
-        columns |= {key: (label.partition("[")[2][:-1], arrays[key]) for key, label in SHOWN.items()}
-        write_table(folder / f"{name}.csv", columns)
+    for name, table, arrays in zip(options.names, tables, found, strict=False):
+        units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in SHOWN.items()}}
+        channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
+        stops = result(build(table, scene.file, Path(scene.folder)), channels, {}, engine="reference")
+        stops.save(folder / f"{name}.nc")
+        stops.save_table(folder / f"{name}.csv")
     scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in found]
     tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(found) > 1 else {}
     _figure(scene, options, found, scatters, tests, folder)

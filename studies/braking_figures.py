@@ -5,11 +5,12 @@ from pathlib import Path as File
 import matplotlib.pyplot as plt
 import numpy as np
 
+from models.brake.plane_chain import place_of
 from models.brake.plane_step import LOAD, SLIP
+from models.brake.plane_vehicle import Plane
 from models.drawing.figures import save
-from models.systems.braking.hitch import hitch, on_ground, outlines
 from models.systems.braking.measured_pressures import MeasuredPressures
-from models.systems.braking.of_scene import plane_of, sides
+from models.systems.braking.of_scene import plane_of, sides, vehicle_of
 from models.systems.braking.plan import behind
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
@@ -18,6 +19,8 @@ COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#66c2a5", "#c
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
 OTHER = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
+OVERHANG, BESIDE = 1.2, 1.1
+"""m, of an outline beyond its axles, chosen, and half of its width."""
 
 
 def stop_figure(
@@ -85,12 +88,31 @@ def _motion(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
     axis.plot(stop.times, slip, color="#d55e00", label="side slip [deg]")
     if trailer:
-        axis.plot(stop.times, np.degrees(hitch(stop)), color="#cc79a7", label="hitch angle [deg]")
+        axis.plot(stop.times, np.degrees(stop.hitch), color="#cc79a7", label="hitch angle [deg]")
     axis.plot(stop.times[1:], stop.across, color="#009e73", lw=0.8, label="lateral acceleration [m/s²]")
     axis.set(xlabel="time [s]", ylabel="see legend", title="Motion beside the direction of travel")
     low, high = axis.get_ylim()
     axis.set_ylim(min(low, -1.0), max(high, 1.0))
     axis.legend(fontsize=8)
+
+
+def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
+    """Unit and corners (m, 2) in m in its axes: of the truck, the drawbar and the trailer's body."""
+    truck, trailer = vehicle_of(scene), scene.trailer
+    boxes = [(0, _box(truck.front.x, truck.rear.x))]
+    if trailer is not None:
+        boxes += [(1, np.array([[trailer.drawbar, 0.0], [0.0, 0.0]])), (2, _box(trailer.front.x, trailer.rear.x))]
+    return boxes
+
+
+def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
+    """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
+    return np.array([place_of(unit, x, y, positions, plane.reach) for x, y in corners])
+
+
+def _box(front: float, rear: float) -> np.ndarray:
+    ahead, behind = front + OVERHANG, rear - OVERHANG
+    return np.array([[ahead, BESIDE], [ahead, -BESIDE], [behind, -BESIDE], [behind, BESIDE], [ahead, BESIDE]])
 
 
 def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:

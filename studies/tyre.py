@@ -8,9 +8,10 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
+from models.core.result import Channel, result
 from models.core.strict import Strict, read
 from models.core.tables import write_table
-from models.systems.braking.of_scene import kinds_of, surfaces_of, table_of
+from models.systems.braking.of_scene import tables_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_table import TyreTable
@@ -36,42 +37,22 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every tyre of the scene: saves tyre.png, and a CSV of each that can be read as a tyre again."""
+    """Every tyre of the scene: saves tyre.png, and of each a netCDF and a CSV that can be read as a tyre
+    again."""
     from studies.tyre_figure import tyre_figure
 
     options = read(Options, scene.options, scene.file, "options")
     tables = tables_of(scene)
     tyre_figure(tables, options.slip_angles, options.load, scene.title, folder / "tyre.png")
-    answer = {name: figures(table, options.load) for name, table in tables.items()}
+    answer = {name: table.figures(options.load) for name, table in tables.items()}
     for name, table in tables.items():
-        save_csv(table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+        save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "answer": answer,
         "table": lines(answer, options.load),
-    }
-
-
-def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
-    """Tables by name of all surfaces under all procedures, a rear tyre of its own beside the front one."""
-    names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
-    return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
-
-
-def figures(table: TyreTable, load: float) -> dict[str, float]:
-    """What engineers ask of a tyre first, under one load (N)."""
-    x, y = table.friction(table.angles, table.slips, load)
-    little_slip, little_angle = table.slips[1], table.angles[min(1, table.angles.size - 1)]
-    return {
-        "peak along": float(x[0].max()),
-        "at slip [%]": 100.0 * float(table.slips[x[0].argmax()]),
-        "locked": float(x[0, -1]),
-        "slope [1/%]": 0.01 * float(x[0, 1] / little_slip),
-        "peak across": float(y[:, 0].max()),
-        "at slip angle [deg]": float(np.rad2deg(table.angles[y[:, 0].argmax()])),
-        "slope [1/deg]": float(y[:, 0][min(1, len(y) - 1)] / np.rad2deg(little_angle)) if little_angle else 0.0,
     }
 
 
@@ -83,10 +64,13 @@ def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
     return rows + [f"  {key:<22}" + "".join(f"{own[key]:>{width}.4g}" for own in answer.values()) for key in keys]
 
 
-def save_csv(table: TyreTable, options: Options, path: Path) -> None:
-    """Friction at the slip angles of the figure and at none, at all slips of the table."""
-    angles = np.unique([0.0, *options.slip_angles])
+def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> None:
+    """Friction at the slip angles of the figure and at none, at all slips of the table: as netCDF, and as a CSV."""
+    angles, axes = np.unique([0.0, *options.slip_angles]), ("slip_angle", "slip")
     x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
+    channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}
+    nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", table.slips, "-")}
+    result(scene, channels, nodes, load=options.load).save(path.with_suffix(".nc"))
     angle, slip = (axis.ravel() for axis in np.meshgrid(angles, table.slips, indexing="ij"))
     write_table(
         path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()), "mu_y": ("-", y.ravel())}

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from models.brake.written import turned
 
 from models.brake.advance import AT_REST, advance
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.surfaces import Stretch, road
 from models.brake.trailer import CHOSEN, follow, hooked
-from models.brake.written import turned
 from models.engines.braking import Carried
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braked_truck import ICE, braked, constant, sideways_with_locked_front_wheels, transfer_errors

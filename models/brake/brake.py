@@ -55,7 +55,16 @@ def torque(i, pressure, before, brakes):
     return max(up, min(down, before))
 
 
+def torques(pressures: np.ndarray, brakes: Brakes) -> np.ndarray:
+    """Torques (n,) in N m of the first brake along pressures (n,) in bar, from none on."""
+    before, along = 0.0, np.empty(len(pressures))
+    for n, pressure in enumerate(pressures):
+        before = along[n] = torque(0, pressure, before, brakes)
+    return along
+
+
 PAPER_FRONT = Brake(push_out=0.75, release=0.71, rising=1500.0, falling=1500.0)
 PAPER_REAR = Brake(push_out=0.25, release=0.25, rising=1200.0, falling=1200.0)
 """The paper's brakes as far as its printed data can be read: its hysteresis parameters (0.71, 0.75; 0.25, 0.25) are
 good, that they are these two pressures and that the factors are 1500 and 1200 N m/bar is guessed."""
+PAPER_BRAKES = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)

@@ -56,6 +56,18 @@ def is_steady(controller: Controller) -> bool:
     return bool(own.get("steady", False))
 
 
+@dataclass(frozen=True, eq=False)
+class Pressures:
+    """Pressures (W,) in bar that stay, as on a test without anti-lock system."""
+
+    pressures: np.ndarray
+    steady: ClassVar[bool] = True
+
+    def sample(self, given: Sample) -> Command:
+        """Always the same."""
+        return Command(pressures=self.pressures)
+
+
 @dataclass(frozen=True)
 class AllApplied:
     """No anti-lock system: every valve stays open."""

@@ -48,6 +48,10 @@ def road(stretches: list[Stretch], line: float = 0.0, kinds: int = 1) -> Road:
     return Road(starts, left, right, line, kinds)
 
 
+EVEN = road([Stretch(0.0, 0, 0)])
+"""The same surface everywhere."""
+
+
 def check_way(own: Road, way: float) -> None:
     """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
     shortest = float(np.diff(own.starts[1:]).min()) if own.starts.size > 2 else np.inf

@@ -112,6 +112,20 @@ class TyreTable:
         mu_x, g, h = self._at(np.asarray(angles, dtype=float), np.asarray(slips, dtype=float), np.array([load]))
         return mu_x[:, 0, :], g * h
 
+    def figures(self, load: float) -> dict[str, float]:
+        """What engineers ask of a tyre first, under one load (N), by name and unit."""
+        x, y = self.friction(self.angles, self.slips, load)
+        little_slip, little_angle = self.slips[1], self.angles[min(1, self.angles.size - 1)]
+        return {
+            "peak along": float(x[0].max()),
+            "at slip [%]": 100.0 * float(self.slips[x[0].argmax()]),
+            "locked": float(x[0, -1]),
+            "slope [1/%]": 0.01 * float(x[0, 1] / little_slip),
+            "peak across": float(y[:, 0].max()),
+            "at slip angle [deg]": float(np.rad2deg(self.angles[y[:, 0].argmax()])),
+            "slope [1/deg]": float(y[:, 0][min(1, len(y) - 1)] / np.rad2deg(little_angle)) if little_angle else 0.0,
+        }
+
     def _at(self, angles: np.ndarray, slips: np.ndarray, loads: np.ndarray) -> list[np.ndarray]:
         """mu_x, g and h at other nodes."""
         mu_x = _along(_along(_along(self.mu_x, 0, self.angles, angles), 1, self.loads, loads), 2, self.slips, slips)

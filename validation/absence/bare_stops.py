@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from models.machine.timing import interleave, paired_ratio
+from models.systems.braking.march import Path
 from models.systems.braking.procedures import controller_of, ready
-from models.systems.braking.run import Path
 from validation.absence import hand_built_braking
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare

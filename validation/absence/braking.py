@@ -32,18 +32,18 @@ def write(folder: Path) -> None:
 
 def seen(scene: BrakingScene, engine: str = "reference") -> tuple[dict[str, int], bytes]:
     """Counts of what is handed to the run of a stop, and its path."""
-    from models.systems.braking.procedures import drive
-    from models.systems.braking.run import Braked
+    from models.systems.braking.march import Braked
+    from models.systems.braking.run import run
 
-    found, run = dict[str, int](), Braked.run
+    counts, march = dict[str, int](), Braked.run
 
     def watched(vehicle: Braked, controller: Any, *more: Any) -> Any:
-        found.update(_counts(vehicle, controller))
-        return run(vehicle, controller, *more)
+        counts.update(_counts(vehicle, controller))
+        return march(vehicle, controller, *more)
 
     with mock.patch.object(Braked, "run", watched):
-        path = drive(scene, STOP, engine)
-    return found, path.states.tobytes()
+        path = run(scene, engine, procedure=STOP).detail
+    return counts, path.states.tobytes()
 
 
 def _counts(vehicle: Any, controller: Any) -> dict[str, int]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from models.brake.wheel_step import wheel_step
 from models.machine.compiled import inlined, lean, njit
-from models.systems.braking.run import Path
+from models.systems.braking.march import Path
 from models.tyre.tyre_table import across, place
 
 CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12

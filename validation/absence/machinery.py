@@ -93,7 +93,7 @@ def made_by_hubs(engine: str) -> int:
 
 def made_by_braking(engine: str) -> tuple[int, int]:
     """Arrays that more samples of a bare manoeuvre of a braked vehicle make, and how many more samples these are."""
-    from models.systems.braking.procedures import drive
+    from models.systems.braking.run import run
 
     slow, fast = (
         bare("braking", procedures={braking.STOP: {"kind": "j_turn", "speed": speed, "steer": 0.02}})
@@ -101,8 +101,8 @@ def made_by_braking(engine: str) -> tuple[int, int]:
     )
     samples, counts = [], []
     for scene in (slow, fast):
-        samples.append(len(drive(scene, braking.STOP, engine).times))
-        counts.append(arrays(partial(drive, scene, braking.STOP, engine)))
+        samples.append(len(run(scene, engine).times))
+        counts.append(arrays(partial(run, scene, engine)))
     return counts[1] - counts[0], samples[1] - samples[0]
 
 

@@ -1,18 +1,18 @@
 """The paper's truck under constant brake torques, and what it must do by closed forms."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE, advance
-from models.brake.plane_step import LOAD, REPORTED
+from models.brake.advance import AT_REST, FINE
+from models.brake.plane_step import LOAD
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
-from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked
+from validation.braking.stepping import Moving
 
+PLANE = truck(PAPER)
 ICE = surface("ice")
 LOCKS = 1e9
 """Torque (N m) that locks a wheel at once."""
@@ -22,45 +22,26 @@ def braked(
     torques: np.ndarray,
     *,
     tables: Tables | None = None,
-    steer: float = 0.0,
     speed: float = 10.0,
     until: float = 0.0,
     step: float = 5.5e-3,
     plane: Plane | None = None,
-    go: Callable[..., Any] = advance,
     yaw: float = 0.0,
     duration: float = 200.0,
     side: float = 0.0,
-) -> Any:
-    """State, time, last report and wheels' turning at the end of a stop, or at a speed (m/s) or a time (s) before.
+    **more: Any,
+) -> Moving:
+    """The truck at the end of a stop, or at a speed (m/s) or a time (s) before.
 
-    torques (4,) : N m; steer : rad, of the front wheels; yaw, side : rates at the start; go : ``advance`` or an
-    engine's.
+    torques (4,) : N m; yaw, side : rates at the start; more : as of ``Moving``.
     """
-    tables, plane = tables or stacked([ICE]), plane or truck(PAPER)
-    state, turning = np.zeros((2, 3)), speed / plane.radius
-    state[1] = speed, side, yaw
-    found, report, time, status = np.zeros(3), np.zeros((4, REPORTED)), 0.0, FINE
-    front, way = np.array([steer, steer, 0.0, 0.0]), road([Stretch(0.0, 0, 0)])
-    while status == FINE and np.hypot(*state[1, :2]) > until and time < duration - 1e-9:
-        status, used = go(
-            state,
-            turning,
-            np.tile(torques, (2, 1)),
-            step,
-            front,
-            ICE.cornering,
-            plane,
-            np.zeros(4, dtype=int),
-            way,
-            tables.packed,
-            found,
-            report,
-        )
-        time += used
+    truck = Moving(plane or PLANE, tables or stacked([ICE]), speed, slope=ICE.cornering, **more)
+    truck.state[1, 1:], status = (side, yaw), FINE
+    while status == FINE and truck.speed > until and truck.time < duration - 1e-9:
+        status, _ = truck.on(torques, step)
     if status not in (FINE, AT_REST):
-        raise RunFailed("braking", "the truck does not come to its end", time)
-    return state, time, report, turning
+        raise RunFailed("braking", "the truck does not come to its end", truck.time)
+    return truck
 
 
 def constant(mu: float) -> Tables:
@@ -77,8 +58,8 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     Friction mu on a part of the weight slows the whole mass: z = mu F / (m g -+ mu m g h / E) for one axle, and the
     axles' loads change by m z g h / E.
     """
-    plane, lift = truck(PAPER), PAPER.height / PAPER.wheelbase
-    light, static = plane._replace(spin=np.full(4, 1e-9)), plane.static.reshape(2, 2).sum(1)
+    lift = PAPER.height / PAPER.wheelbase
+    light, static = PLANE._replace(spin=np.full(4, 1e-9)), PLANE.static.reshape(2, 2).sum(1)
     slowing = {
         "all wheels": mu * GRAVITY,
         "front wheels": mu * static[0] / (PAPER.mass * (1.0 - mu * lift)),
@@ -86,12 +67,12 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        _, _, report, _ = braked(np.repeat(torque, 2), tables=constant(mu), plane=light, duration=0.5)
+        slid = braked(np.repeat(torque, 2), tables=constant(mu), plane=light, duration=0.5)
         wanted = static + PAPER.mass * slowing[name] * lift * np.array([1.0, -1.0])
-        errors[name] = float(np.abs(report[:, LOAD].reshape(2, 2).sum(1) / wanted - 1.0).max())
+        errors[name] = float(np.abs(slid.report[:, LOAD].reshape(2, 2).sum(1) / wanted - 1.0).max())
     return errors
 
 
 def sideways_with_locked_front_wheels() -> float:
     """Lateral way (m) of a truck on ice from 10 to 1 m/s whose front wheels are steered by 0.05 rad, but locked."""
-    return float(braked(np.array([LOCKS, LOCKS, 0.0, 0.0]), steer=0.05, until=1.0)[0][0, 1])
+    return float(braked(np.array([LOCKS, LOCKS, 0.0, 0.0]), steer=0.05, until=1.0).state[0, 1])

@@ -12,6 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.five_phase_cycle import Frozen
+
 
 @dataclass(frozen=True)
 class Wheel:
@@ -100,6 +103,15 @@ def phase(wheel: Wheel, at: list[float], rate: float, sign: float, level: float)
         if side != 0:
             at[0], i = float(wheel.slips[i + (side > 0)]), i + side
     raise ArithmeticError("a phase that does not end")
+
+
+def exact_cycle(frozen: Frozen, controller: FivePhase, begun: float | None = None) -> tuple[float, float]:
+    """``cycle`` of a wheel at a frozen speed whose brake is a line; begun : rate of pressure (bar/s) at first."""
+    rates = [rate(k, controller) for k in range(6)]
+    rates[0] = rates[0] if begun is None else begun
+    phases = [(frozen.brake.rising * speed, *end_of(k, controller)) for k, speed in enumerate(rates)]
+    forces = frozen.load * frozen.tyre.mu_x[0, 0]
+    return cycle(Wheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
 
 
 def cycle(wheel: Wheel, phases: list[tuple[float, float, float]], cycles: int = 40) -> tuple[float, float]:

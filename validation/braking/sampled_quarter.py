@@ -15,10 +15,8 @@ from models.brake.controller import SAMPLE, Controller, Sample
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import APPLY, RELEASE, Chambers
 from models.brake.quarter import Quarter
-from models.brake.surfaces import Stretch, road
-from models.systems.braking.run import Braked
+from models.systems.braking.march import on_tyres
 from models.tyre.magic_formula import SURFACES, surface
-from models.tyre.tyre_table import stacked
 
 SUPPLY, FILL, EMPTY = 10.0, 0.15, 0.1
 SLOWEST = 0.06
@@ -29,18 +27,8 @@ Stretches = Sequence[tuple[float, Callable[[float], float]]]
 
 def own_distance(quarter: Quarter, brake: Brake, on: str, controller: Controller, speed: float, substeps: int) -> float:
     """Stopping distance (m) by the product's step."""
-    tyre, one = surface(on), np.ones(1)
-    vehicle = Braked(
-        quarter.plane,
-        np.zeros(1, dtype=np.int64),
-        stacked([tyre]),
-        tyre.cornering,
-        road([Stretch(0.0, 0, 0)]),
-        of_wheels(brake),
-        Chambers(FILL * one, EMPTY * one, SUPPLY),
-        np.zeros(1),
-        substeps=substeps,
-    )
+    chambers = Chambers(np.array([FILL]), np.array([EMPTY]), SUPPLY)
+    vehicle = on_tyres(quarter.plane, [surface(on)], of_wheels(brake), chambers, substeps=substeps)
     return float(vehicle.run(controller, speed).states[-1, 0, 0])
 
 

@@ -6,14 +6,13 @@ from functools import cache
 import numpy as np
 
 from models.brake.brake import Brake, of_wheels
-from models.brake.controller import Command, Sample
+from models.brake.controller import Pressures
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
-from models.brake.surfaces import Stretch, road
 from models.engines.braking_sprung import OnSprings
-from models.systems.braking.run import Braked, Path
-from models.tyre.tyre_table import TyreTable, stacked
+from models.systems.braking.march import Braked, Path, on_tyres
+from models.tyre.tyre_table import TyreTable
 from models.vehicles.spatial import FREEDOMS, Body, SideForce, SpatialVehicle, SpringDamper, Tyre, Vector
 from models.vehicles.vehicle_file import load_vehicle
 
@@ -83,15 +82,9 @@ def constant(mu: float) -> TyreTable:
     return TyreTable(angles, slips, np.array([1e3]), x, np.ones((3, 3)), mu * aside[:, None])
 
 
-class Torques:
+def steady(*torques: float) -> Pressures:
     """Torques (4,) in N m of the brakes of ``braked``, which stay."""
-
-    def __init__(self, *torques: float) -> None:
-        self.torques = np.array(torques)
-
-    def sample(self, given: Sample) -> Command:
-        """Always the same."""
-        return Command(pressures=self.torques / GRADIENT)
+    return Pressures(np.array(torques) / GRADIENT)
 
 
 def braked(
@@ -109,15 +102,12 @@ def braked(
     steer : rad, of the front wheels; supply : bar, for a controller of valves; gradient : N m/bar.
     """
     brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
-    return Braked(
+    return on_tyres(
         truck(own.plane),
-        none.astype(int),
-        stacked([tyre]),
-        tyre.cornering,
-        road([Stretch(0.0, 0, 0)]),
+        [tyre],
         of_wheels(brake, brake, brake, brake),
         Chambers(none + 0.03, none + 0.02, supply),
-        np.array([steer, steer, 0.0, 0.0]),
+        steer=np.array([steer, steer, 0.0, 0.0]),
         substeps=substeps,
         sample=step,
         engine=None if engine is None else OnSprings(engine, own),

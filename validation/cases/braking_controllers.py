@@ -8,27 +8,26 @@ from typing import Any
 import numpy as np
 from scipy.stats import ttest_ind
 
-from models.brake.brake import PAPER_FRONT, PAPER_REAR, Brake, of_wheels, torque
+from models.brake.brake import PAPER_BRAKES, PAPER_FRONT, Brake, of_wheels, torques
 from models.brake.controller import SAMPLE
 from models.brake.controllers import CONTROLLERS
-from models.brake.controllers.five_phase import FivePhase, end_of, rate
-from models.brake.frozen import Cycle, Frozen, limit_cycle, sampled
+from models.brake.controllers.five_phase import FivePhase
+from models.brake.controllers.five_phase_cycle import Cycle, Frozen, limit_cycle, sampled
+from models.brake.plane_step import LOCKED
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
-from models.brake.quarter import Quarter
-from models.brake.surfaces import Stretch, road
-from models.systems.braking.run import Braked
-from models.systems.braking.run import Path as Recorded
+from models.systems.braking.march import Path as Recorded
+from models.systems.braking.march import on_tyres
+from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import stacked
-from validation.braking.five_phase_exact import Wheel, cycle
+from validation.braking.five_phase_exact import exact_cycle
+from validation.braking.quarter_stops import FRONT
 from validation.braking.sampled_quarter import own_distance, reference_distance
 from validation.common.rows import Row, System, Table, at_most, behaves, finding
 
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
 SEED = 22
-FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 LINE = Brake(push_out=0.0, release=0.0, rising=1500.0, falling=1500.0)
 WIDE = Brake(push_out=0.75, release=0.5, rising=1500.0, falling=1800.0)
 PHASES = {
@@ -76,19 +75,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def draw(data: dict[str, Any]) -> dict[str, Any]:
-    """None."""
-    return {}
-
-
 def loop(brake: Brake, low: float, high: float, points: int = 2000) -> tuple[np.ndarray, np.ndarray]:
     """Pressures (bar) and torques (N m) of one run from high down to low and up again, after a rise from none."""
-    brakes, now = of_wheels(brake), 0.0
     path = np.concatenate((np.linspace(high, low, points), np.linspace(low, high, points)))
-    now, torques = torque(0, high, now, brakes), np.empty(path.size)
-    for n, p in enumerate(path):
-        now = torques[n] = torque(0, p, now, brakes)
-    return path, torques
+    return path, torques(path, of_wheels(brake))
 
 
 def loop_area(brake: Brake, low: float, high: float) -> float:
@@ -108,7 +98,7 @@ def _loop_rows() -> list[Row]:
             p, t = loop(brake, low, 4.5)
             worst = max(worst, abs(-np.trapezoid(t, p) / loop_area(brake, low, 4.5) - 1.0))
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
-    rise = [torque(0, p, 0.0, of_wheels(WIDE)) for p in np.linspace(0.0, 0.75, 100)]
+    rise = torques(np.linspace(0.0, 0.75, 100), of_wheels(WIDE))
     return [
         at_most(
             "braking_controllers.loop",
@@ -124,7 +114,7 @@ def _loop_rows() -> list[Row]:
             "braking_controllers.push_out",
             SYSTEM,
             "torque up to the push-out pressure",
-            "none" if not any(rise) else "some",
+            "some" if rise.any() else "none",
             "none",
             "the springs hold the shoes back",
         ),
@@ -143,12 +133,11 @@ def _supply_row() -> Row:
     """Four strokes from a reservoir whose supply is cut: what the fifth still has."""
     volumes, reservoir = np.array([1.2, 1.2, 1.6, 1.6]), 40.0
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0, volumes, reservoir)
-    air, torques = still(chambers, SAMPLE), np.empty((5, 4))
-    brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
+    air, ends = still(chambers, SAMPLE), np.empty((5, 4))
     for stroke in range(5):
         for valve in (APPLY,) if stroke == 4 else (APPLY, RELEASE):
             for _ in range(500):
-                by_valves(np.full(4, valve), SAMPLE, air, chambers, brakes, torques)
+                by_valves(np.full(4, valve), SAMPLE, air, chambers, PAPER_BRAKES, ends)
     left = 8.0 * (reservoir / (reservoir + volumes.sum())) ** 5
     return at_most(
         "braking_controllers.strokes",
@@ -166,17 +155,9 @@ def _frozen(inertia: float = FRONT.spin_inertia) -> Frozen:
     return Frozen(11.11, FRONT.mass * GRAVITY, FRONT.radius, inertia, LINE, surface("dry"))
 
 
-def closed_form(controller: FivePhase, inertia: float = FRONT.spin_inertia) -> tuple[float, float]:
-    """Period (s) and utilisation of the limit cycle, exact from node to node."""
-    wheel = _frozen(inertia)
-    phases = [(LINE.rising * rate(k, controller), *end_of(k, controller)) for k in range(6)]
-    forces = wheel.load * wheel.tyre.mu_x[0, 0]
-    return cycle(Wheel(wheel.speed, wheel.radius, inertia, wheel.tyre.slips, forces), phases, 12)
-
-
 def _cycle_rows(name: str) -> list[Row]:
-    own, (period, used) = limit_cycle(_frozen(), PHASES[name]), closed_form(PHASES[name])
-    wrong = closed_form(PHASES[name], FRONT.spin_inertia * 1.001)[0]
+    own, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
+    wrong = exact_cycle(_frozen(FRONT.spin_inertia * 1.001), PHASES[name])[0]
     return [
         at_most(
             f"braking_controllers.period_{name}",
@@ -226,32 +207,21 @@ def _sampled_rows(name: str, own: Cycle) -> Iterator[Row]:
 
 def truck_stop(on: str, name: str, speed: float) -> Recorded:
     """The paper's truck on one surface under a controller with its defaults."""
-    tyre, plane = surface(on), truck(PAPER)
-    vehicle = Braked(
-        plane,
-        np.zeros(4, dtype=np.int64),
-        stacked([tyre]),
-        tyre.cornering,
-        road([Stretch(0.0, 0, 0)]),
-        of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR),
-        Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0),
-        np.zeros(4),
-    )
-    return vehicle.run(CONTROLLERS[name](4), speed)
+    chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 8.0)
+    return on_tyres(truck(PAPER), [surface(on)], PAPER_BRAKES, chambers).run(CONTROLLERS[name](4), speed)
 
 
 def stop(on: str, name: str, speed: float) -> dict[str, float]:
     """Figures of one stop: distance (m), time (s), utilisation above 15 km/h, longest lock there (ms)."""
     path = truck_stop(on, name, speed)
-    speeds = np.hypot(path.states[:, 1, 0], path.states[:, 1, 1])
+    speeds = Stop(path).speed
     last = int(np.argmax(speeds < LOCK_FREE))
     used = (speed**2 - speeds[last] ** 2) / (2.0 * path.states[last, 0, 0]) / GRAVITY / surface(on).mu_x.max()
-    locked = 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports[:last, :, 5].T)
     return {
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),
         "used": float(used),
-        "locked": float(locked),
+        "locked": 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports[:last, :, LOCKED].T),
         "stands": float(path.stands),
     }
 

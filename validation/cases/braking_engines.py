@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 
 from models.brake.advance import FINE, advance
-from models.brake.brake import PAPER_FRONT, PAPER_REAR, of_wheels
-from models.brake.controllers.slip_bang_bang import SlipBangBang
-from models.brake.plane_step import REPORTED
-from models.brake.plane_vehicle import PAPER, truck
+from models.brake.brake import PAPER_BRAKES
+from models.brake.controllers.slip import SlipBangBang
+from models.brake.plane_vehicle import PAPER
 from models.brake.pressure import Chambers
-from models.brake.surfaces import Stretch, road
 from models.brake.trailer import CHOSEN, follow, hooked
-from models.brake.written import Turned, turned
 from models.engines.braking import Carried
-from models.systems.braking.run import Braked
+from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked
-from validation.braking.braked_truck import ICE, sideways_with_locked_front_wheels, transfer_errors
+from validation.braking.braked_truck import ICE, PLANE, sideways_with_locked_front_wheels, transfer_errors
+from validation.braking.stepping import Moving
+from validation.braking.truck_equations import Turned, turned
 from validation.common.rows import Row, System, Table, aim, at_most
 
 TITLE = "Braking in a turn, in engines and with a trailer"
@@ -36,7 +35,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     until = 10.0 if quick else UNTIL
     own = turn(until)
     beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
-    beside |= {name: turn(until, go=Carried(name, truck(PAPER)).advance) for name in ("exudyn", "mujoco")}
+    beside |= {name: turn(until, go=Carried(name, PLANE).advance) for name in ("exudyn", "mujoco")}
     rows = [
         at_most(
             f"braking_engines.{name.replace(' ', '_')}",
@@ -70,46 +69,20 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def turn(until: float, steer: float = STEER, go: Callable[..., Any] = advance) -> Turned:
     """The truck from SPEED to another (m/s) on ice; the last step is shared in proportion."""
-    plane, state = truck(PAPER), np.zeros((2, 3))
-    state[1, 0], turning, torques = SPEED, SPEED / plane.radius, np.tile(np.repeat(TORQUES, 2), (2, 1))
-    found, report, passed = np.zeros(3), np.zeros((4, REPORTED)), 0.0
-    rest = (
-        np.array([steer, steer, 0.0, 0.0]),
-        ICE.cornering,
-        plane,
-        np.zeros(4, dtype=int),
-        road([Stretch(0.0, 0, 0)]),
-        stacked([ICE]).packed,
-        found,
-        report,
-    )
+    truck = Moving(PLANE, stacked([ICE]), SPEED, steer=steer, slope=ICE.cornering, go=go)
     while True:
-        before = state.copy()
-        status, used = go(state, turning, torques, STEP, *rest)
-        fast, slow = np.hypot(*before[1, :2]), np.hypot(*state[1, :2])
-        if status != FINE or slow <= until:
-            share = (fast - until) / (fast - slow)
-            place = before[0] + share * (state[0] - before[0])
-            x, y, heading = (float(value) for value in place)
+        passed, place, fast = truck.time, truck.state[0].copy(), truck.speed
+        status, used = truck.on(np.repeat(TORQUES, 2), STEP)
+        if status != FINE or truck.speed <= until:
+            share = (fast - until) / (fast - truck.speed)
+            x, y, heading = (float(value) for value in place + share * (truck.state[0] - place))
             return Turned(x, y, heading, float(passed + share * used))
-        passed += used
 
 
 def speed(steps: int) -> float:
     """Simulated seconds of a straight stop in one of the processor."""
     chambers = Chambers(np.full(4, 0.15), np.full(4, 0.1), 6.0)
-    brakes = of_wheels(PAPER_FRONT, PAPER_FRONT, PAPER_REAR, PAPER_REAR)
-    vehicle = Braked(
-        truck(PAPER),
-        np.zeros(4, dtype=int),
-        stacked([ICE]),
-        ICE.cornering,
-        road([Stretch(0.0, 0, 0)]),
-        brakes,
-        chambers,
-        np.zeros(4),
-        steps,
-    )
+    vehicle = on_tyres(PLANE, [ICE], PAPER_BRAKES, chambers, substeps=steps)
     vehicle.run(SlipBangBang(wheels=4), SPEED, 0.1)
     start = time.process_time()
     path = vehicle.run(SlipBangBang(wheels=4), SPEED)

@@ -10,17 +10,17 @@ import numpy as np
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import SLOW
-from models.brake.controllers.five_phase import FivePhase, end_of, rate
-from models.brake.controllers.slip_pi import SlipPI
-from models.brake.frozen import Frozen, limit_cycle
+from models.brake.controllers.five_phase import FivePhase
+from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
+from models.brake.controllers.slip import SlipPI
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers, by_valves, still
 from models.brake.trailer import CHOSEN
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
-from validation.braking.five_phase_exact import Wheel, cycle
+from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.random_stops import random_stop
 from validation.common.rows import Row, System, Table, at_most, behaves, within
 
@@ -47,7 +47,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def finished(number: int) -> str:
     """How a random stop ended: "" if it stands."""
     try:
-        path = drive(build(random_stop(SEED, number)), "stop")
+        path = run(build(random_stop(SEED, number))).detail
     except RunFailed as error:
         return error.reason
     return "" if path.stands else "does not stand"
@@ -70,7 +70,7 @@ def _scene(**tables: Any) -> Any:
 def _end(scene: Any) -> RunFailed | None:
     """How the one procedure of a scene failed."""
     try:
-        drive(scene, "p")
+        run(scene)
     except RunFailed as error:
         return error
     return None
@@ -93,7 +93,7 @@ def _jackknife_row() -> Row:
             trailer=CHOSEN.model_copy(update={"fold": 1.0}).model_dump(),
         )
     )
-    kept = None if end is None or end.partial is None else end.partial.states[:, 0, 2:]
+    kept = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
     angle = 0.0 if kept is None else float(np.abs(np.diff(kept, axis=1)).max())
     told = "" if end is None or "jackknifes" not in end.reason else end.reason
     return within(
@@ -169,10 +169,7 @@ def _slow_apply_row() -> Row:
 def _cycle_row() -> Row:
     """The limit cycle from a rolling wheel whose brake is applied fast, against the exact one, begun slowly."""
     frozen = Frozen(20.0, 16900.0, 0.5, 13.35, LINE, surface("snow"))
-    phases = [(LINE.rising * rate(k, ROLLING), *end_of(k, ROLLING)) for k in range(6)]
-    phases[0] = (LINE.rising * ROLLING.slow, *phases[0][1:])
-    forces = frozen.load * frozen.tyre.mu_x[0, 0]
-    period, _ = cycle(Wheel(frozen.speed, frozen.radius, frozen.inertia, frozen.tyre.slips, forces), phases, 12)
+    period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     found = limit_cycle(frozen, replace(ROLLING), 1e-4).period
     return at_most(
         "braking_limits.cycle_from_rolling",
@@ -197,7 +194,7 @@ def _yaw_row(speed: float) -> Row:
             load_transfer={},
             run={"sample": 0.02, "substeps": substeps, "duration": 20.0},
         )
-        return float(drive(scene, "p").states[-1, 0, 2])
+        return float(run(scene).detail.states[-1, 0, 2])
 
     return within(
         f"braking_limits.yaw.{speed:g}",
@@ -215,9 +212,7 @@ def _yaw_row(speed: float) -> Row:
 REFUSED: dict[str, Callable[[], Any]] = {
     "a supply of 10000 bar": lambda: _scene(procedures={"p": {}}, brakes={"supply": 1e4}),
     "a brake of 6e9 N m": lambda: _scene(procedures={"p": {}}, brakes={"front": {"gradient": 1e9}}),
-    "a truck lighter than its wheels": lambda: drive(
-        _scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}}), "p"
-    ),
+    "a truck lighter than its wheels": lambda: run(_scene(procedures={"p": {}}, vehicle={"override": {"mass": 0.1}})),
     "a gain of 1e12": lambda: SlipPI(4, gain=1e12),
     "a complex threshold": lambda: FivePhase(4, e1=1j),  # type: ignore[arg-type]
     "slow apply faster than apply": lambda: _scene(procedures={"p": {}}, pressure={"slow": 0.01}),
@@ -225,9 +220,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
 """What is beyond physics, and must be refused before it runs."""
 
 
-def _refused_row(name: str, run: Callable[[], Any]) -> Row:
+def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
     try:
-        run()
+        ask()
         found = "taken"
     except InputError as error:
         found = "refused" if error.place and error.value is not None else "refused without its value"
@@ -245,8 +240,3 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """Stops that a limit of the vehicle ended."""
     ends = tuple((str(i), end) for i, end in enumerate(data["ends"]) if end)
     return [Table("Random stops that do not come to rest", "", ("number", "how it ended"), ends)] if ends else []
-
-
-def draw(data: dict[str, Any]) -> dict[str, Any]:
-    """None."""
-    return {}

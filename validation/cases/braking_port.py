@@ -21,8 +21,8 @@ from models.brake.port.ask import ControllerFailed, ask
 from models.brake.port.example import Example
 from models.brake.port.setup import PortTable, Run, opened
 from models.machine.timing import median
-from models.systems.braking.procedures import drive
-from models.systems.braking.run import Path as Driven
+from models.systems.braking.march import Path as Driven
+from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking import misbehaving_client
 from validation.common.rows import Row, System, Table, aim, behaves, finding, not_run
@@ -143,14 +143,14 @@ def _built_fmu(folder: Path) -> dict[str, Any] | str:
 
 def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) -> list[Row]:
     """Every way against the callable, then the replay of its log."""
-    first = drive(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"}), "straight")
+    first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
         key, what = f"braking_port.bits.{_id(name)}", f"{len(first.times) - 1} samples, {name}"
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue
-        found = _same(first, drive(_scene(folder, duration, table), "straight"))
+        found = _same(first, run(_scene(folder, duration, table)).detail)
         rows.append(behaves(key, SYSTEM, what, found, "same bits", "doubles pass every way whole", "none"))
     return [*rows, _alive(first)]
 
@@ -176,14 +176,14 @@ def _same(path: Driven, other: Driven) -> str:
 
 def _costs(ways: dict[str, dict[str, Any] | str], folder: Path, rounds: int) -> dict[str, list[float]]:
     """Microseconds of one exchange by way: median of the rounds with its 95 % interval."""
-    run, seconds = Run(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
+    facts, seconds = Run(np.full(4, 0.5), SAMPLE, folder=folder), dict[str, list[float]]()
     with ExitStack() as stack:
         tables = {
             name: PortTable(timeout=PATIENT, start=PATIENT, **table)
             for name, table in ways.items()
             if isinstance(table, dict)
         }
-        controllers = {name: stack.enter_context(opened(table, run, Example(4)))[0] for name, table in tables.items()}
+        controllers = {name: stack.enter_context(opened(table, facts, Example(4)))[0] for name, table in tables.items()}
         for i in range(rounds):
             for name, controller in controllers.items():
                 seconds.setdefault(name, []).append(_timed(controller, i * ROUND))
@@ -246,7 +246,7 @@ def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[s
     found = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
         with watched:
-            drive(_scene(folder, 1.0, {**table, "timeout": timeout}), "straight")
+            run(_scene(folder, 1.0, {**table, "timeout": timeout}))
     except ControllerFailed as error:
         kept = 0 if error.partial is None else len(error.partial.times) - 1
         found |= {"name": error.name, "number": error.number, "kept": kept, "message": str(error)}
@@ -257,14 +257,14 @@ class _Watch:
     """Notes when each exchange begins."""
 
     def __enter__(self) -> "_Watch":
-        import models.systems.braking.run as run
+        from models.systems.braking import march
 
-        self.last, self._run, self._ask = time.perf_counter(), run, run.ask
-        run.ask = self._noted  # type: ignore[assignment]
+        self.last, self._march, self._ask = time.perf_counter(), march, march.ask
+        march.ask = self._noted  # type: ignore[assignment]
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._run.ask = self._ask
+        self._march.ask = self._ask
 
     def _noted(self, controller: Controller, given: Sample, *more: Any) -> Any:
         self.last = time.perf_counter()
@@ -315,8 +315,3 @@ def tables(data: dict[str, Any]) -> list[Table]:
         ),
         Table("Controllers that fail", f"Time-out {TIMEOUT:g} s.", ("what it does", "message", "s, once"), faults),
     ]
-
-
-def draw(data: dict[str, Any]) -> dict[str, Any]:
-    """None: tables say all."""
-    return {}

@@ -1,7 +1,6 @@
 """A quarter vehicle braked to a stop: distances against the exact answer, other schemes, locking and standstill."""
 
 import math
-from functools import cache
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
@@ -10,18 +9,14 @@ import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
-from models.brake.surfaces import Stretch, road
-from models.tyre.magic_formula import SURFACES, surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.brake.surfaces import EVEN
+from models.tyre.magic_formula import SURFACES
 from validation.braking.braking_schemes import PATIENCE, SCHEMES, exact, stopped
+from validation.braking.quarter_stops import FRONT, STEP, met, steady, stop
 from validation.common.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Braking to a stop"
 SYSTEM: System = "anti-lock"
-FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
-"""A front wheel of the paper's truck under what it bears while braking."""
-STEP = 5.5e-3
-"""The paper's step (s)."""
 HEADLINE = {
     "ice, 3 % slip": ("ice", 0.03, 11.11),
     "dry, 6 % slip": ("dry", 0.06, 22.22),
@@ -56,7 +51,6 @@ SLOW = 0.5
 """Speed (m/s) of the sweep in steps below 1 ms, which are many."""
 AFTER = 2.0
 """Time (s) for which a vehicle that stands is watched."""
-EVEN = road([Stretch(0.0, 0, 0)])
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -73,34 +67,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         _friction_row(9 if quick else 25),
     ]
     return rows, {"curves": curves, "steps": steps}
-
-
-@cache
-def met(on: str, scale: float = 1.0) -> tuple[TyreTable, Tables]:
-    """Table of a surface, as it is and for compiled functions."""
-    tyre = surface(on, scale)
-    return tyre, stacked([tyre])
-
-
-def steady(quarter: Quarter, tyre: TyreTable, slip: float) -> tuple[float, float]:
-    """Force (N) at a slip and the torque (N m) under which it stays."""
-    force = quarter.mass * GRAVITY * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
-    return force, quarter.steady_torque(slip, force)
-
-
-def stop(
-    quarter: Quarter,
-    tyre: tuple[TyreTable, Tables],
-    torque: float,
-    speed: float,
-    step: float = STEP,
-    after: float = 0.0,
-    turning: float | None = None,
-) -> Stop:
-    """Braked by a constant torque (N m) for more than it takes at the least of both forces, and ``after`` (s)."""
-    least = min(torque / quarter.radius, quarter.mass * GRAVITY * float(tyre[0].mu_x[0, 0, -1]))
-    steps = math.ceil((1.25 * speed * quarter.mass / least + 0.5 + after) / step) if torque > 0.0 else 1000
-    return braked(quarter, tyre[1], EVEN, np.full(steps + 1, torque), step, speed, turning)
 
 
 def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:

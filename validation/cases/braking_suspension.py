@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from models.brake.controller import Command, Controller, Sample
-from models.brake.controllers.slip_bang_bang import SlipBangBang
+from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_step import LOAD
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH, Sprung
-from models.systems.braking.run import Path as Run
+from models.systems.braking.march import Path as Run
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable
-from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
+from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady
 from validation.common.rows import Row, System, Table, aim, at_most, finding, within
 
 TITLE = "Braking on the suspension"
@@ -52,7 +52,7 @@ def drive(
     substeps: int = 1,
 ) -> Run:
     """A stop under torques that stay, from a speed (m/s)."""
-    return braked(own, tyre, engine, steer, step, substeps).run(Torques(*torques), speed)
+    return braked(own, tyre, engine, steer, step, substeps).run(steady(*torques), speed)
 
 
 def _locked_rows(mu: float) -> list[Row]:
@@ -60,7 +60,7 @@ def _locked_rows(mu: float) -> list[Row]:
     speed, found = 4.0 * mu * GRAVITY, []
     for name, own in (("box", box()), ("car", car())):
         vehicle, place = braked(own, constant(mu)), f"{name}.{mu:g}"
-        path = vehicle.run(Torques(*4 * (LOCKS,)), speed)
+        path = vehicle.run(steady(*4 * (LOCKS,)), speed)
         way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
         gained = float(path.reports[late, :2, LOAD].sum() - path.reports[0, :2, LOAD].sum())

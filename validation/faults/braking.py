@@ -13,69 +13,51 @@ import numpy as np
 
 from models.brake import brake, plane_vehicle
 from models.brake.advance import advance
-from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, REPORTED
+from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
 from models.brake.port import sensors
-from models.brake.surfaces import Stretch, road
+from models.brake.quarter import Stop
+from models.brake.surfaces import EVEN, Road, Stretch, road
 from models.tyre import tyre_table
-from validation.braking.braking_schemes import LITERAL, stopped
-from validation.cases import braking_stop as stops
+from validation.braking import braked_wheels as wheels
+from validation.braking import quarter_stops as stops
+from validation.braking.braking_schemes import LITERAL, exact, stopped
+from validation.braking.stepping import Moving
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
-from validation.hard_cases import braking as hard
 
-EVEN, SPLIT = road([Stretch(0.0, 0, 0)]), road([Stretch(0.0, 1, 0)])
-STEP = 5.5e-3
+SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _first_step(own: Any, steer: float = 0.0, speed: float = 10.0) -> tuple[np.ndarray, np.ndarray, Plane]:
-    """State and report after one step of the truck with all wheels locked; the left side dry, the right ice."""
-    plane = plane_vehicle.truck(PAPER)
+def _first_step(own: Road, steer: float = 0.0) -> Moving:
+    """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
     tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
-    state, report = np.zeros((2, 3)), np.zeros((4, REPORTED))
-    state[1, 0] = speed
-    turning, angles = np.zeros(4), steer * (plane.place[:, 0] > 0.0)
-    if steer:
-        turning[:] = speed / plane.radius
-    level = 0.0 if steer else 1e5
-    advance(
-        state,
-        turning,
-        np.full((2, 4), level),
-        STEP,
-        angles,
-        10.0,
-        plane,
-        np.zeros(4, dtype=np.int64),
-        own,
-        tables.packed,
-        np.zeros(3),
-        report,
-    )
-    return state, report, plane
+    truck = Moving(plane_vehicle.truck(PAPER), tables, 10.0, steer=steer, road=own, go=advance)
+    if not steer:
+        truck.turning[:] = 0.0
+    truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
+    return truck
+
+
+DRY = stops.met("dry")[0]
+LEVEL = stops.steady(stops.FRONT, DRY, 0.004)[1]
+"""Torque (N m) of light braking."""
 
 
 def _light() -> float:
     """Quarter vehicle, light braking on dry road: way against the exact one."""
-    tyre, _ = both = stops.met("dry")
-    level = stops.steady(stops.FRONT, tyre, 0.004)[1]
-    return abs(stops.stop(stops.FRONT, both, level, 11.11).distance / _way() - 1.0)
+    return abs(stops.stop(stops.FRONT, stops.met("dry"), LEVEL, 11.11).distance / _way() - 1.0)
 
 
 @cache
 def _way() -> float:
     """The exact way (m)."""
-    return stops.exact(
-        stops.Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35), stops.met("dry")[0], _LEVEL, 11.11
-    )
-
-
-_LEVEL = stops.steady(stops.FRONT, stops.met("dry")[0], 0.004)[1]
+    return exact(stops.FRONT, DRY, LEVEL, 11.11)
 
 
 def _transfer() -> float:
     """Locked on even friction: load of the front wheels against W (b + mu h) / (2 L), relative."""
-    _, report, _ = _first_step(EVEN)
+    report = _first_step(EVEN).report
     slide = float(stops.met("ice")[0].mu_x[0, 0, -1])
     base = 1.42 + 2.19
     wanted = 5640.0 * GRAVITY * (2.19 + slide * 1.2) / (2.0 * base)
@@ -84,31 +66,28 @@ def _transfer() -> float:
 
 def _split() -> float:
     """Locked, the left side dry: yaw acceleration against the moment of the reported forces."""
-    state, report, _ = _first_step(SPLIT)
+    truck = _first_step(SPLIT)
     x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
-    moment = float(x @ report[:, FORCE_Y] - y @ report[:, FORCE_X])
-    return float(abs(state[1, 2] / (STEP * moment / 25000.0) - 1.0))
+    moment = float(x @ truck.report[:, FORCE_Y] - y @ truck.report[:, FORCE_X])
+    return float(abs(truck.state[1, 2] / (STEP * moment / 25000.0) - 1.0))
 
 
 def _turns_left() -> float:
     """Steered to the left: 1 if the truck does not yaw to the left, and 1 if it is not the left that is unloaded."""
-    state, report, _ = _first_step(EVEN, 0.05)
-    return float(not state[1, 2] > 0.0) + float(not report[0, LOAD] < report[1, LOAD])
+    truck = _first_step(EVEN, 0.05)
+    return float(not truck.state[1, 2] > 0.0) + float(not truck.report[0, LOAD] < truck.report[1, LOAD])
 
 
 def _pulls_left() -> float:
     """Dry on the left: 1 if the truck does not yaw to the left."""
-    return float(not _first_step(SPLIT)[0][1, 2] > 0.0)
+    return float(not _first_step(SPLIT).state[1, 2] > 0.0)
 
 
 def _loop() -> float:
     """Area of a brake's loop from 0 to 5 bar and back against its closed form, by it."""
     own = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
-    level, found = 0.0, []
-    for pressure in pressures:
-        level = brake.torque(0, pressure, level, own)
-        found.append(level)
+    found = brake.torques(pressures, own)
     top, down = 1400.0 * 4.2, 1500.0
     left = 0.3 + top / down
     wanted = 0.5 * top * (left - 0.3) + top * (5.0 - left) - 0.5 * top * 4.2
@@ -122,14 +101,13 @@ def _push_out() -> float:
 
 def _nodes() -> float:
     """Friction of the stacked table at its own nodes against the tyre's."""
-    own = stops.met("dry")[0]
-    tables = tyre_table.stacked([own])
-    return float(np.abs(np.interp(own.slips, tables.slips, tables.mu_x[0, 0, 0]) - own.mu_x[0, 0]).max())
+    tables = tyre_table.stacked([DRY])
+    return float(np.abs(np.interp(DRY.slips, tables.slips, tables.mu_x[0, 0, 0]) - DRY.mu_x[0, 0]).max())
 
 
 def _settled() -> float:
     """Quarter vehicle at a slip that stays: way against m v^2 / (2 F), as in the hard case of that name."""
-    return float(hard.steady(hard.DRY, 0.02)("reference", Path()))
+    return float(wheels.steady(wheels.DRY, 0.02)("reference", Path()))
 
 
 def _code() -> float:
@@ -172,7 +150,7 @@ def _literal(real: Any) -> Any:
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
         way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
-        return stops.Stop(np.array([[0.0, 0.0, speed, 0.0, 0.0], [0.0, way, 0.0, 0.0, 0.0]]), 1)
+        return Stop(np.array([[0.0, 0.0, speed, 0.0, 0.0], [0.0, way, 0.0, 0.0, 0.0]]), 1)
 
     return stop
 
@@ -208,7 +186,7 @@ def _one_bit_less(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("force of the start of the step", "step", attribute("validation.cases.braking_stop:stop", _literal)),
+    Fault("force of the start of the step", "step", attribute("validation.braking.quarter_stops:stop", _literal)),
     Fault("load transfer with the other sign", "vehicle", _truck(by_x=np.negative)),
     Fault("roll transfer with the other sign", "vehicle", _truck(by_y=np.negative)),
     Fault("left and right swapped", "vehicle", _truck(place=lambda p: p * np.array([1.0, -1.0]))),

@@ -25,7 +25,7 @@ from models.systems.handling.scene import HandlingScene, build
 from models.systems.hub_forces.measurement import two_tracks
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.vehicle_file import load_vehicle
-from validation.hard_cases.braking import braking_scene
+from validation.braking.braked_trucks import braking_scene
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 from validation.hard_cases.rolling import STEP, built
 

@@ -4,19 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels, torque
+from models.brake.brake import Brake, of_wheels, torques
 from validation.hard_cases.case import Case
 
 OWN = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
-
-
-def _followed(pressures: np.ndarray) -> np.ndarray:
-    """Torques (n,) in N m along pressures (n,) in bar, from a free brake."""
-    level, found = 0.0, []
-    for pressure in pressures:
-        level = torque(0, pressure, level, OWN)
-        found.append(level)
-    return np.array(found)
 
 
 def ways(implementation: str, folder: Path) -> float:
@@ -25,7 +16,7 @@ def ways(implementation: str, folder: Path) -> float:
     found = []
     for parts in (1, 7, 50):
         between = np.linspace(turns[:-1], turns[1:], parts, endpoint=False, axis=1).ravel()
-        found.append(_followed(np.append(between, turns[-1]))[::parts])
+        found.append(torques(np.append(between, turns[-1]), OWN)[::parts])
     return float(max(np.abs(one - found[0]).max() for one in found))
 
 
@@ -34,8 +25,7 @@ def loops(implementation: str, folder: Path) -> float:
     worst = 0.0
     for low, high in np.sort(np.random.default_rng(3).uniform(0.0, 6.0, (20, 2)), axis=1):
         once = np.concatenate((np.linspace(low, high, 1001), np.linspace(high, low, 1001)))
-        pressures = np.concatenate((once, once))
-        found = _followed(pressures)
+        found = torques(np.concatenate((once, once)), OWN)
         area = -float(np.trapezoid(found[once.size :], once))
         worst = max(worst, -area, -float(found.min()))
     return worst

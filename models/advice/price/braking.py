@@ -9,8 +9,9 @@ from models.advice.price import Answer, Ladder
 from models.advice.price.meshed import chosen, part_of
 from models.advice.price.problem import Setting
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.procedures import drive, engines_of
-from models.systems.braking.run import Path
+from models.systems.braking.march import Path
+from models.systems.braking.procedures import engines_of
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
@@ -81,7 +82,7 @@ class OwnBraking:
         """Substeps and the procedure, driven; RunFailed where it does not end at rest."""
         substeps = round(self.scene.run.sample / setting.value)
         run = self.scene.run.model_copy(update={"substeps": substeps})
-        path = drive(self.scene.model_copy(update={"run": run}), self.name, setting.engine)
+        path = drive(self.scene.model_copy(update={"run": run}), setting.engine, procedure=self.name).detail
         if not path.stands:
             raise RunFailed(setting.engine, f"the vehicle does not stand after {duration:g} s: give it longer")
         return substeps, path

@@ -1,10 +1,9 @@
-"""Controllers of anti-lock brakes, one file each; all decide wheel by wheel, or axle by axle where they select low."""
+"""Controllers of anti-lock brakes; all decide wheel by wheel, or axle by axle where they select low."""
 
 from models.brake.controller import AllApplied
 from models.brake.controllers.acceleration_phases import AccelerationPhases
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.slip_bang_bang import SlipBangBang
-from models.brake.controllers.slip_pi import SlipPI
+from models.brake.controllers.slip import SlipBangBang, SlipPI
 
 CONTROLLERS = {
     "none": AllApplied,

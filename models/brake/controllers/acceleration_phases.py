@@ -14,8 +14,8 @@ Automotive Handbook. Their figures are those of cars; these are for a truck with
 
 from dataclasses import dataclass
 
-from models.brake.controller import APPLY, HOLD, RELEASE, SLOW, Command, Sample
-from models.brake.controllers.per_wheel import ACCELERATION, SLIP, SMALLEST, Common, PerWheel
+from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
+from models.brake.controllers.per_wheel import ACCELERATION, SLIP, SMALLEST, Common
 from models.core.errors import InputError
 
 FIRST, WAIT, LET_GO, RECOVER, OVERSHOOT, STEP_UP = range(6)
@@ -27,7 +27,6 @@ class AccelerationPhases(Common):
     deep, above which a wheel that does not rise is released; pulse : samples per step of pressure; slow : whether
     valves that can apply slowly do so in place of these steps."""
 
-    wheels: int
     falls: float = -20.0
     rises: float = 2.0
     rises_fast: float = 20.0
@@ -49,11 +48,7 @@ class AccelerationPhases(Common):
             if not isinstance(getattr(self, name), kind):
                 allowed = "must be a whole number" if kind is int else "must be true or false"
                 raise InputError("", f"controller.parameters.{name}", getattr(self, name), allowed)
-        self._loop = PerWheel(self.wheels, self, lambda: _Logic(self))
-
-    def sample(self, given: Sample) -> Command:
-        """States of the valves."""
-        return self._loop.command(given)
+        self.governed_by(_Logic)
 
 
 class _Logic:

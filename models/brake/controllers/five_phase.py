@@ -17,8 +17,7 @@ with phase 1.
 
 from dataclasses import dataclass
 
-from models.brake.controller import Command, Sample
-from models.brake.controllers.per_wheel import ACCELERATION, PRESSURE_RATE, SLIP, Common, PerWheel
+from models.brake.controllers.per_wheel import ACCELERATION, PRESSURE_RATE, SLIP, Common
 from models.core.errors import InputError
 
 
@@ -26,7 +25,6 @@ from models.core.errors import InputError
 class FivePhase(Common):
     """Thresholds of the wheel's acceleration (m/s^2) and rates of its pressure (bar/s); deep : slip of phase 1."""
 
-    wheels: int
     e1: float = 4.0
     e2: float = 5.0
     e3: float = 4.5
@@ -46,11 +44,7 @@ class FivePhase(Common):
         )
         if not self.e1 < self.e2 or not self.e4 < self.e3 < self.e2:
             raise InputError("", "controller.parameters.e2", self.e2, "must be above e1 and e3, and e3 above e4")
-        self._loop = PerWheel(self.wheels, self, lambda: _Logic(self), pressures=True)
-
-    def sample(self, given: Sample) -> Command:
-        """Pressures."""
-        return self._loop.command(given)
+        self.governed_by(_Logic, pressures=True)
 
 
 FIRST = 0

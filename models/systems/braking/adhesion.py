@@ -4,12 +4,12 @@ The procedure of UN R13, Annex 13, appendix 2, in a simulation that repeats exac
 regulation.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 
-from models.brake.controller import Command, Sample
+from models.brake.controller import Pressures
 from models.brake.figures_of_merit import (
     KMH,
     Axles,
@@ -25,9 +25,10 @@ from models.brake.figures_of_merit import (
 from models.brake.plane_step import LOCKED
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
-from models.systems.braking.of_scene import braked, vehicle_of
-from models.systems.braking.procedures import looped
-from models.systems.braking.run import Braked, Path
+from models.systems.braking.march import Braked, Path
+from models.systems.braking.of_scene import braked, sides, vehicle_of
+from models.systems.braking.plan import behind
+from models.systems.braking.procedures import looped, step_steer
 from models.systems.braking.scene import BrakingScene, Procedure, RoadTable, Stretch
 from models.systems.braking.stop_report import Stop
 
@@ -73,26 +74,15 @@ class Utilised:
         return self.z / self.k_vehicle
 
 
-@dataclass(frozen=True)
-class Held:
-    """Pressures (W,) in bar that stay, as on a test without anti-lock system."""
-
-    pressures: np.ndarray
-
-    def sample(self, given: Sample) -> Command:
-        """Always the same."""
-        return Command(pressures=self.pressures)
-
-
 def axles(scene: BrakingScene) -> Axles:
     """Loads and lengths of the scene's vehicle."""
-    own = vehicle_of(scene)
-    weight = own.mass * GRAVITY
-    front = weight * -own.rear.x / own.wheelbase
-    return Axles(front, weight - front, own.wheelbase, own.height)
+    truck = vehicle_of(scene)
+    weight = truck.mass * GRAVITY
+    front = weight * -truck.rear.x / truck.wheelbase
+    return Axles(front, weight - front, truck.wheelbase, truck.height)
 
 
-def behind(vehicle: Braked, z: float) -> np.ndarray:
+def trailer_loads(vehicle: Braked, z: float) -> np.ndarray:
     """Loads (2,) in N of the trailer's axles at a deceleration z g; (0,) without one."""
     loads = vehicle.plane.static - vehicle.plane.by_x * z * GRAVITY
     return loads[4:].reshape(-1, 2).sum(axis=1)
@@ -106,22 +96,24 @@ def on_one(scene: BrakingScene, surface: str, **changes: Any) -> Braked:
 
 def adhesion(scene: BrakingScene, surface: str) -> Adhesion:
     """k of both axles of a surface, each braked alone from 50 km/h without locking; raises NoAdhesion."""
-    vehicle, own = on_one(scene, surface, trailer=None), axles(scene)
-    found = Adhesion(adhesion_front(_rate(scene, vehicle, 0), own), adhesion_rear(_rate(scene, vehicle, 1), own))
+    vehicle, lengths = on_one(scene, surface, trailer=None), axles(scene)
+    front, rear = adhesion_front(_rate(scene, vehicle, 0), lengths), adhesion_rear(_rate(scene, vehicle, 1), lengths)
     if scene.trailer is None:
-        return found
+        return Adhesion(front, rear)
     train = on_one(scene, surface)
     rates, weight = [_rate(scene, train, axle) for axle in (2, 3)], float(train.plane.static.sum())
-    return replace(
-        found, trailer=tuple(adhesion_trailer(z, weight, float(behind(train, z)[i])) for i, z in enumerate(rates))
-    )
+    trailer = (adhesion_trailer(z, weight, float(trailer_loads(train, z)[i])) for i, z in enumerate(rates))
+    return Adhesion(front, rear, tuple(trailer))
 
 
-def _held_by_system(scene: BrakingScene, name: str, vehicle: Braked, speed: float) -> Path:
-    """A run from a speed (km/h) with the scene's controller, or what stands behind its port, which logs nothing."""
+def _by_system(scene: BrakingScene, name: str, vehicle: Braked, speeds: tuple[float, float, float]) -> float:
+    """z between the last two of three speeds (km/h), braked from the first with the scene's controller, or what stands
+    behind its port, which logs nothing."""
     port = None if scene.port is None else scene.port.model_copy(update={"log": None})
-    lasting = scene.run.model_copy(update={"duration": LONGEST})
-    return looped(scene.model_copy(update={"port": port, "run": lasting}), name, vehicle, vehicle.rolling(speed * KMH))
+    lasting = scene.model_copy(update={"port": port, "run": scene.run.model_copy(update={"duration": LONGEST})})
+    begin, high, low = speeds
+    path = looped(lasting, name, vehicle, vehicle.rolling(begin * KMH))
+    return braking_rate(high * KMH, low * KMH, _between(path, high, low))
 
 
 def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
@@ -129,7 +121,7 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
     wheels = np.arange(vehicle.plane.wheels) // 2 == axle
 
     def run(pressure: float) -> Path:
-        return vehicle.run(Held(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
+        return vehicle.run(Pressures(np.where(wheels, pressure, 0.0)), 50.0 * KMH, LONGEST)
 
     low, high = 0.0, scene.brakes.supply
     if not _locks(run(high)):
@@ -158,13 +150,12 @@ def _between(path: Path, high: float, low: float) -> float:
 def utilisation(scene: BrakingScene, surface: str, k: Adhesion | None = None, name: str = "adhesion") -> Utilised:
     """epsilon of the scene's system on a surface: z from 45 to 15 km/h, braked from 55 km/h; the port knows the run by
     its name."""
-    own, found = axles(scene), k or adhesion(scene, surface)
+    lengths, k = axles(scene), k or adhesion(scene, surface)
     train = on_one(scene, surface)
-    path = _held_by_system(scene, name, train, 55.0)
-    z = braking_rate(45.0 * KMH, 15.0 * KMH, _between(path, 45.0, 15.0))
-    loads = np.concatenate(([own.weight], behind(train, z)))
-    each = np.array([adhesion_of_vehicle(z, found.front, found.rear, own), *found.trailer])
-    return Utilised(z, found, float(each @ loads / loads.sum()))
+    z = _by_system(scene, name, train, (55.0, 45.0, 15.0))
+    loads = np.concatenate(([lengths.weight], trailer_loads(train, z)))
+    each = np.array([adhesion_of_vehicle(z, k.front, k.rear, lengths), *k.trailer])
+    return Utilised(z, k, float(each @ loads / loads.sum()))
 
 
 @dataclass(frozen=True)
@@ -183,10 +174,43 @@ class Split:
 
 def split(scene: BrakingScene, name: str) -> Split:
     """z of a split procedure from 50 km/h, between 40 and 20 km/h, and k_M of both surfaces of its first stretch."""
-    own, first = scene.procedures[name], scene.road.stretches[0]
-    alone = scene.model_copy(update={"trailer": None})
-    both = [adhesion(alone, surface) for surface in (first.left, own.right or first.right or first.left)]
-    path = _held_by_system(alone, name, braked(alone, own), 50.0)
-    z = braking_rate(40.0 * KMH, 20.0 * KMH, _between(path, 40.0, 20.0))
-    k = sorted(adhesion_of_vehicle(z, one.front, one.rear, axles(scene)) for one in both)
-    return Split(z, k[0], k[1])
+    procedure, alone = scene.procedures[name], scene.model_copy(update={"trailer": None})
+    both = [adhesion(alone, surface) for surface in sides(procedure, scene.road.stretches[0])]
+    z = _by_system(alone, name, braked(alone, procedure), (50.0, 40.0, 20.0))
+    return Split(z, *sorted(adhesion_of_vehicle(z, k.front, k.rear, axles(scene)) for k in both))
+
+
+def merits(scene: BrakingScene, name: str, stop: Stop) -> dict[str, float]:
+    """Figures of merit of a procedure, by name and unit; none where they have no meaning.
+
+    Nor are there any that need runs of their own where a client that connects once, or a log, is behind the port, or
+    where the pressures were measured.
+    """
+    procedure, port = scene.procedures[name], scene.port
+    if procedure.radius is not None:
+        if stop.times[-1] < 1.0:
+            return {}
+        return {f"after 1 s: {key}": value for key, value in stop.in_turn(procedure.radius).items()}
+    if procedure.kind == "j_turn":
+        response = step_steer(scene, name)
+        time, overshoot, steady = (np.nan,) * 3 if response is None else astuple(response)
+        return {
+            "without brakes: response time [s]": time,
+            "without brakes: overshoot [%]": 100.0 * overshoot,
+            "without brakes: steady yaw rate [deg/s]": np.degrees(steady),
+        }
+    once = port is not None and (port.port is not None or port.replay is not None)
+    if behind(scene) == "none" or scene.measured is not None or once:
+        return {}
+    if procedure.kind == "split":
+        both = split(scene, name)
+        return {"z_MALS": both.z, "z_MALS asked for": both.asked, "k low": both.k_low, "k high": both.k_high}
+    used = utilisation(scene, scene.road.stretches[0].left)
+    return {
+        "z_AL": used.z,
+        "k front": used.k.front,
+        "k rear": used.k.rear,
+        "k of all": used.k_vehicle,
+        "adhesion utilisation epsilon": used.epsilon,
+        **dict(zip(("k trailer front", "k trailer rear"), used.k.trailer, strict=False)),
+    }

@@ -18,11 +18,11 @@ from models.core.errors import InputError
 from models.core.scene_effects import extended
 from models.core.scene_file import parse
 from models.core.strict import read
+from models.systems.braking.march import Braked, on_tyres
 from models.systems.braking.measured_pressures import MeasuredPressures, read_pressures
-from models.systems.braking.run import Braked
 from models.systems.braking.scene import BrakeTable, BrakingScene, Procedure, Stretch
 from models.tyre.tyre_source import NAMES, SCALES, from_file, named
-from models.tyre.tyre_table import TyreTable, stacked
+from models.tyre.tyre_table import TyreTable
 
 SPRUNG_ENGINE = "mujoco"
 """Marches a vehicle on its suspension where no engine is asked for."""
@@ -30,37 +30,32 @@ SPRUNG_ENGINE = "mujoco"
 
 def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
     """The scene's vehicle with its brakes on the road of a procedure; InputError for what does not fit together."""
-    plane = plane_of(scene)
+    plane, known = plane_of(scene), (*NAMES, *scene.tyres.files)
     for name, scale in scene.tyres.scale.items():
-        if name not in (*NAMES, *scene.tyres.files):
-            known = (*NAMES, *scene.tyres.files)
+        if name not in known:
             raise InputError(scene.file, f"tyres.scale.{name}", scale, "no such surface", known)
-    names = surfaces_of(scene, procedure)
-    tyres = [table_of(scene, name, rear) for name in names for rear in kinds_of(scene)]
+    names, kinds, lags = surfaces_of(scene, procedure), kinds_of(scene), scene.relaxation
     front, rear, behind = (brake_of(scene, axle) for axle in ("front", "rear", "trailer"))
-    own = None if scene.vehicle.file is None else sprung_of(scene)
-    engine = None if own is None else on_springs(SPRUNG_ENGINE, own)
+    sprung = None if scene.vehicle.file is None else sprung_of(scene)
+    engine = None if sprung is None else on_springs(SPRUNG_ENGINE, sprung)
     if engine is not None:
         engine.check_step(scene.run.sample / scene.run.substeps)
-    return extended(
-        Braked(
-            plane=plane,
-            kind=np.where(np.arange(plane.wheels) < 2, 0, len(kinds_of(scene)) - 1),
-            tables=stacked(tyres),
-            slope=max(table.cornering for table in tyres),
-            road=road_of(scene, procedure, names),
-            brakes=of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
-            chambers=chambers_of(scene, plane.wheels),
-            steer=np.zeros(plane.wheels),
-            substeps=scene.run.substeps,
-            sample=scene.run.sample,
-            speed_given=scene.controller.true_speed,
-            relaxation=lags_of(scene, plane.wheels),
-            sprung=own,
-            engine=engine,
-        ),
-        scene,
+    ahead = np.arange(plane.wheels) < 2
+    vehicle = on_tyres(
+        plane,
+        [table_of(scene, name, kind) for name in names for kind in kinds],
+        of_wheels(front, front, rear, rear, *[behind] * (plane.wheels - 4)),
+        chambers_of(scene, plane.wheels),
+        road_of(scene, procedure, names),
+        kind=np.where(ahead, 0, len(kinds) - 1),
+        substeps=scene.run.substeps,
+        sample=scene.run.sample,
+        speed_given=scene.controller.true_speed,
+        relaxation=None if lags is None else np.where(ahead, lags.front, lags.rear),
+        sprung=sprung,
+        engine=engine,
     )
+    return extended(vehicle, scene)
 
 
 def plane_of(scene: BrakingScene) -> Plane:
@@ -103,22 +98,23 @@ def vehicle_of(scene: BrakingScene) -> Truck:
     else:
         raise InputError(file, "vehicle.parameters", name, "no such set; a file of your own ends in .toml", ("paper",))
     if scene.vehicle.override:
-        changed = _merged(vehicle.model_dump(), scene.vehicle.override)
+        changed = merged(vehicle.model_dump(), scene.vehicle.override)
         vehicle = read(Truck, changed, scene.file, "vehicle.override")
     if scene.load_transfer is not None and "front" in scene.load_transfer.model_fields_set:
         share = scene.load_transfer.front
         parts = {"front": {"roll_share": share}, "rear": {"roll_share": 1.0 - share}}
-        vehicle = Truck(**_merged(vehicle.model_dump(), parts))
+        vehicle = Truck(**merged(vehicle.model_dump(), parts))
     return vehicle
 
 
-def _merged(base: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables with some of their values changed."""
-    merged = dict(base)
+def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables with some of their values changed; a table that gives another ``kind`` replaces the old one."""
+    new = dict(table)
     for key, value in changes.items():
-        inner = base.get(key)
-        merged[key] = _merged(inner, value) if isinstance(inner, dict) and isinstance(value, Mapping) else value
-    return merged
+        old = table.get(key)
+        both = isinstance(old, Mapping) and isinstance(value, Mapping) and "kind" not in value
+        new[key] = merged(old, value) if both else value  # type: ignore[arg-type]
+    return new
 
 
 def sides(procedure: Procedure, stretch: Stretch) -> tuple[str, str]:
@@ -159,6 +155,12 @@ def table_of(scene: BrakingScene, name: str, rear: bool = False) -> TyreTable:
     return table if scale == 1.0 else table.scaled(scale)
 
 
+def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
+    """Tables by name of all surfaces under all procedures, a rear tyre of its own beside the front one."""
+    names = dict.fromkeys(name for procedure in scene.procedures.values() for name in surfaces_of(scene, procedure))
+    return {f"{name}/rear" if rear else name: table_of(scene, name, rear) for name in names for rear in kinds_of(scene)}
+
+
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
     """Brake of one axle's wheels."""
     own: BrakeTable = getattr(scene.brakes, axle)
@@ -173,12 +175,6 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
         scene.file,
         f"brakes.{axle}",
     )
-
-
-def lags_of(scene: BrakingScene, wheels: int) -> np.ndarray | None:
-    """Relaxation lengths (W,) in m, None where slip angles do not lag."""
-    own = scene.relaxation
-    return None if own is None else np.where(np.arange(wheels) < 2, own.front, own.rear)
 
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:

@@ -1,6 +1,8 @@
 """What a scene of braking will compute: printed by ``twinrig show``, checked before any run."""
 
-from models.brake.plausible_truck import plausible_truck
+from collections.abc import Iterator
+
+from models.brake.plane_vehicle import Truck
 from models.brake.port.setup import BEHIND, check_port
 from models.core.errors import InputError
 from models.core.finding import Finding
@@ -9,7 +11,7 @@ from models.systems.braking.of_scene import braked, controller_of, sprung_of, su
 from models.systems.braking.procedures import check_engine, engines_of, port_of, ready
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_source import NAMES
-from models.vehicles.plausible import plausible
+from models.vehicles.plausible import GYRATION, HEIGHT, MASS, TRACK, WHEELBASE, plausible
 
 PROCEDURES = {
     "straight": "straight braking",
@@ -66,7 +68,31 @@ def findings(scene: BrakingScene) -> tuple[Finding, ...]:
     """Queries about the vehicle."""
     if scene.vehicle.file is not None:
         return plausible(sprung_of(scene).handling.given, scene.vehicle.accept)
-    return tuple(query for query in plausible_truck(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
+    return tuple(query for query in _queries(vehicle_of(scene)) if query.check not in scene.vehicle.accept)
+
+
+REMEDIES = {"mass": "Masses are in kg", "size": "Lengths are in m", "inertia": "Inertias are in kg m^2"}
+RADIUS = 0.1, 1.5
+"""m, of a usual wheel."""
+
+
+def _queries(truck: Truck) -> Iterator[Finding]:
+    """What no usual vehicle that brakes in the plane has, each at the name of its parameter."""
+    gyration, span = (truck.yaw_inertia / truck.mass) ** 0.5, tuple(g * truck.wheelbase for g in GYRATION["rz"])
+    looks = [
+        ("mass", "mass", truck.mass, MASS),
+        ("size", "wheelbase", truck.wheelbase, WHEELBASE),
+        ("size", "height", truck.height, (0.0, HEIGHT)),
+        ("inertia", "radius of gyration by yaw_inertia", gyration, span),
+    ]
+    for name, axle in (("front", truck.front), ("rear", truck.rear)):
+        looks += [("size", f"{name}.track", axle.track, TRACK), ("size", f"{name}.radius", axle.radius, RADIUS)]
+    for check, place, value, usual in looks:
+        if not usual[0] <= value <= usual[1]:
+            unit = "kg" if check == "mass" else "m"
+            bounds = f"{usual[0]:.3g} to {usual[1]:.3g} {unit}"
+            text = f"{place}: {value:.4g} {unit}; usual are {bounds}. {REMEDIES[check]}."
+            yield Finding(check, "doubt", place, text, value, unit)
 
 
 def describe(scene: BrakingScene) -> str:
@@ -75,31 +101,23 @@ def describe(scene: BrakingScene) -> str:
     Raises InputError for parts that cannot be.
     """
     _check_parts(scene, engines_of(scene, ())[:1])
-    vehicle, run = vehicle_of(scene), scene.run
-    axles = (vehicle.front.x, vehicle.rear.x)
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
-    motion = "plane motion" if scene.vehicle.file is None else "suspension, roll and pitch"
-    name = scene.vehicle.file or scene.vehicle.parameters
-    lines += [
-        _line(
-            "vehicle",
-            f"{name}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
-            f"axles at {axles[0]:g} and {axles[1]:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
-            "wheels turn",
-        )
-    ]
-    lines += [_line("brakes", f"supply {scene.brakes.supply:g} bar")]
-    lines += [_line("controller", f"{behind(scene)}, every {1e3 * run.sample:g} ms")]
-    for name, own in scene.procedures.items():
-        names = ", ".join(surfaces_of(scene, own))
-        lines += [_line(name, f"{PROCEDURES[own.kind]}, from {own.speed:g} m/s on {names}")]
-    lines += [
-        _line(
-            "step",
-            f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample; order two, wheels exact within it",
-        )
-    ]
-    return "\n".join([*lines, *effect_lines(scene)])
+    vehicle, run, file = vehicle_of(scene), scene.run, scene.vehicle.file
+    motion = "plane motion" if file is None else "suspension, roll and pitch"
+    told = {
+        "scene": f"{scene.file}, study {scene.study}",
+        "vehicle": f"{file or scene.vehicle.parameters}: {vehicle.mass:g} kg, {vehicle.yaw_inertia:g} kg m^2, "
+        f"axles at {vehicle.front.x:g} and {vehicle.rear.x:g} m, wheels of {vehicle.front.radius:g} m; {motion}, "
+        "wheels turn",
+        "brakes": f"supply {scene.brakes.supply:g} bar",
+        "controller": f"{behind(scene)}, every {1e3 * run.sample:g} ms",
+    }
+    lines = [_line(*part) for part in told.items()]
+    for name, procedure in scene.procedures.items():
+        names = ", ".join(surfaces_of(scene, procedure))
+        lines.append(_line(name, f"{PROCEDURES[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
+    length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
+    lines.append(_line("step", f"{length}; order two, wheels exact within it"))
+    return "\n".join([scene.title, *lines, *effect_lines(scene)])
 
 
 def user_code(scene: BrakingScene) -> str:

@@ -3,19 +3,19 @@
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path as Folder
-from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import root
 
-from models.brake.controller import Command, Sample
+from models.brake.controller import Pressures
 from models.brake.plane_step import REPORTED, step_on
+from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
 from models.brake.steering import Response, Steering, response
 from models.brake.surfaces import check_way, under_wheels
 from models.core.errors import InputError, Refused
-from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of, on_springs
-from models.systems.braking.run import Braked, Path, Start
+from models.systems.braking.march import Braked, Path, Start
+from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
 from models.systems.braking.scene import BrakingScene, Procedure
 
 UNBRAKED = 4.0
@@ -42,10 +42,6 @@ def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
     if own.radius is not None:
         turn = steady_turn(vehicle, own.speed, own.radius)
-        if turn is not None and vehicle.sprung is not None:
-            from models.systems.braking.sprung_turn import sprung_turn
-
-            turn = sprung_turn(vehicle, own.speed, own.radius, turn)
         if turn is None:
             allowed = f"tyres do not hold a steady circle of this radius at {own.speed:g} m/s on this surface"
             raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
@@ -61,23 +57,11 @@ def steering_of(own: Procedure, vehicle: Braked) -> Steering:
     return Steering(times, angles, steered(vehicle, 1.0))
 
 
-@dataclass(frozen=True)
-class Released:
-    """No pressure anywhere, for wheels (W,)."""
-
-    wheels: int
-    steady: ClassVar[bool] = True
-
-    def sample(self, given: Sample) -> Command:
-        """None."""
-        return Command(pressures=np.zeros(self.wheels))
-
-
 def step_steer(scene: BrakingScene, name: str) -> Response | None:
     """How fast the vehicle of a J-turn answers to its steering without brakes; None where no yaw rate is steady."""
     vehicle, start = ready(scene, name)
     steering = steering_of(scene.procedures[name], vehicle)
-    path = vehicle.run(Released(vehicle.plane.wheels), start, float(steering.times[-1]) + UNBRAKED)
+    path = vehicle.run(Pressures(np.zeros(vehicle.plane.wheels)), start, float(steering.times[-1]) + UNBRAKED)
     return response(path.times, path.states[:, 1, 2], steering.half)
 
 
@@ -86,21 +70,6 @@ def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
     if scene.vehicle.file is None:
         return asked or ("reference",)
     return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
-
-
-def drive(scene: BrakingScene, name: str, engine: str | None = None) -> Path:
-    """One run of a procedure, whatever stands behind the port; InputError, Refused, or RunFailed with the path until
-    then."""
-    (engine,) = engines_of(scene, (engine,) if engine else ())
-    check_engine(scene, engine)
-    vehicle, start = ready(scene, name)
-    if vehicle.sprung is not None:
-        vehicle = replace(vehicle, engine=on_springs(engine, vehicle.sprung))
-    elif engine != "reference":
-        from models.engines.braking import Carried
-
-        vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
-    return looped(scene, name, vehicle, start, engine)
 
 
 def check_engine(scene: BrakingScene, engine: str) -> None:
@@ -151,69 +120,95 @@ class SteadyTurn:
     start: Start
 
 
-def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
-    """Circle of the first unit's centre of mass (m, positive to the left) at a speed (m/s); None if there is none.
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """Motion of a vehicle whose first unit's centre of mass goes round a circle (m, positive to the left) at a speed.
 
-    All wheels roll freely: the drive that holds the speed is not there, so that the vehicle slows down by the drag of
-    its slip angles. Unknown are the steer angle, the side slip and the headings of the units behind.
+    All wheels roll freely: the drive that holds the speed (m/s) is not there, so that the vehicle slows down by the
+    drag of its slip angles. Unknown (n - 1,) are the steer angle, the side slip (rad) and all n coordinates but the
+    first unit's place and heading: headings of the units behind, or, if it is ``sprung``, those on the springs.
     """
-    units = vehicle.plane.masses.size
 
-    def state(unknown: np.ndarray, own: float) -> np.ndarray:
-        both = np.zeros((2, 2 + units))
-        both[0, 3:], both[1, 2:] = unknown[2:], own / radius
-        both[1, :2] = own * np.cos(unknown[1]), own * np.sin(unknown[1])
+    vehicle: Braked
+    speed: float
+    radius: float
+    sprung: bool = False
+
+    def state(self, unknown: np.ndarray) -> np.ndarray:
+        """Positions and rates (2, n)."""
+        both = np.zeros((2, unknown.size + 1))
+        both[0, 3:], both[1, 2 : 3 if self.sprung else None] = unknown[2:], self.speed / self.radius
+        both[1, :2] = self.speed * np.cos(unknown[1]), self.speed * np.sin(unknown[1])
         return both
 
-    def left(unknown: np.ndarray, own: float) -> np.ndarray:
-        found = _accelerations(vehicle, state(unknown, own), steered(vehicle, unknown[0]))
-        across = found[1] * np.cos(unknown[1]) - found[0] * np.sin(unknown[1])
-        return np.concatenate(([across - own**2 / radius], found[2:]))
+    def motion(self, unknown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Accelerations (n,), and speeds of turning (W,) of the wheels."""
+        vehicle, state, steer = self.vehicle, self.state(unknown), steered(self.vehicle, unknown[0])
+        if not self.sprung:
+            return _accelerations(vehicle, state, steer)
+        motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(
+            state, steer, vehicle.plane, vehicle.kind, vehicle.road, vehicle.tables.packed
+        )
+        return motion
 
-    plane = vehicle.plane
+    def left(self, unknown: np.ndarray) -> np.ndarray:
+        """What accelerations (n - 1,) of a steady circle must not have: across the way, then of the others."""
+        rates, _ = self.motion(unknown)
+        across = rates[1] * np.cos(unknown[1]) - rates[0] * np.sin(unknown[1])
+        return np.concatenate(([across - self.speed**2 / self.radius], rates[2:]))
+
+    def settled(self, guess: np.ndarray) -> tuple[np.ndarray, bool]:
+        """What is unknown, and whether that is steady."""
+        unknown: np.ndarray = root(self.left, guess, tol=1e-12).x
+        return unknown, bool(np.abs(self.left(unknown)).max() <= STEADY)
+
+    def turn(self, unknown: np.ndarray) -> SteadyTurn:
+        """As a procedure begins with it."""
+        return SteadyTurn(steered(self.vehicle, unknown[0]), Start(self.state(unknown), self.motion(unknown)[1]))
+
+
+def steady_turn(vehicle: Braked, speed: float, radius: float) -> SteadyTurn | None:
+    """The steady ``Circle`` of a vehicle; None if there is none.
+
+    That of the plane vehicle is followed from a low speed on, and is the first guess of one on its suspension.
+    """
+    plane, units = vehicle.plane, vehicle.plane.masses.size
     last = np.array([plane.reach[k].sum() + plane.place[plane.unit == k, 0].min() for k in range(units)])
-    guess = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
-    guess[0], guess[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
-    guess[2:] = (last[1:] - last[0]) / radius
-    for own in speed * SPEEDS:
-        guess = root(left, guess, (own,), tol=1e-12).x
-        if np.abs(left(guess, own)).max() > STEADY or np.abs(guess).max() > LARGEST:
+    unknown = np.zeros(1 + units)  # of wheels that roll along the circle: the last ones of each unit on its tangent
+    unknown[0], unknown[1] = np.ptp(plane.place[plane.unit == 0, 0]) / radius, -last[0] / radius
+    unknown[2:] = (last[1:] - last[0]) / radius
+    for slower in speed * SPEEDS:
+        unknown, steady = Circle(vehicle, slower, radius).settled(unknown)
+        if not steady or np.abs(unknown).max() > LARGEST:
             return None
-    steer = steered(vehicle, guess[0])
-    return SteadyTurn(steer, Start(state(guess, speed), _rolling(vehicle, state(guess, speed), steer)))
+    circle, state = Circle(vehicle, speed, radius), Circle(vehicle, speed, radius).state(unknown)
+    if vehicle.sprung is not None:
+        guess = np.zeros(vehicle.engine.size - 1)
+        guess[0], guess[1] = unknown[0], np.arctan2(state[1, 1], state[1, 0])
+        circle = Circle(vehicle, speed, radius, sprung=True)
+        unknown, steady = circle.settled(guess)
+    return circle.turn(unknown) if steady else None
 
 
-def _rolling(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
+def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
     """Speeds of turning (W,) of wheels without slip."""
-    plane, headings, rates = vehicle.plane, state[0, 2:], state[1, 2:]
+    headings, rates, unit = state[0, 2:], state[1, 2:], plane.unit
     ahead = np.column_stack((np.cos(headings), np.sin(headings)))
     aside = np.column_stack((-ahead[:, 1], ahead[:, 0]))
     centres = state[1, :2] + plane.reach @ (rates[:, None] * aside)
-    own = plane.unit
-    spun = rates[own, None] * (plane.place[:, :1] * aside[own] - plane.place[:, 1:] * ahead[own])
-    course = headings[own] + steer
+    spun = rates[unit, None] * (plane.place[:, :1] * aside[unit] - plane.place[:, 1:] * ahead[unit])
+    course = headings[unit] + steer
     along = np.column_stack((np.cos(course), np.sin(course)))
-    return ((centres[own] + spun) * along).sum(axis=1) / plane.radius
+    return ((centres[unit] + spun) * along).sum(axis=1) / plane.radius
 
 
-def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
-    """Accelerations (2 + U,) of a vehicle whose wheels roll without brakes."""
-    plane, none, turning = vehicle.plane, np.zeros(vehicle.plane.wheels), _rolling(vehicle, state, steer)
-    surface, found = np.zeros((plane.wheels, 3)), np.zeros(state.shape[1])
-    found[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
+def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (2 + U,) of a plane vehicle whose wheels roll without brakes, and their speeds of turning (W,)."""
+    plane, none, turning = vehicle.plane, np.zeros(vehicle.plane.wheels), _rolling(vehicle.plane, state, steer)
+    surface, rates = np.zeros((plane.wheels, 3)), np.zeros(state.shape[1])
+    rates[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
     under_wheels(state, 0.0, plane, vehicle.kind, vehicle.road, surface)
-    step_on(
-        state.copy(),
-        turning,
-        none,
-        none,
-        BLINK,
-        steer,
-        surface,
-        vehicle.slope * 9.81 * BLINK,
-        plane,
-        vehicle.tables.packed,
-        found,
-        np.zeros((plane.wheels, REPORTED)),
-    )
-    return found
+    regular, report = vehicle.slope * 9.81 * BLINK, np.zeros((plane.wheels, REPORTED))
+    moved = state.copy(), turning.copy(), none, none, BLINK, steer, surface, regular, plane, vehicle.tables.packed
+    step_on(*moved, rates, report)
+    return rates, turning

@@ -1,191 +1,83 @@
-"""A braked vehicle with its controller in the loop, sample by sample, until it stands or its time is over."""
+"""One procedure of a scene of braking, from scene to result: built, driven in an engine, labelled."""
 
-import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+import time
+from dataclasses import replace
 
 import numpy as np
 
-from models.brake.advance import AT_REST, FINE
-from models.brake.brake import Brakes
-from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
-from models.brake.plane_vehicle import Plane
-from models.brake.port.ask import STATES, WITH_SLOW, ask
-from models.brake.port.sensors import Sensed
-from models.brake.pressure import Chambers, still
-from models.brake.row import Row, parts, row
-from models.brake.samples import Braking, Kept, Told, by_steps
-from models.brake.surfaces import Road, check_way
+from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
 from models.core.errors import RunFailed
-from models.systems.braking.endings import ENDS, ending
-from models.tyre.tyre_table import Tables
+from models.core.result import Channel, Result, result
+from models.systems.braking.march import Path
+from models.systems.braking.of_scene import on_springs
+from models.systems.braking.procedures import check_engine, engines_of, looped, ready
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import WHEELS
 
-MOST = 1024
-"""Samples of which a controller that is not asked knows nothing, at a time."""
+REPORTS = {
+    "force_x": (FORCE_X, "N"),
+    "force_y": (FORCE_Y, "N"),
+    "load": (LOAD, "N"),
+    "slip": (SLIP, "1"),
+    "slip_angle": (SLIP_ANGLE, "rad"),
+}
+"""Channels of what wheels report of the last step of every sample: column and unit."""
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """What a run recorded at every sample, the start included.
+def run(scene: BrakingScene, engine: str = "", *, procedure: str = "") -> Result:
+    """Drive a procedure, the first of the scene's if none is named, whatever stands behind the port.
 
-    times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest;
-    coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
-    clock on the wall told of overruns, if the run kept to it.
+    engine : the usual one of such a vehicle if none is named. The result's detail is its ``Path``. Raises InputError,
+    Refused, or RunFailed, whose ``partial`` is the result until then, None where nothing was recorded.
     """
+    name = procedure or next(iter(scene.procedures))
+    (engine,) = engines_of(scene, (engine,) if engine else ())
+    check_engine(scene, engine)
+    vehicle, start = ready(scene, name)
+    if vehicle.sprung is not None:
+        vehicle = replace(vehicle, engine=on_springs(engine, vehicle.sprung))
+    elif engine != "reference":
+        from models.engines.braking import Carried
 
-    times: np.ndarray
-    states: np.ndarray
-    turning: np.ndarray
-    pressures: np.ndarray
-    torques: np.ndarray
-    reports: np.ndarray
-    stands: bool
-    coordinates: tuple[str, ...] = ()
-    clock: str = ""
-
-
-class Start(NamedTuple):
-    """What a run goes on from: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in rad/s."""
-
-    state: np.ndarray
-    turning: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Braked:
-    """A vehicle on a road with brakes, ready to run.
-
-    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
-    in the middle of each sample; engine : ``models.engines.braking.Carried`` if an engine is to carry the chassis.
-    sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
-    """
-
-    plane: Plane
-    kind: np.ndarray
-    tables: Tables
-    slope: float
-    road: Road
-    brakes: Brakes
-    chambers: Chambers
-    steer: np.ndarray
-    substeps: int = 4
-    sample: float = SAMPLE
-    speed_given: bool = True
-    switch: float = 0.0
-    engine: Any = None
-    relaxation: np.ndarray | None = None
-    sprung: Any = None
-    steering: Callable[[float], np.ndarray] | None = None
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates of a state."""
-        if self.sprung is not None:
-            return tuple(self.sprung.names)
-        return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
-
-    def rolling(self, speed: float) -> Start:
-        """Steady rolling along x at a speed (m/s)."""
-        state = np.zeros((2, len(self.coordinates)))
-        state[1, 0] = speed
-        return Start(state, speed / self.plane.radius)
-
-    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
-        """From a start, or steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
-
-        Until then no valve lets anything through, whatever the controller commands.
-
-        Raises RunFailed, which names the time and whose ``partial`` is the path until then.
-        """
-        given, wheels = start if isinstance(start, Start) else self.rolling(start), self.plane.wheels
-        check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
-        now = row(given.state.shape[1], wheels)
-        now.state[:], now.turning[:] = given.state, given.turning
-        told = Told(np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
-        steady = self.steering is None and is_steady(controller)
-        most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
-        kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
-        states = WITH_SLOW if self.chambers.slow.size else STATES
-        beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
-        rows, status, number, rates = [now.whole[None].copy()], FINE, 0, np.zeros(2 + self.plane.masses.size)
-        with _taken(rows, kept, now, self.coordinates):
-            for status, time, speed, supply in self._moving(told, kept, now, rates):
-                if status in ENDS:
-                    raise RunFailed("braking", ending(status, self.plane, now.state, rates, now.report), time)
-                _take(rows, kept)
-                if status == AT_REST or time >= kept.until:
-                    break
-                braked = time >= self.switch - 1e-9
-                told.samples[0] = most if braked else 1
-                known = speed if self.speed_given else math.nan
-                rims = np.abs(now.turning) * self.plane.radius
-                asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
-                number += 1
-                _tell(told, ask(controller, asked, states, max(beyond, supply)), braked)
-                if self.steering is not None:
-                    told.steer[:] = self.steering(time + 0.5 * self.sample)
-        return _path(rows, now, status == AT_REST, self.coordinates)
-
-    def _moving(self, told: Told, kept: Kept, now: Row, rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``now`` with its accelerations (2 + U,), moved on sample by sample; see ``samples``."""
-        air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
-        torques = np.zeros((self.substeps + 1, self.plane.wheels))
-        given = (
-            told,
-            kept,
-            self.sample,
-            Braking(air, self.chambers, self.brakes, torques),
-            now.state,
-            now.turning,
-            self.slope,
-            self.plane,
-            self.kind,
-            self.road,
-            self.tables.packed,
-            rates,
-            now.report,
-        )
-        if self.engine is not None:
-            moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
-            return moving
-        if self.relaxation is None:
-            return by_steps(*given)
-        from models.brake.relaxation import by_lagging_steps
-
-        # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady one
-        lag = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
-        return by_lagging_steps(*given, self.relaxation, lag)
-
-
-def _tell(told: Told, command: Command, braked: bool) -> None:
-    """What a command means for the next sample."""
-    if command.pressures is not None:
-        told.pressures[:] = command.pressures
-    else:
-        told.valves[:] = command.valves if braked else RELEASE
-        told.pressures[0] = math.nan
-
-
-def _take(rows: list[np.ndarray], kept: Kept) -> None:
-    """Put what was recorded to the rows."""
-    rows.append(kept.rows[: kept.left[0]].copy())
-    kept.left[0] = 0
-
-
-@contextmanager
-def _taken(rows: list[np.ndarray], kept: Kept, now: Row, names: tuple[str, ...]) -> Iterator[None]:
-    """Gives a failed run the path until then."""
+        vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
+    begun = time.perf_counter()
     try:
-        yield
+        path = looped(scene, name, vehicle, start, engine)
     except RunFailed as error:
-        _take(rows, kept)
-        error.partial = _path(rows, now, False, names)
+        if error.partial is not None:
+            error.partial = _labelled(scene, name, engine, error.partial, time.perf_counter() - begun)
         raise
+    return _labelled(scene, name, engine, path, time.perf_counter() - begun)
 
 
-def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:
-    times, states, turning, pressures, torques, reports = parts(rows, now)
-    return Path(times[:, 0], states, turning, pressures, torques, reports[1:], stands, names)
+def _labelled(scene: BrakingScene, name: str, engine: str, path: Path, seconds: float) -> Result:
+    """Motion by coordinate, and by wheel its turning, pressure and torque, with its forces, load and slips."""
+    units = ", ".join("rad" if place.split()[-1][0] in "hr" else "m" for place in path.coordinates)
+    rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
+    moving, wheel = ("time", "coordinate"), ("time", "wheel")
+    channels = {
+        "positions": Channel(moving, path.states[:, 0], units),
+        "rates": Channel(moving, path.states[:, 1], rates),
+        "turning": Channel(wheel, path.turning, "rad/s"),
+        "pressure": Channel(wheel, path.pressures, "bar"),
+        "torque": Channel(wheel, path.torques, "N m"),
+    }
+    begun = np.full((1, *path.reports.shape[1:]), np.nan)
+    reports = np.concatenate((begun, path.reports))
+    channels |= {key: Channel(wheel, reports[:, :, column], unit) for key, (column, unit) in REPORTS.items()}
+    samples = len(path.times) - 1
+    return result(
+        scene,
+        channels,
+        {
+            "time": Channel("time", path.times, "s"),
+            "coordinate": Channel("coordinate", list(path.coordinates)),
+            "wheel": Channel("wheel", list(WHEELS[: path.turning.shape[1]])),
+        },
+        engine=engine,
+        counts={"samples": samples, "steps": samples * scene.run.substeps},
+        seconds=seconds,
+        detail=path,
+        title=f"{scene.title}: {name}",
+        stands=int(path.stands),
+    )

@@ -1,7 +1,8 @@
 """Scenes of braking: a vehicle, the road under its tyres, brakes, a controller in the loop, and a test procedure."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import chain, product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -174,11 +175,9 @@ class BrakingScene(SceneFile):
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> BrakingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(BrakingScene, table, file, folder)
-    for name, own in scene.procedures.items():
-        _check_procedure(own, scene.file, f"procedures.{name}")
-    _check_vehicle(scene)
-    _check_brakes(scene)
-    _check_run(scene)
+    parts = (_of_procedures, _of_vehicle, _of_brakes, _of_run)
+    for place, value, allowed in chain.from_iterable(part(scene) for part in parts):
+        raise InputError(scene.file, place, value, allowed)
     check(scene)
     return scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, file)})
 
@@ -187,97 +186,79 @@ READ = {"straight": (), "split": ("right",), "turn": ("radius",), "j_turn": ("st
 """Keys that a procedure reads beside its speed; it needs one of them."""
 STEEPEST = 1.0
 """rad; no wheel is steered further."""
+Refusals = Iterator[tuple[str, Any, str]]
+"""Places that cannot be so, their values, and what is allowed."""
 
 
-def _check_procedure(own: Procedure, file: str, place: str) -> None:
-    if own.speed > LARGEST_SPEED:
-        raise InputError(file, f"{place}.speed", own.speed, f"must be at most {LARGEST_SPEED:g} m/s")
-    read = READ[own.kind]
-    there = [key for key in ("right", "steer", "steering", "radius") if getattr(own, key) is not None]
-    for key in there:
+def _of_procedures(scene: BrakingScene) -> Refusals:
+    for name, procedure in scene.procedures.items():
+        yield from ((f"procedures.{name}.{key}", *wrong) for key, *wrong in _of_procedure(procedure))
+
+
+def _of_procedure(procedure: Procedure) -> Refusals:
+    if procedure.speed > LARGEST_SPEED:
+        yield "speed", procedure.speed, f"must be at most {LARGEST_SPEED:g} m/s"
+    read = READ[procedure.kind]
+    named = [key for key in ("right", "steer", "steering", "radius") if getattr(procedure, key) is not None]
+    for key in named:
         if key not in read:
-            raise InputError(file, f"{place}.{key}", getattr(own, key), f"has no meaning for {own.kind}")
-    if read and not there:
-        raise InputError(file, f"{place}.{read[0]}", None, f"is missing: {own.kind} needs {' or '.join(read)}")
-    if len(there) > 1:
-        raise InputError(file, f"{place}.{there[1]}", None, f"has no meaning beside {there[0]}: leave one out")
-    if own.steer is not None and abs(own.steer) > STEEPEST:
-        raise InputError(file, f"{place}.steer", own.steer, f"must be at most {STEEPEST:g} rad, of either sign")
-    if own.steering is not None:
-        _check_steering(own.steering, file, f"{place}.steering")
-    if own.radius is not None and abs(own.radius) < 10.0:
-        raise InputError(file, f"{place}.radius", own.radius, "must be at least 10 m, of either sign")
+            yield key, getattr(procedure, key), f"has no meaning for {procedure.kind}"
+    if read and not named:
+        yield read[0], None, f"is missing: {procedure.kind} needs {' or '.join(read)}"
+    if len(named) > 1:
+        yield named[1], None, f"has no meaning beside {named[0]}: leave one out"
+    if procedure.steer is not None and abs(procedure.steer) > STEEPEST:
+        yield "steer", procedure.steer, f"must be at most {STEEPEST:g} rad, of either sign"
+    if procedure.steering is not None:
+        times, angles = np.array(procedure.steering, float).T
+        if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
+            yield "steering", times.tolist(), "times must rise from knot to knot, from 0 on, in s"
+        if np.abs(angles).max() > STEEPEST:
+            yield "steering", angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign"
+    if procedure.radius is not None and abs(procedure.radius) < 10.0:
+        yield "radius", procedure.radius, "must be at least 10 m, of either sign"
 
 
-def _check_steering(knots: list[Pair], file: str, place: str) -> None:
-    times, angles = np.array(knots, float).T
-    if (np.diff(times) <= 0.0).any() or times[0] < 0.0:
-        raise InputError(file, place, times.tolist(), "times must rise from knot to knot, from 0 on, in s")
-    if np.abs(angles).max() > STEEPEST:
-        raise InputError(file, place, angles.tolist(), f"angles must be at most {STEEPEST:g} rad, of either sign")
-
-
-def _check_brakes(scene: BrakingScene) -> None:
-    """Refuse a supply that no vehicle has, and torques that no brake gives."""
-    own, file = scene.brakes, scene.file
-    if own.supply > LARGEST_PRESSURE:
-        raise InputError(file, "brakes.supply", own.supply, f"must be at most {LARGEST_PRESSURE:g} bar")
-    for axle in ("front", "rear", "trailer"):
-        table: BrakeTable = getattr(own, axle)
-        for key, value in (("gradient", table.gradient), ("falling", table.falling or 0.0)):
-            if value * own.supply > LARGEST_TORQUE:
-                most = LARGEST_TORQUE / own.supply
-                raise InputError(
-                    file,
-                    f"brakes.{axle}.{key}",
-                    value,
-                    f"must be at most {most:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m",
-                )
-
-
-def _check_vehicle(scene: BrakingScene) -> None:
+def _of_vehicle(scene: BrakingScene) -> Refusals:
     """A vehicle on its suspension has all that its file says."""
-    own, file = scene.vehicle, scene.file
-    if own.file is None:
-        if own.spin_inertia is not None:
-            raise InputError(file, "vehicle.spin_inertia", own.spin_inertia, "has no meaning without vehicle.file")
+    vehicle = scene.vehicle
+    if vehicle.file is None:
+        if vehicle.spin_inertia is not None:
+            yield "vehicle.spin_inertia", vehicle.spin_inertia, "has no meaning without vehicle.file"
         return
-    if own.spin_inertia is None:
-        raise InputError(file, "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it")
-    for place, named in (
-        ("vehicle.parameters", "parameters" in own.model_fields_set),
-        ("vehicle.override", bool(own.override)),
-    ):
+    if vehicle.spin_inertia is None:
+        yield "vehicle.spin_inertia", None, "is missing: a vehicle file does not say it"
+    for key, named in (("parameters", "parameters" in vehicle.model_fields_set), ("override", vehicle.override)):
         if named:
-            raise InputError(file, place, None, "has no meaning beside vehicle.file, which says it all")
+            yield f"vehicle.{key}", None, "has no meaning beside vehicle.file, which says it all"
 
 
-def _check_run(scene: BrakingScene) -> None:
-    if not 1e-4 <= scene.run.sample <= 0.1:
-        raise InputError(scene.file, "run.sample", scene.run.sample, "must be from 0.0001 to 0.1 s")
-    if scene.run.sample / scene.run.substeps > LONGEST_STEP * (1.0 + 1e-9):
-        least = math.ceil(scene.run.sample / LONGEST_STEP - 1e-9)
-        raise InputError(
-            scene.file,
-            "run.substeps",
-            scene.run.substeps,
-            f"must be at least {least}: steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents",
-        )
-    if scene.pressure is not None and scene.pressure.delay > 1.0:
-        raise InputError(scene.file, "pressure.delay", scene.pressure.delay, "must be at most 1 s")
-    if scene.pressure is not None and scene.pressure.slow is not None and scene.pressure.slow < scene.pressure.fill:
-        raise InputError(
-            scene.file,
-            "pressure.slow",
-            scene.pressure.slow,
-            f"must be at least fill, {scene.pressure.fill:g} s: it is that of filling slowly",
-        )
-    if scene.run.duration < 2.0 * scene.run.sample:
-        raise InputError(
-            scene.file,
-            "run.duration",
-            scene.run.duration,
-            f"must be at least {2.0 * scene.run.sample:g} s, two samples",
-        )
-    if scene.run.duration > 1000.0:
-        raise InputError(scene.file, "run.duration", scene.run.duration, "must be at most 1000 s")
+def _of_brakes(scene: BrakingScene) -> Refusals:
+    """A supply that no vehicle has, and torques that no brake gives."""
+    supply = scene.brakes.supply
+    if supply > LARGEST_PRESSURE:
+        yield "brakes.supply", supply, f"must be at most {LARGEST_PRESSURE:g} bar"
+    most = f"must be at most {LARGEST_TORQUE / supply:g} N m/bar: no brake gives more than {LARGEST_TORQUE:g} N m"
+    for axle, key in product(("front", "rear", "trailer"), ("gradient", "falling")):
+        value = getattr(getattr(scene.brakes, axle), key) or 0.0
+        if value * supply > LARGEST_TORQUE:
+            yield f"brakes.{axle}.{key}", value, most
+
+
+def _of_run(scene: BrakingScene) -> Refusals:
+    run, pressure = scene.run, scene.pressure
+    if not 1e-4 <= run.sample <= 0.1:
+        yield "run.sample", run.sample, "must be from 0.0001 to 0.1 s"
+    if run.sample / run.substeps > LONGEST_STEP * (1.0 + 1e-9):
+        least = math.ceil(run.sample / LONGEST_STEP - 1e-9)
+        longer = f"steps of more than {LONGEST_STEP:g} s mistake stopping distances by percents"
+        yield "run.substeps", run.substeps, f"must be at least {least}: {longer}"
+    if pressure is not None and pressure.delay > 1.0:
+        yield "pressure.delay", pressure.delay, "must be at most 1 s"
+    if pressure is not None and pressure.slow is not None and pressure.slow < pressure.fill:
+        allowed = f"must be at least fill, {pressure.fill:g} s: it is that of filling slowly"
+        yield "pressure.slow", pressure.slow, allowed
+    if run.duration < 2.0 * run.sample:
+        yield "run.duration", run.duration, f"must be at least {2.0 * run.sample:g} s, two samples"
+    if run.duration > 1000.0:
+        yield "run.duration", run.duration, "must be at most 1000 s"

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
 from models.brake.plane_step import LOAD, LOCKED, SLIP
-from models.systems.braking.run import Path
+from models.systems.braking.march import Path
 
 WHEELS = (
     "front left",
@@ -76,7 +76,7 @@ class Stop:
     def of_vehicle(self) -> dict[str, float]:
         """What the whole vehicle did, by name and unit."""
         path, speed, way = self.path, self.speed, self.way
-        slip, lateral = int(np.argmax(np.abs(self.side_slip))), int(np.argmax(np.abs(self.across)))
+        slip, lateral = _peak(self.side_slip), _peak(self.across)
         time, distance = float(path.times[-1]), float(way[-1])
         return {
             "initial speed [m/s]": float(speed[0]),
@@ -106,9 +106,23 @@ class Stop:
             return {}
         roll, pitch = np.degrees(self.lean).T
         return {
-            "largest roll [deg]": float(roll[np.argmax(np.abs(roll))]),
-            "largest pitch [deg]": float(pitch[np.argmax(np.abs(pitch))]),
+            "largest roll [deg]": float(roll[_peak(roll)]),
+            "largest pitch [deg]": float(pitch[_peak(pitch)]),
             "least wheel load [N]": float(self.path.reports[:, :, LOAD].min()),
+        }
+
+    @property
+    def hitch(self) -> np.ndarray:
+        """Angle (n,) of the drawbar of a train against its truck in rad, positive to the left."""
+        return self.path.states[:, 0, 3] - self.path.states[:, 0, 2]
+
+    def of_hitch(self) -> dict[str, float]:
+        """What the hitch of a train did, by name and unit."""
+        largest = _peak(self.hitch)
+        return {
+            "largest hitch angle [deg]": float(np.degrees(self.hitch[largest])),
+            "largest hitch angle at [s]": float(self.times[largest]),
+            "final hitch angle [deg]": float(np.degrees(self.hitch[-1])),
         }
 
     def of_wheels(self) -> dict[str, np.ndarray]:
@@ -148,3 +162,8 @@ class Stop:
     def locks(self) -> Locks:
         """Locks of the wheels above 15 km/h."""
         return lock_table(self.lengths, self.path.reports[:, :, LOCKED] > 0.0, self.speed[:-1])
+
+
+def _peak(values: np.ndarray) -> int:
+    """Where the largest magnitude is."""
+    return int(np.argmax(np.abs(values)))

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from models.core.errors import RunFailed
 from models.core.noise import SPEED, normal
 from models.ensemble.runner import PathFailed
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
 from models.systems.braking.stop_report import Stop
 
@@ -41,7 +41,7 @@ class Stops:
     def __call__(self, paths: range) -> dict[str, np.ndarray]:
         """Named arrays (len(paths),) of ``KEPT`` and of the initial speed (m/s)."""
         scene = build(self.table, self.file, Path(self.folder))
-        rows = [self._one(scene, path) for path in paths]
+        rows = [self._stopped(scene, number) for number in paths]
         return {name: np.array([row[key] for row in rows]) for key, name in KEPT.items()} | {
             "speed": np.array([row["initial speed [m/s]"] for row in rows])
         }
@@ -55,18 +55,18 @@ class Stops:
             "seed": self.seed,
         }
 
-    def _one(self, scene: BrakingScene, path: int) -> dict[str, float]:
+    def _stopped(self, scene: BrakingScene, number: int) -> dict[str, float]:
         own = scene.procedures[self.procedure]
-        drawn = float(normal(self.seed, path, 1, 1, source=SPEED)[0, 0])
+        drawn = float(normal(self.seed, number, 1, 1, source=SPEED)[0, 0])
         changed = own.model_copy(update={"speed": own.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:
-            run = drive(scene, self.procedure)
+            path = run(scene, procedure=self.procedure).detail
         except RunFailed as error:
-            raise PathFailed(path, str(error)) from None
-        if not run.stands:
-            raise PathFailed(path, f"does not stand after {scene.run.duration:g} s")
-        return Stop(run).of_vehicle()
+            raise PathFailed(number, str(error)) from None
+        if not path.stands:
+            raise PathFailed(number, f"does not stand after {scene.run.duration:g} s")
+        return Stop(path).of_vehicle()
 
 
 @dataclass(frozen=True)

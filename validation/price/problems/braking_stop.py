@@ -18,20 +18,18 @@ from models.advice.price.problem import Setting
 from models.brake.brake import PAPER_FRONT, of_wheels
 from models.brake.controller import SAMPLE, Command, Controller, Sample
 from models.brake.controllers import CONTROLLERS
-from models.brake.plane_vehicle import GRAVITY
 from models.brake.pressure import Chambers, by_valves, still
-from models.brake.quarter import Quarter, braked
+from models.brake.quarter import braked
 from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
 from models.machine.compiled import njit
-from models.systems.braking.run import Braked
+from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
 from validation.braking.braking_schemes import advanced
+from validation.braking.quarter_stops import FRONT
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
-VEHICLE = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
-"""A front wheel of the paper's truck under what it bears while braking."""
 SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
 """Surfaces, where the second begins (m), speed at the start (m/s)."""
 FINE = 64
@@ -178,24 +176,14 @@ class BrakingStop:
     def _taped(self) -> np.ndarray:
         """Valves (n,) of the controller's own run, one a sample, and the last ones for a while."""
         tape = Tape(CONTROLLERS["slip_bang_bang"](1), [])
-        kind, slope = np.zeros(1, dtype=np.int64), max(table.cornering for table in self._tables)
-        Braked(
-            VEHICLE.plane,
-            kind,
-            stacked(self._tables),
-            slope,
-            self._road,
-            self._brakes,
-            self._chambers,
-            np.zeros(1),
-            substeps=FINE,
-        ).run(tape, self.speed)
+        vehicle = on_tyres(FRONT.plane, self._tables, self._brakes, self._chambers, self._road, substeps=FINE)
+        vehicle.run(tape, self.speed)
         return np.array(tape.valves + [tape.valves[-1]] * MORE)
 
     def _by(self, method: str, tolerance: float) -> float:
         """Distance (m) by scipy, with the change of friction, locking and release as events."""
         stretches = [(begin, partial(self._friction, i)) for i, begin in enumerate((0.0, self.change))]
-        return tight_distance(VEHICLE, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
+        return tight_distance(FRONT, PAPER_FRONT, stretches, Played(self.valves), self.speed, tolerance, method)
 
     def _friction(self, i: int, slip: float) -> float:
         return float(np.interp(slip, self.slips, self.mu[i]))
@@ -210,9 +198,7 @@ class BrakingStop:
         return np.concatenate(found)
 
     def _ours(self, substeps: int) -> Result:
-        stop = braked(
-            VEHICLE, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed
-        )
+        stop = braked(FRONT, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed)
         if stop.rest < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(stop.distance, {"steps": stop.rest, "force calls": WALKS[OURS] * stop.rest})
@@ -222,12 +208,12 @@ class BrakingStop:
         way, steps = march(
             number,
             self.speed,
-            self.speed / VEHICLE.radius,
+            self.speed / FRONT.radius,
             self._torques(substeps),
             self.change,
-            VEHICLE.mass,
-            VEHICLE.radius,
-            VEHICLE.spin_inertia,
+            FRONT.mass,
+            FRONT.radius,
+            FRONT.spin_inertia,
             self.slips,
             self.mu,
             SAMPLE / substeps,

@@ -7,9 +7,10 @@ import numpy as np
 from models.brake.brake import PAPER_FRONT
 from models.brake.controller import SAMPLE
 from models.brake.plane_vehicle import GRAVITY
+from validation.braking.quarter_stops import FRONT
 from validation.braking.sampled_quarter import EMPTY, FILL, SLOWEST, SUPPLY
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import CHANGE, SPEED, SURFACES, VEHICLE
+from validation.price.problems.braking_stop import CHANGE, SPEED, SURFACES
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
 
@@ -28,8 +29,8 @@ Brake: pressure p (bar) and torque T (N m) begin at 0. In each sample of {1e3 * 
     up(p) = {PAPER_FRONT.rising:g} max(p - {PAPER_FRONT.push_out:g}, 0)
     down(p) = {PAPER_FRONT.falling:g} max(p - {PAPER_FRONT.release:g}, 0)
 
-with T before that at the start of the sample. Parameters (SI): m = {VEHICLE.mass:.17g}, r = {VEHICLE.radius:.17g},
-J = {VEHICLE.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u / r.
+with T before that at the start of the sample. Parameters (SI): m = {FRONT.mass:.17g}, r = {FRONT.radius:.17g},
+J = {FRONT.spin_inertia:.17g}, g = {GRAVITY:g}. Start: x = 0, u = {SPEED:g} m/s, w = u / r.
 
 Asked for: the stopping distance. After the first sample that ends at u <= {SLOWEST:g} m/s the wheel stands, and the
 rest of the way is u^2 / (2 g mu(1))."""

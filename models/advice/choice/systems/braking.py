@@ -1,13 +1,15 @@
 """Braking: quantities are the numbers of a stop and of its wheels, a case per procedure."""
 
 import time
+from collections import defaultdict
 from typing import Any
 
 import numpy as np
 
 from models.advice.choice.answer import Answer, Quantity
 from models.core.errors import RunFailed
-from models.systems.braking.procedures import drive, engines_of
+from models.systems.braking.procedures import engines_of
+from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
@@ -16,29 +18,28 @@ ENGINE, WINDOWED = "reference", False
 
 def answer(scene: BrakingScene, engine: str) -> Answer:
     """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
-    found, samples, states, seconds = dict[str, list[np.ndarray]](), 0, 0, 0.0
+    numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
     for name in scene.procedures:
         begun = time.process_time()
-        path = drive(scene, name, engine)
+        drive = run(scene, engine, procedure=name)
         seconds += time.process_time() - begun
+        path, stop = drive.detail, Stop(drive.detail)
         if len(path.times) < 3:
             raise RunFailed("braking", f"{name} ends before it has begun", float(path.times[-1]))
-        stop = Stop(path)
         for key, value in {**stop.of_vehicle(), **stop.of_wheels()}.items():
-            found.setdefault(key, []).extend(np.atleast_1d(np.asarray(value, float))[:, None])
-        samples += len(path.times) - 1
+            numbers[key] += [*np.atleast_1d(np.asarray(value, float))[:, None]]
+        steps += drive.counts()["steps"]
         states = path.states[0].size + path.turning.shape[1] + (scene.pressure is not None) * path.pressures.shape[1]
-    steps = samples * scene.run.substeps
     return Answer(
-        {name: _quantity(name, cases) for name, cases in found.items() if np.isfinite(cases).all()},
+        {
+            name: Quantity(name.partition("[")[2].rstrip("]"), tuple(cases))
+            for name, cases in numbers.items()
+            if np.isfinite(cases).all()
+        },
         {"steps": steps, "calls": steps, "states": states},
         seconds,
     )
-
-
-def _quantity(name: str, cases: list[np.ndarray]) -> Quantity:
-    return Quantity(name.partition("[")[2].rstrip("]"), tuple(cases))
 
 
 def steps(scene: BrakingScene) -> int:

@@ -1,0 +1,68 @@
+"""Slip control: by two thresholds, the simplest controller and the yardstick of the others, and by two parts of a loop.
+
+``SlipPI`` has a proportional and an integral part whose gains grow with speed, and commands pressures. Its controlled
+quantity mixes slip with deceleration, s - mix w' r / g: the deceleration tells first. Slip answers to torque the faster
+the slower the vehicle is, and gains in proportion to the speed keep the loop the same. Sources: S. Savaresi, M.
+Tanelli, Active braking control systems design for vehicles (2010), mixed slip-deceleration control; S. Solyom, A.
+Rantzer, J. Ludemann, Synthesis of a model-based tire slip controller, Vehicle System Dynamics 41 (2004).
+"""
+
+from dataclasses import dataclass
+
+from models.brake.controller import APPLY, RELEASE
+from models.brake.controllers.per_wheel import SLIP, SMALLEST, Common
+from models.core.errors import InputError
+
+
+@dataclass
+class SlipBangBang(Common):
+    """Releases above one slip, applies below a lower one, and between them goes on with what it did."""
+
+    release: float = 0.10
+    apply: float = 0.05
+
+    def __post_init__(self) -> None:
+        self.check(release=SLIP, apply=SLIP)
+        if not self.apply <= self.release < 1.0:
+            raise InputError("", "controller.parameters.apply", self.apply, "must be at most release, and that below 1")
+        self.governed_by(_BangBang)
+
+
+class _BangBang:
+    def __init__(self, own: SlipBangBang) -> None:
+        self._own, self._valve = own, APPLY
+
+    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+        if slip > self._own.release:
+            self._valve = RELEASE
+        elif slip < self._own.apply:
+            self._valve = APPLY
+        return self._valve
+
+
+@dataclass
+class SlipPI(Common):
+    """target : slip wanted; gain : bar per unit of slip and m/s; reset : time of the integral part (s); mix : share
+    of the deceleration (slip per g)."""
+
+    target: float = 0.06
+    gain: float = 1.0
+    reset: float = 0.08
+    mix: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.check(target=SLIP, gain=(0.0, 1e4), reset=(0.0, 1e3), mix=(-SMALLEST, 10.0))
+        self.governed_by(_Loop, pressures=True)
+
+
+class _Loop:
+    def __init__(self, own: SlipPI) -> None:
+        self._own, self._sum = own, 0.0
+
+    def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
+        own = self._own
+        error = own.target - (slip - own.mix * gains / 9.81)
+        gain = own.gain * speed
+        total = self._sum + gain * error * own.period / own.reset
+        self._sum = min(max(total, 0.0), supply)
+        return min(max(self._sum + gain * error, 0.0), supply)

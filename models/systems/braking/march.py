@@ -1,0 +1,193 @@
+"""A braked vehicle with its controller in the loop, sample by sample, until it stands or its time is over."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from models.brake.advance import AT_REST, ENDS, FINE, ending
+from models.brake.brake import Brakes
+from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
+from models.brake.plane_vehicle import Plane
+from models.brake.port.ask import STATES, WITH_SLOW, ask
+from models.brake.port.sensors import Sensed
+from models.brake.pressure import Chambers, still
+from models.brake.samples import Braking, Kept, Row, Told, by_steps, parts, row
+from models.brake.surfaces import EVEN, Road, check_way
+from models.core.errors import RunFailed
+from models.tyre.tyre_table import Tables, TyreTable, stacked
+
+MOST = 1024
+"""Samples of which a controller that is not asked knows nothing, at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """What a run recorded at every sample, the start included.
+
+    times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
+    reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest;
+    coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
+    clock on the wall told of overruns, if the run kept to it.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    turning: np.ndarray
+    pressures: np.ndarray
+    torques: np.ndarray
+    reports: np.ndarray
+    stands: bool
+    coordinates: tuple[str, ...] = ()
+    clock: str = ""
+
+
+class Start(NamedTuple):
+    """What a run goes on from: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in rad/s."""
+
+    state: np.ndarray
+    turning: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Braked:
+    """A vehicle on a road with brakes, ready to run.
+
+    kind (W,) : which tyre each wheel has; steer (W,) : rad, or in its place steering : such angles by time (s), those
+    in the middle of each sample; engine : ``models.engines.braking.Carried`` if an engine is to carry the chassis.
+    sprung : ``models.brake.sprung.Sprung`` of a vehicle on its suspension, which its engine then marches.
+    """
+
+    plane: Plane
+    kind: np.ndarray
+    tables: Tables
+    slope: float
+    road: Road
+    brakes: Brakes
+    chambers: Chambers
+    steer: np.ndarray
+    substeps: int = 4
+    sample: float = SAMPLE
+    speed_given: bool = True
+    switch: float = 0.0
+    engine: Any = None
+    relaxation: np.ndarray | None = None
+    sprung: Any = None
+    steering: Callable[[float], np.ndarray] | None = None
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of a state."""
+        if self.sprung is not None:
+            return tuple(self.sprung.names)
+        return ("x", "y", *(f"heading_{k}" for k in range(self.plane.masses.size)))
+
+    def rolling(self, speed: float) -> Start:
+        """Steady rolling along x at a speed (m/s)."""
+        state = np.zeros((2, len(self.coordinates)))
+        state[1, 0] = speed
+        return Start(state, speed / self.plane.radius)
+
+    def run(self, controller: Controller, start: float | Start, duration: float = 60.0) -> Path:
+        """From a start, or steady rolling along x at a speed (m/s); the brake switch closes at ``switch``.
+
+        Until then no valve lets anything through, whatever the controller commands.
+
+        Raises RunFailed, which names the time and whose ``partial`` is the path until then.
+        """
+        given, wheels = start if isinstance(start, Start) else self.rolling(start), self.plane.wheels
+        check_way(self.road, self.sample / self.substeps * float(np.hypot(*given.state[1, :2])))
+        now = row(given.state.shape[1], wheels)
+        now.state[:], now.turning[:] = given.state, given.turning
+        told = Told(np.ones(1, dtype=np.int64), np.full(wheels, RELEASE), np.full(wheels, math.nan), self.steer.copy())
+        steady = self.steering is None and is_steady(controller)
+        most = int(min(duration / self.sample + 2.0, MOST)) if steady else 1
+        kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
+        states = WITH_SLOW if self.chambers.slow.size else STATES
+        beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
+        rows, status, rates = [now.whole[None].copy()], FINE, np.zeros(2 + self.plane.masses.size)
+        try:
+            for number, (status, time, speed, supply) in enumerate(self._moving(told, kept, now, rates)):
+                if status in ENDS:
+                    raise RunFailed("braking", ending(status, self.plane, now.state, rates, now.report), time)
+                _take(rows, kept)
+                if status == AT_REST or time >= kept.until:
+                    break
+                braked = time >= self.switch - 1e-9
+                told.samples[0] = most if braked else 1
+                known = speed if self.speed_given else math.nan
+                rims = np.abs(now.turning) * self.plane.radius
+                asked = Sample(number, round(time * 1e9), rims, braked, supply, known)
+                _tell(told, ask(controller, asked, states, max(beyond, supply)), braked)
+                if self.steering is not None:
+                    told.steer[:] = self.steering(time + 0.5 * self.sample)
+        except RunFailed as error:
+            _take(rows, kept)
+            error.partial = _path(rows, now, False, self.coordinates)
+            raise
+        return _path(rows, now, status == AT_REST, self.coordinates)
+
+    def _moving(self, told: Told, kept: Kept, now: Row, rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
+        """The vehicle as it is ``now`` with its accelerations (2 + U,), moved on sample by sample; see ``samples``."""
+        air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
+        torques = np.zeros((self.substeps + 1, self.plane.wheels))
+        given = (
+            told,
+            kept,
+            self.sample,
+            Braking(air, self.chambers, self.brakes, torques),
+            now.state,
+            now.turning,
+            self.slope,
+            self.plane,
+            self.kind,
+            self.road,
+            self.tables.packed,
+            rates,
+            now.report,
+        )
+        if self.engine is not None:
+            moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
+            return moving
+        if self.relaxation is None:
+            return by_steps(*given)
+        from models.brake.relaxation import by_lagging_steps
+
+        # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady one
+        lag = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
+        return by_lagging_steps(*given, self.relaxation, lag)
+
+
+def on_tyres(
+    plane: Plane, tyres: Sequence[TyreTable], brakes: Brakes, chambers: Chambers, road: Road = EVEN, **more: Any
+) -> Braked:
+    """A vehicle whose wheels point straight ahead, all with the same kind of tyre where no other is named.
+
+    tyres : tables, surface by surface and kind by kind; more : as of ``Braked``.
+    """
+    none = np.zeros(plane.wheels)
+    slope = max(tyre.cornering for tyre in tyres)
+    given = {"kind": none.astype(int), "steer": none, "tables": stacked(tyres), "slope": slope, **more}
+    return Braked(plane=plane, road=road, brakes=brakes, chambers=chambers, **given)
+
+
+def _tell(told: Told, command: Command, braked: bool) -> None:
+    """What a command means for the next sample."""
+    if command.pressures is not None:
+        told.pressures[:] = command.pressures
+    else:
+        told.valves[:] = command.valves if braked else RELEASE
+        told.pressures[0] = math.nan
+
+
+def _take(rows: list[np.ndarray], kept: Kept) -> None:
+    """Put what was recorded to the rows."""
+    rows.append(kept.rows[: kept.left[0]].copy())
+    kept.left[0] = 0
+
+
+def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:
+    times, states, turning, pressures, torques, reports = parts(rows, now)
+    return Path(times[:, 0], states, turning, pressures, torques, reports[1:], stands, names)

@@ -1,0 +1,169 @@
+"""Trucks and trains that lock, slide, fold or fall, and controllers that answer nonsense: errors of hard cases."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.brake.brake import PAPER_FRONT, of_wheels, torque
+from models.brake.controller import AllApplied, Command, Sample
+from models.brake.plane_chain import inertia
+from models.brake.plane_step import BORNE, KNOWN, SIDE, share_out
+from models.brake.plane_vehicle import GRAVITY, PAPER, truck
+from models.brake.port.ask import checked
+from models.brake.surfaces import Stretch, road
+from models.brake.trailer import CHOSEN, train
+from models.systems.braking.march import Start
+from models.systems.braking.procedures import check_engine, ready
+from models.systems.braking.run import run
+from models.systems.braking.scene import BrakingScene, build
+from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, Moved, bent
+
+TRUCK, HIGH = truck(PAPER), truck(PAPER.model_copy(update={"height": 4.0}))
+"""The paper's truck, and one as high as it is long and twice as high as it is wide."""
+
+
+def energy_grows(speeds: tuple[float, float, float], level: float) -> Error:
+    """A case of the truck at rates of x, y (m/s) and heading (rad/s) under torques (N m) on ice: largest gain of its
+    kinetic energy over 20 ms, by that of the start."""
+
+    def energy(rates: np.ndarray) -> float:
+        return float(TRUCK.masses[0] * (rates[:2] ** 2).sum() + TRUCK.inertias[0] * rates[2] ** 2)
+
+    def error(implementation: str, folder: Path) -> float:
+        moved = Moved(implementation, TRUCK, ICE, turning=0.0)
+        moved.state[1] = speeds
+        first, gains = energy(moved.state[1]), []
+        for _ in range(25):
+            before = energy(moved.state[1])
+            moved.under(np.full((5, 4), level), 5e-3)
+            gains.append(energy(moved.state[1]) - before)
+        return float(max(*gains, 0.0) / first) if np.isfinite(moved.state).all() else np.inf
+
+    return error
+
+
+def even(implementation: str, folder: Path) -> float:
+    """The truck on even friction, straight ahead: y, heading and yaw rate (m, rad, rad/s)."""
+    moved = Moved(implementation, TRUCK, DRY)
+    moved.under(np.full((101, 4), 4e3))
+    return float(np.abs(moved.state[:, 1:]).max())
+
+
+def mirrored(implementation: str, folder: Path) -> float:
+    """The truck steered left on a slick left side, and its mirror image: difference (m, rad)."""
+    ends = []
+    for side, stretch in ((1.0, Stretch(0.0, 0, 1)), (-1.0, Stretch(0.0, 1, 0))):
+        moved = Moved(implementation, TRUCK, ICE, DRY, road=road([stretch]), steer=0.05 * side)
+        moved.under(np.full((101, 4), 2e3))
+        ends.append(moved.state * np.array([1.0, side, side]))
+    return float(np.abs(ends[0] - ends[1]).max())
+
+
+def lifting(implementation: str, folder: Path) -> float:
+    """A truck as high as it is long, braked on dry road."""
+    Moved(implementation, HIGH, DRY, speed=20.0).under(np.full((101, 4), 2e4))
+    return np.inf
+
+
+def turned_over(implementation: str, folder: Path) -> float:
+    """A truck twice as high as it is wide, steered on dry road."""
+    Moved(implementation, HIGH, DRY, speed=20.0, steer=0.1).under(np.zeros((201, 4)))
+    return np.inf
+
+
+def jackknifed(implementation: str, folder: Path) -> float:
+    """A train folded by 100 degrees, all wheels locked on dry road: largest gain of energy over 0.4 s, by the first."""
+    plane = train(PAPER, CHOSEN.model_copy(update={"fold": np.pi}), transfer=False)
+    moved = Moved(implementation, plane, DRY, turning=0.0)
+    state = moved.state
+    state[0, 3:] = np.radians(-100.0)
+
+    def energy() -> float:
+        mass, rest = np.zeros((5, 5)), np.zeros(5)
+        units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
+        inertia(units, state[1], plane.masses, plane.inertias, plane.reach, mass, rest, rest.copy(), rest.copy())
+        return float(0.5 * state[1] @ mass @ state[1])
+
+    levels = [energy()]
+    for _ in range(20):
+        moved.under(np.full((5, plane.wheels), 2e4), 5e-3)
+        levels.append(energy())
+    return float(max(np.diff(levels).max(), 0.0) / levels[0]) if levels[-1] < 0.8 * levels[0] else np.inf
+
+
+def no_friction_on_one_side(implementation: str, folder: Path) -> float:
+    """The truck locked, none on the left, 0.8 on the right, for 5 ms: speed lost against mu g t / 2, relative."""
+    tyres, plane = (bent((0.0, 0.0), (1.0, mu)) for mu in (0.0, 0.8)), truck(PAPER, transfer=False)
+    moved = Moved(implementation, plane, *tyres, turning=0.0, road=road([Stretch(0.0, 0, 1)]))
+    moved.under(np.full((6, 4), 2e4), 1e-3)
+    lost = abs((SPEED - moved.state[1, 0]) / (0.4 * GRAVITY * 5e-3) - 1.0)
+    return lost if moved.state[1, 2] < 0.0 else np.inf
+
+
+def braking_scene(**tables: Any) -> BrakingScene:
+    """The truck from 1.5 m/s on ice without anti-lock system."""
+    plain = {"title": "hard", "system": "braking", "procedures": {"stop": {"speed": 1.5}}, "pressure": {}}
+    return build({**plain, **tables})
+
+
+def lagging_at_rest(implementation: str, folder: Path) -> float:
+    """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
+    scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
+    check_engine(scene, implementation)
+    vehicle, begun = ready(scene, "stop")
+    begun.state[1, 1] = 0.2
+    path = vehicle.run(AllApplied(4), begun, 10.0)
+    rest = Start(path.states[-1].copy(), path.turning[-1].copy())
+    after = vehicle.run(AllApplied(4), rest, 1.0)
+    moved = np.abs(after.states[:, 0] - rest.state[0]).max() + np.abs(after.states[:, 1]).max()
+    return float(moved) if path.stands else np.inf
+
+
+def rests(**tables: Any) -> Error:
+    """A case of a scene that must come to rest: speeds that are left of vehicle and wheels (m/s, rad/s)."""
+
+    def error(implementation: str, folder: Path) -> float:
+        path = run(braking_scene(**tables), implementation).detail
+        return float(np.abs(path.states[-1, 1]).max() + np.abs(path.turning[-1]).max()) if path.stands else np.inf
+
+    return error
+
+
+AT_THE_EDGE_OF_LOCKING: dict[str, Any] = {
+    "load_transfer": {"front": 0.3},
+    "brakes": {"supply": 5.0},
+    "road": {"stretches": [{"left": "dry"}]},
+    "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}},
+    "pressure": None,
+}
+"""A J-turn on dry road, stopped under full brakes."""
+
+
+def one_wheel_lifted(implementation: str, folder: Path) -> float:
+    """Loads of which one would be negative: weight, and moments along and across, that change (N, N m)."""
+    known = np.zeros((4, KNOWN))
+    known[:, SIDE], known[:, BORNE] = TRUCK.place[:, 1], (9e3, 24e3, -4e3, 26e3)
+
+    def balance() -> np.ndarray:
+        loads: np.ndarray = known[:, BORNE]
+        return np.array([loads.sum(), loads @ TRUCK.place[:, 0], loads @ TRUCK.place[:, 1]])
+
+    before = balance()
+    share_out(known)
+    return float(np.abs(balance() - before).max()) if known[:, BORNE].min() >= 0.0 else np.inf
+
+
+def below_push_out(implementation: str, folder: Path) -> float:
+    """Torque (N m) of a brake below its push-out pressure."""
+    return float(torque(0, 0.99 * PAPER_FRONT.push_out, 0.0, of_wheels(PAPER_FRONT)))
+
+
+def answers(most: float = 8.0, **command: Any) -> Error:
+    """A case of a controller that answers nonsense where the supply has ``most`` bar."""
+
+    def error(implementation: str, folder: Path) -> float:
+        checked(Command(**command), Sample(3, 16_500_000, np.ones(4), True, most, 10.0), most=most)
+        return np.inf
+
+    return error

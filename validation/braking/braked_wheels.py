@@ -1,0 +1,171 @@
+"""One wheel that bears all of a vehicle, moved on by the compiled step or by an engine: errors of hard cases."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from models.brake.advance import AT_REST, ENDS, advance, ending
+from models.brake.plane_vehicle import GRAVITY, Plane
+from models.brake.quarter import Quarter
+from models.brake.surfaces import EVEN, Road, Stretch, road
+from models.core.errors import RunFailed
+from models.engines.braking import Carried
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import TyreTable, stacked
+from validation.braking.braking_schemes import exact
+from validation.braking.stepping import Moving
+
+Error = Callable[[str, Path], float]
+STEP, SPEED = 5.5e-3, 10.0
+ONE = Quarter(mass=1700.0, radius=0.5, spin_inertia=13.35)
+LOAD = ONE.mass * GRAVITY
+DRY, ICE = surface("dry"), surface("ice")
+
+
+def bent(*points: tuple[float, float]) -> TyreTable:
+    """Friction of these (slip, mu) at every load and slip angle, and none across."""
+    slips, mu = np.array(points).T
+    along = np.tile(mu, (2, 1, 1))
+    return TyreTable(np.array([0.0, 1.5]), slips, np.array([LOAD]), along, np.ones((2, slips.size)), np.zeros((2, 1)))
+
+
+class Moved(Moving):
+    """A vehicle on tyres, moved on by an implementation; it begins by rolling."""
+
+    def __init__(
+        self,
+        implementation: str,
+        plane: Plane,
+        *tyres: TyreTable,
+        speed: float = SPEED,
+        turning: float | None = None,
+        road: Road = EVEN,
+        steer: float = 0.0,
+    ) -> None:
+        go = advance if implementation == "reference" else Carried(implementation, plane).advance
+        super().__init__(plane, stacked(tyres), speed, steer=steer, road=road, go=go)
+        self.implementation = implementation
+        if turning is not None:
+            self.turning[:] = turning
+
+    def under(self, torques: np.ndarray, step: float = STEP) -> bool:
+        """Go on under torques (n + 1, W) at the ends of steps (s); whether it came to rest. Raises RunFailed."""
+        self.rates[:] = 0.0
+        status, used = self.on(torques, step)
+        if status in ENDS:
+            raise RunFailed(self.implementation, ending(status, self.plane, self.state, self.rates, self.report), used)
+        return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
+
+    @property
+    def rims(self) -> float:
+        """Speed of the first wheel's rim by that of the vehicle, less 1, as a magnitude."""
+        return float(abs(self.plane.radius[0] * self.turning[0] / self.state[1, 0] - 1.0))
+
+
+def stopping(
+    implementation: str,
+    level: float,
+    *tyres: TyreTable,
+    step: float = STEP,
+    turning: float | None = None,
+    road: Road = EVEN,
+) -> float:
+    """Way (m) to a stop that is one exactly, under a torque (N m); infinite without it."""
+    wheel = Moved(implementation, ONE.plane, *tyres, turning=turning, road=road)
+    least = min(level / ONE.radius, LOAD * min(float(tyre.mu_x[0, 0, -1]) for tyre in tyres))
+    rests = wheel.under(np.full((int(2.0 * SPEED * ONE.mass / least / step) + 50, 1), level), step)
+    return float(wheel.state[0, 0]) if rests and not wheel.state[1].any() and wheel.turning[0] == 0.0 else np.inf
+
+
+def settled(tyre: TyreTable, slip: float) -> tuple[float, float, float]:
+    """Torque (N m) under which a slip stays, the way (m) that this takes, and the speed of turning (rad/s)."""
+    force = LOAD * float(np.interp(slip, tyre.slips, tyre.mu_x[0, 0]))
+    return ONE.steady_torque(slip, force), ONE.mass * SPEED**2 / (2.0 * force), (1.0 - slip) * SPEED / ONE.radius
+
+
+def steady(tyre: TyreTable, slip: float, step: float = STEP) -> Error:
+    """A case of a stop at a slip that stays: way against m v^2 / (2 F), relative."""
+    level, way, turning = settled(tyre, slip)
+    return lambda name, folder: abs(stopping(name, level, tyre, step=step, turning=turning) / way - 1.0)
+
+
+def from_rolling(tyre: TyreTable, slip: float, step: float) -> Error:
+    """A case of a stop from rolling: way against the exact one, relative."""
+    level, _, _ = settled(tyre, slip)
+    return lambda name, folder: abs(stopping(name, level, tyre, step=step) / exact(ONE, tyre, level, SPEED) - 1.0)
+
+
+PEAKED = bent((0.0, 0.0), (0.1, 0.8), (1.0, 0.6))
+
+
+def beyond_the_peak(implementation: str, folder: Path) -> float:
+    """A thousandth above the torque of the peak: the wheel locks; way against the exact one."""
+    peak = 1.001 * LOAD * 0.8 * (ONE.radius + ONE.spin_inertia / (ONE.mass * ONE.radius))
+    return abs(stopping(implementation, peak, PEAKED) / exact(ONE, PEAKED, peak, SPEED) - 1.0)
+
+
+def at_the_peak(implementation: str, folder: Path) -> float:
+    """The torque of the peak itself: way outside those of the peak and of sliding, by the first."""
+    force = LOAD * 0.8
+    way = stopping(implementation, ONE.steady_torque(0.1, force), PEAKED, turning=0.9 * SPEED / ONE.radius)
+    least = ONE.mass * SPEED**2 / (2.0 * force)
+    return max(1.0 - way / least, way / (least * 0.8 / 0.6) - 1.0, 0.0)
+
+
+def locked(implementation: str, folder: Path) -> float:
+    """Locked from the start: way against v^2 / (2 mu g)."""
+    way = stopping(implementation, 2e4, DRY, turning=0.0)
+    return abs(way * 2.0 * GRAVITY * float(DRY.mu_x[0, 0, -1]) / SPEED**2 - 1.0)
+
+
+def changing(implementation: str, folder: Path) -> float:
+    """Locked from friction 0.2 on to 0.8 after 10 m: way against its closed form."""
+    slick, rough = (bent((0.0, 0.0), (1.0, mu)) for mu in (0.2, 0.8))
+    way = stopping(implementation, 1e5, slick, rough, turning=0.0, road=road([Stretch(0.0, 0, 0), Stretch(10.0, 1, 1)]))
+    return abs(way / (10.0 + (SPEED**2 - 2.0 * 0.2 * GRAVITY * 10.0) / (2.0 * 0.8 * GRAVITY)) - 1.0)
+
+
+def frictions(implementation: str, folder: Path) -> float:
+    """Locked on friction from 1e-6 to 1.5 for 0.2 s: speed lost against mu g t."""
+    errors = []
+    for mu in (1e-6, 1e-3, 0.1, 1.5):
+        wheel = Moved(implementation, ONE.plane, bent((0.0, 0.0), (1.0, mu)), turning=0.0)
+        wheel.under(np.full((41, 1), 1e6), 5e-3)
+        errors.append(abs((SPEED - wheel.state[1, 0]) / (mu * GRAVITY * 0.2) - 1.0))
+    return float(max(errors))
+
+
+def at_rest(implementation: str, folder: Path) -> float:
+    """A vehicle that stands, its brakes on: way and speed (m, m/s)."""
+    wheel = Moved(implementation, ONE.plane, DRY, speed=0.0)
+    wheel.under(np.full((51, 1), 5e3))
+    return float(np.abs(wheel.state).max() + abs(wheel.turning[0]))
+
+
+def backwards(implementation: str, folder: Path) -> float:
+    """A wheel thrown backwards, no brake: rim's speed against the vehicle's after 0.5 s, by it."""
+    wheel = Moved(implementation, ONE.plane, DRY, turning=-10.0)
+    wheel.under(np.zeros((101, 1)), 5e-3)
+    return wheel.rims
+
+
+def released(implementation: str, folder: Path) -> float:
+    """A locked wheel whose brake lets go on a step's end: rim's speed against the vehicle's 0.6 s later, by it."""
+    wheel = Moved(implementation, ONE.plane, ICE, turning=0.0)
+    wheel.under(np.where(np.arange(161) < 40, 2e4, 0.0)[:, None], 5e-3)
+    return wheel.rims
+
+
+def on_the_line(implementation: str, folder: Path) -> float:
+    """A wheel exactly on the line between dry and ice: way against that on the left surface alone (m)."""
+    both = stopping(implementation, 2e3, DRY, ICE, road=road([Stretch(0.0, 0, 1)]))
+    return abs(both - stopping(implementation, 2e3, DRY))
+
+
+def slope_changes(implementation: str, folder: Path) -> float:
+    """From dry on to wet within a step of 20 ms, lightly braked: way against that of the same force, relative."""
+    level, way, turning = settled(DRY, 0.004)
+    both = road([Stretch(0.0, 0, 0), Stretch(5.03, 1, 1)])
+    stop = stopping(implementation, level, DRY, surface("wet"), step=2e-2, turning=turning, road=both)
+    return abs(stop / way - 1.0)
