@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
@@ -86,10 +87,9 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         progress("as fitted", options.rounds / (options.rounds + 2))
         last = fitted(scene, options, scale, steer)
         found = _means(last, options, options.last, pool, options.seed + 1)
-    rounds = [
-        Channel("round", values, unit) for values, unit in zip(zip(*steps, strict=True), ROUNDS.values(), strict=True)
-    ]
-    result(scene, dict(zip(ROUNDS, rounds, strict=True)), {}, engine="reference").save(folder / "rounds.nc")
+    columns = zip(ROUNDS.items(), np.array(steps).T, strict=True)
+    rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
+    result(scene, rounds, {}, engine="reference").save(folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in ROUNDS.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")

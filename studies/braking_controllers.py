@@ -145,7 +145,7 @@ def _save(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], folde
     cases = [[getattr(case, name) for name in names] for case, _ in found]
     values = [[stop[head] for head in heads] for _, stop in found]
     channels = {
-        head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
+        head.partition(" [")[0].replace("/", " by "): Channel("stop", np.array(column), head.partition(" [")[2][:-1])
         for head, column in zip(heads, zip(*values, strict=True), strict=True)
     }
     texts = {name: Channel("stop", list(column)) for name, column in zip(names, zip(*cases, strict=True), strict=False)}

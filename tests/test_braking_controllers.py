@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from models.brake.controllers.slip_bang_bang import SlipBangBang
-from models.brake.controllers.slip_pi import SlipPI
-from models.brake.frozen import Frozen, limit_cycle
-from models.brake.speed_estimate import SpeedEstimate
 
 from models.brake.brake import Brake
 from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.acceleration_phases import AccelerationPhases
 from models.brake.controllers.five_phase import FivePhase, end_of, rate
+from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle
+from models.brake.controllers.per_wheel import SpeedEstimate
+from models.brake.controllers.slip import SlipBangBang, SlipPI
 from models.core.errors import InputError, RunFailed
 from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import Wheel, cycle

@@ -7,9 +7,10 @@ import pytest
 
 from models.brake.trailer import CHOSEN
 from models.systems.braking.adhesion import utilisation
-from models.systems.braking.hitch import of_hitch, on_ground, outlines
 from models.systems.braking.of_scene import plane_of
 from models.systems.braking.scene import build
+from models.systems.braking.stop_report import Stop
+from studies.braking_figures import on_ground, outlines
 
 TABLE = {
     "title": "t",
@@ -23,8 +24,8 @@ TABLE = {
 def test_hitch_angles_are_of_the_drawbar_against_the_truck():
     states = np.zeros((3, 2, 5))
     states[:, 0, 2:4] = [[0.0, 0.0], [0.1, -0.2], [0.3, 0.2]]
-    stop = SimpleNamespace(path=SimpleNamespace(states=states), times=np.array([0.0, 1.0, 2.0]))
-    assert of_hitch(stop) == pytest.approx(
+    stop = Stop(SimpleNamespace(states=states, times=np.array([0.0, 1.0, 2.0])))
+    assert stop.of_hitch() == pytest.approx(
         {
             "largest hitch angle [deg]": np.degrees(-0.3),
             "largest hitch angle at [s]": 1.0,

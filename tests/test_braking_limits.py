@@ -10,7 +10,8 @@ from models.brake.port.ask import WITH_SLOW, ControllerFailed, checked
 from models.brake.quarter import Quarter
 from models.brake.trailer import CHOSEN, train
 from models.core.errors import InputError, RunFailed
-from models.systems.braking.procedures import drive, ready
+from models.systems.braking.procedures import ready
+from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking.random_stops import random_stop
 from validation.cases import braking_limits as rows
@@ -42,15 +43,14 @@ def test_beyond_balance_two_wheels_bear_nothing(loads, side):
 
 def test_a_stop_at_the_edge_of_locking_finishes():
     steered = {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.02}}
-    path = drive(
+    path = run(
         scene(
             load_transfer={"front": 0.3},
             brakes={"supply": 5.0},
             road={"stretches": [{"left": "dry"}]},
             procedures=steered,
-        ),
-        "stop",
-    )
+        )
+    ).detail
     assert path.stands and path.times[-1] == pytest.approx(2.301, abs=0.01)
 
 
@@ -77,19 +77,18 @@ def test_valves_apply_slowly_only_where_the_scene_has_them():
     assert (checked(Command(valves=np.full(4, SLOW)), GIVEN, WITH_SLOW).valves == SLOW).all()
     phases = {"kind": "acceleration_phases", "parameters": {"slow": True}}
     with pytest.raises(InputError, match=r"controller.parameters.slow.*pressure.slow"):
-        drive(scene(controller=phases), "stop")
+        run(scene(controller=phases))
     with pytest.raises(InputError, match=r"pressure.slow = 0.01: must be at least fill, 0.15 s"):
         scene(pressure={"slow": 0.01})
     fast, slow = (
-        drive(
+        run(
             scene(
                 controller=phases | {"parameters": {"slow": value, "cut_off": 0.0}},
                 pressure={"slow": 2.0},
                 procedures={"stop": {"speed": 11.0}},
                 run={"duration": 2.0},
-            ),
-            "stop",
-        )
+            )
+        ).detail
         for value in (False, True)
     )
     assert not np.array_equal(fast.pressures, slow.pressures)
@@ -114,14 +113,13 @@ def test_what_cannot_be_is_refused_with_its_value():
 
 def test_a_train_that_folds_ends_with_its_angle_and_keeps_its_path():
     with pytest.raises(RunFailed, match=r"jackknifes: the drawbar against the truck at -?\d+\.\d deg, limit") as told:
-        drive(
+        run(
             scene(
                 trailer=CHOSEN.model_copy(update={"fold": 0.02}).model_dump(),
                 run={"duration": 6.0},
                 brakes={"supply": 2.0},
                 procedures={"stop": {"kind": "j_turn", "speed": 8.0, "steer": 0.1}},
-            ),
-            "stop",
+            )
         )
     assert len(told.value.partial.times) > 3
 

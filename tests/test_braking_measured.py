@@ -10,7 +10,7 @@ from models.core.errors import InputError
 from models.systems.braking.measured_pressures import read_pressures
 from models.systems.braking.of_scene import measured_of
 from models.systems.braking.plan import check, describe
-from models.systems.braking.procedures import drive
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
 from studies.braking import ended, run
@@ -47,7 +47,7 @@ def test_the_pressures_that_a_run_writes_repeat_it(tmp_path):
 def test_pressures_of_a_file_are_held_after_its_end_and_it_is_said(tmp_path):
     (tmp_path / "stop_pressures.csv").write_text(HEAD + "\n0, 1, 100, 1, 1\n0.1, 1, 100, 1, 1\n")
     own = scene(tmp_path, **MEASURED, run={"duration": 0.3})
-    path = drive(own, "stop")
+    path = drive(own).detail
     assert path.pressures[1:] == pytest.approx(1.0, rel=1e-12)
     told = ended(measured_of(own, "stop", 4), Stop(path))
     assert told == ["    measured pressures end at 0.100 s: from then on the last ones stay"]

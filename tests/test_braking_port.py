@@ -33,8 +33,8 @@ from models.brake.pressure import Chambers
 from models.brake.surfaces import Stretch, road
 from models.core.errors import InputError, RunFailed
 from models.core.strict import read
-from models.systems.braking.procedures import drive
-from models.systems.braking.run import Braked
+from models.systems.braking.march import Braked
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
@@ -668,7 +668,7 @@ def test_a_scene_logs_and_replays_what_it_drives(tmp_path):
     base = {"system": "braking", "title": "t", "run": {"duration": 0.1}, "procedures": {"one": {"speed": 11.0}}}
 
     def driven(port, **more):
-        return drive(build({**base, **more, "port": port}, "scene.toml", tmp_path), "one")
+        return drive(build({**base, **more, "port": port}, "scene.toml", tmp_path), procedure="one").detail
 
     path = driven({"log": "{procedure}.log"}, controller={"kind": "slip_bang_bang"})
     again = driven({"replay": "one.log", "pace": "wall"})  # whatever controller the scene names: the log answers

@@ -5,10 +5,11 @@ import pytest
 
 from models.advice.price import runner as cost
 from models.engines.braking import Carried
-from models.systems.braking.run import Braked
+from models.systems.braking.march import Braked
 from models.tyre.tyre_table import stacked
+from validation.braking.quarter_stops import FRONT
 from validation.price.problems import braking_stop
-from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, VEHICLE, BrakingStop, Played
+from validation.price.problems.braking_stop import EULER, FULL, LITERAL, OURS, QUICK, RK4, BrakingStop, Played
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def test_the_reference_knows_itself_and_where_friction_changes(short, monkeypatc
 def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(short, engine):
     """What the problem's note says: rounding of some hundred steps of 10 mm, 1e-14 m each."""
     stop = Braked(
-        VEHICLE.plane,
+        FRONT.plane,
         np.zeros(1, dtype=np.int64),
         stacked(short._tables),
         1.0,
@@ -48,7 +49,7 @@ def test_an_engine_that_carries_the_chassis_gives_the_digits_of_the_exact_wheel(
         short._chambers,
         np.zeros(1),
         substeps=2,
-        engine=Carried(engine, VEHICLE.plane),
+        engine=Carried(engine, FRONT.plane),
     )
     path = stop.run(Played(short.valves), 2.0)
     assert path.stands and path.states[-1, 0, 0] == pytest.approx(short._ours(2).distance, abs=1e-12)

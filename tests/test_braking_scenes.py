@@ -15,7 +15,8 @@ from models.core.systems import load
 from models.systems.braking.adhesion import Adhesion, NoAdhesion, utilisation
 from models.systems.braking.of_scene import braked
 from models.systems.braking.plan import check, check_reference, describe
-from models.systems.braking.procedures import drive, ready
+from models.systems.braking.procedures import ready
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
 from studies.braking import lines
@@ -122,8 +123,8 @@ def test_a_controller_that_dies_leaves_the_path_until_then():
 def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all():
     both = {"split": {"kind": "split", "speed": 10.0, "right": "snow"}, "straight": {"speed": 10.0}}
     own = scene(procedures=both, load_transfer={})
-    assert drive(own, "split").states[-1, 0, 2] < -1e-3
-    straight = drive(own, "straight")
+    assert drive(own, procedure="split").detail.states[-1, 0, 2] < -1e-3
+    straight = drive(own, procedure="straight").detail
     assert not straight.states[:, 0, 1:].any() and straight.states[-1, 1, 0] < 10.0
 
 
@@ -145,11 +146,11 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
 
 def test_an_engine_that_would_leave_the_lag_of_tyres_out_is_refused():
     with pytest.raises(Refused, match="lag of tyres"):
-        drive(scene(relaxation={"front": 0.5, "rear": 0.5}), "straight", "mujoco")
+        drive(scene(relaxation={"front": 0.5, "rear": 0.5}), "mujoco")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():
-    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0}), "stop")).of_wheels()
+    slips = Stop(drive(scene(procedures={"stop": {"speed": 0.5}}, run={"duration": 3.0})).detail).of_wheels()
     assert 0.0 < slips["mean slip"].min() <= slips["largest slip"].max() <= 1.0
 
 
@@ -209,7 +210,7 @@ def test_what_a_scene_names_is_read_before_its_plan_is_shown(tmp_path, tables, p
 def test_what_is_wrong_behind_the_port_is_told_by_the_scene_s_key(tmp_path, port, place, said):
     (tmp_path / "s.log").write_text("x")
     with pytest.raises(InputError, match=said) as error:
-        drive(build({**PLAIN, "port": port}, "s.toml", tmp_path), "stop")
+        drive(build({**PLAIN, "port": port}, "s.toml", tmp_path))
     assert error.value.file == "s.toml" and error.value.place == place
 
 
@@ -261,5 +262,5 @@ def test_adhesion_of_an_axle_that_does_not_lock_is_not_told():
 
 
 def test_a_run_that_ends_before_the_vehicle_stands_says_so():
-    stop = Stop(drive(scene(), "stop"))
+    stop = Stop(drive(scene()).detail)
     assert "not stopped by 0.3025 s, still 9.7" in lines("stop", stop, {}, {})[0]

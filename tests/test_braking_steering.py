@@ -7,7 +7,8 @@ from scipy.signal import lti, step
 from models.brake.plane_vehicle import GRAVITY, PAPER
 from models.brake.steering import Steering, response
 from models.core.errors import InputError
-from models.systems.braking.procedures import drive, ready, step_steer
+from models.systems.braking.procedures import ready, step_steer
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
 
@@ -71,7 +72,7 @@ def test_the_response_of_a_vehicle_is_that_of_the_linear_one():
 
 def test_a_ramp_turns_less_than_a_step_and_a_step_of_one_knot_the_same():
     ways = ({"steer": 0.03}, {"steering": [[0.0, 0.03]]}, {"steering": [[0.0, 0.0], [0.2, 0.03]]})
-    one, knot, ramp = (drive(scene(**own), "j").states[-1, 0, 2] for own in ways)
+    one, knot, ramp = (drive(scene(**own)).detail.states[-1, 0, 2] for own in ways)
     assert one == knot > 1.3 * ramp > 0.0
 
 

@@ -8,14 +8,15 @@ from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.sprung import PITCH, ROLL, sprung
 from models.core.errors import InputError, Refused, RunFailed
 from models.systems.braking.plan import check, describe
-from models.systems.braking.procedures import drive, engines_of, ready
+from models.systems.braking.procedures import engines_of, ready
+from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.vehicles.vehicle_file import load_vehicle
-from validation.braking.sprung_box import LOCKS, Torques, box, braked, car, constant, pitch_and_transfer, stays
+from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady
 
-TORQUES = Torques(600.0, 600.0, 200.0, 200.0)
+TORQUES = steady(600.0, 600.0, 200.0, 200.0)
 
 
 def scene(**tables):
@@ -37,7 +38,7 @@ def scene(**tables):
 def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
     mu, speed = 0.05, 1.5
     vehicle = braked(box(), constant(mu))
-    path = vehicle.run(Torques(*4 * (LOCKS,)), speed)
+    path = vehicle.run(steady(*4 * (LOCKS,)), speed)
     pitch, transfer = pitch_and_transfer(mu * GRAVITY)
     late = -len(path.times) // 8
     assert path.states[late, 0, PITCH] == pytest.approx(pitch, rel=2e-3)  # to first order in 1.6 mrad
@@ -50,7 +51,7 @@ def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
 
 def test_static_loads_are_those_of_levers():
     for own in (box(), car()):
-        path = braked(own, constant(0.1)).run(Torques(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
+        path = braked(own, constant(0.1)).run(steady(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
         assert path.reports[-1, :, LOAD] == pytest.approx(truck(own.plane).static, rel=1e-9)  # no drag, no brakes
 
 
@@ -78,7 +79,7 @@ def test_a_run_repeats_to_the_last_bit():
 def test_a_car_that_turns_over_is_told():
     grip = surface("dry").scaled(2.0)
     with pytest.raises(RunFailed, match="turns over") as told:
-        braked(car(), grip, steer=0.3).run(Torques(0.0, 0.0, 0.0, 0.0), 25.0, 5.0)
+        braked(car(), grip, steer=0.3).run(steady(0.0, 0.0, 0.0, 0.0), 25.0, 5.0)
     assert len(told.value.partial.times) > 10
 
 
@@ -91,10 +92,10 @@ def test_a_step_that_stiff_springs_cannot_take_is_refused_before_the_run():
 def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_body():
     own = scene()
     vehicle, start = ready(own, "turn")
-    path = vehicle.run(Torques(0.0, 0.0, 0.0, 0.0), start, 0.1)
+    path = vehicle.run(steady(0.0, 0.0, 0.0, 0.0), start, 0.1)
     assert np.abs(path.states[-1, 0, 3:] - start.state[0, 3:]).max() < 1e-5  # springs are settled; drag slows it down
     assert start.state[0, ROLL] > 5e-3
-    stop = Stop(drive(own, "straight"))
+    stop = Stop(drive(own, procedure="straight").detail)
     assert stop.path.stands and stop.of_vehicle()["largest pitch [deg]"] > 0.5
     assert "suspension, roll and pitch" in describe(own)
     check(own, ("reference", "exudyn", "mujoco"))

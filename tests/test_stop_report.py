@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.systems.braking.run import Path
+from models.systems.braking.march import Path
 from models.systems.braking.stop_report import Stop
 
 SPEED, RADIUS, SLIP, STEP = 15.0, 60.0, 0.04, 1e-3
