@@ -108,26 +108,18 @@ def wheels(vehicle: Truck, transfer: bool) -> tuple[np.ndarray, ...]:
     shares = vehicle.front.roll_share + vehicle.rear.roll_share
     if transfer and abs(shares - 1.0) > 1e-9:
         raise InputError("", "roll_share", shares, "of both axles must add up to 1")
-    axles, weight = (vehicle.front, vehicle.rear), vehicle.mass * GRAVITY
-    arms = (-vehicle.rear.x / vehicle.wheelbase, vehicle.front.x / vehicle.wheelbase)
-    rows = []
-    for axle, share, lean in zip(axles, arms, (-1.0, 1.0), strict=True):
-        for side in (1.0, -1.0):
-            pitch = lean * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
-            roll = -side * axle.roll_share * vehicle.mass * vehicle.height / axle.track
-            rows.append(
-                [
-                    axle.x,
-                    side * axle.track / 2.0,
-                    axle.radius,
-                    axle.spin_inertia,
-                    weight * share / 2.0,
-                    pitch * transfer,
-                    roll * transfer,
-                ]
-            )
-    x, y, *others = np.ascontiguousarray(np.array(rows).T)
-    return np.column_stack((x, y)), *others
+    front, rear, side = vehicle.front, vehicle.rear, np.array([1.0, -1.0, 1.0, -1.0])
+
+    def each(name: str) -> np.ndarray:
+        """A parameter of the axle of each wheel."""
+        return np.repeat([getattr(front, name), getattr(rear, name)], 2)
+
+    share = np.repeat([-rear.x / vehicle.wheelbase, front.x / vehicle.wheelbase], 2)
+    pitch = np.repeat([-1.0, 1.0], 2) * vehicle.mass * vehicle.height / (2.0 * vehicle.wheelbase)
+    roll = -side * each("roll_share") * vehicle.mass * vehicle.height / each("track")
+    place = np.column_stack((each("x"), side * each("track") / 2.0))
+    static = vehicle.mass * GRAVITY * share / 2.0
+    return place, each("radius"), each("spin_inertia"), static, pitch * transfer, roll * transfer
 
 
 PAPER = Truck(

@@ -67,16 +67,38 @@ def advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, mu, 
 
 
 @njit(cache=True, error_model="numpy")
-def distance(scheme, u, w, torque, mass, radius, inertia, slips, mu, step, most):
-    """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, and the speed (m/s) after ``most`` steps."""
+def march(scheme, u, w, torques, change, mass, radius, inertia, slips, mu, step):
+    """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, the steps (s) taken, -1 if it does not stop
+    under the torques (n + 1,) in N m at the ends of steps, and the speed (m/s) that is left.
+
+    u (m/s), w (rad/s) : speeds at the start; mu (2, s) : before and behind ``change`` (m).
+    """
     x = 0.0
-    for _ in range(most):
-        after, turning = advanced(scheme, u, w, torque, torque, torque, mass, radius, inertia, slips, mu, step)
+    for n in range(torques.size - 1):
+        table, now, then = mu[0] if x < change else mu[1], torques[n], torques[n + 1]
+        middle = 0.5 * (now + then)
+        after, turning = advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, table, step)
         if after <= 0.0:
-            return x + 0.5 * u * step * u / (u - after), 0.0
+            return x + 0.5 * u * step * u / (u - after), n + 1, 0.0
         x += 0.5 * step * (u + after)
         u, w = after, max(turning, 0.0)
-    return x, u
+    return x, -1, u
+
+
+def marched(
+    scheme: int,
+    quarter: Quarter,
+    torques: np.ndarray,
+    slips: np.ndarray,
+    mu: np.ndarray,
+    speed: float,
+    step: float,
+    change: float = math.inf,
+) -> tuple[float, int, float]:
+    """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
+    turning, parts = speed / quarter.radius, (quarter.mass, quarter.radius, quarter.spin_inertia)
+    way, steps, left = march(scheme, speed, turning, torques, change, *parts, slips, mu, step)
+    return way, steps, left
 
 
 def stopped(
@@ -88,19 +110,9 @@ def stopped(
     until then is given, with the speed (m/s) that is left, else 0.
     """
     most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))
-    return distance(
-        SCHEMES.index(scheme),
-        speed,
-        speed / quarter.radius,
-        torque,
-        quarter.mass,
-        quarter.radius,
-        quarter.spin_inertia,
-        tyre.slips,
-        tyre.mu_x[0, 0],
-        step,
-        most,
-    )
+    mu = tyre.mu_x[:1, 0].repeat(2, axis=0)
+    way, _, left = marched(SCHEMES.index(scheme), quarter, np.full(most + 1, torque), tyre.slips, mu, speed, step)
+    return way, left
 
 
 def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:

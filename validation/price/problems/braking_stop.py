@@ -22,11 +22,10 @@ from models.brake.pressure import Chambers, by_valves, still
 from models.brake.quarter import braked
 from models.brake.surfaces import Stretch, road
 from models.core.errors import RunFailed
-from models.machine.compiled import njit
 from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
-from validation.braking.braking_schemes import advanced
+from validation.braking.braking_schemes import marched
 from validation.braking.quarter_stops import FRONT
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
@@ -89,36 +88,6 @@ class Solver:
     """A run that is ready."""
 
     run: Callable[[], Result]
-
-
-@njit(cache=True, error_model="numpy")
-def march(method, u, w, torques, change, mass, radius, inertia, slips, mu, step):
-    """Way (m) until the speed is 0 and the steps (s) taken; method 0 Euler, 1 RK4, 2 the paper's; -1: does not stop.
-
-    torques (n + 1,) in N m at the ends of steps; mu (2, s) : before and behind ``change`` (m).
-    """
-    x = 0.0
-    for n in range(torques.size - 1):
-        table = mu[0] if x < change else mu[1]
-        after, turning = advanced(
-            method,
-            u,
-            w,
-            torques[n],
-            0.5 * (torques[n] + torques[n + 1]),
-            torques[n + 1],
-            mass,
-            radius,
-            inertia,
-            slips,
-            table,
-            step,
-        )
-        if after <= 0.0:
-            return x + 0.5 * u * step * u / (u - after), n + 1
-        x += 0.5 * step * (u + after)
-        u, w = after, max(turning, 0.0)
-    return x, -1
 
 
 class BrakingStop:
@@ -205,19 +174,8 @@ class BrakingStop:
 
     def _others(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
-        way, steps = march(
-            number,
-            self.speed,
-            self.speed / FRONT.radius,
-            self._torques(substeps),
-            self.change,
-            FRONT.mass,
-            FRONT.radius,
-            FRONT.spin_inertia,
-            self.slips,
-            self.mu,
-            SAMPLE / substeps,
-        )
+        torques, step = self._torques(substeps), SAMPLE / substeps
+        way, steps, _ = marched(number, FRONT, torques, self.slips, self.mu, self.speed, step, self.change)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})
