@@ -6,8 +6,8 @@ import pytest
 from models.brake.controller import AllApplied, Command
 from models.brake.port.ask import Asked
 from models.systems.braking.procedures import ready
-from validation.absence.bare_stops import ratio_of_stops
 from validation.absence.braking import STOP
+from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.of_systems import bare
 
 

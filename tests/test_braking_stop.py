@@ -8,7 +8,7 @@ from models.brake.relaxation import by_lagging_steps
 from models.brake.samples import by_steps
 from models.core.errors import InputError
 from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.braking_schemes import LITERAL, exact, stopped
+from validation.braking.quarter_stops import LITERAL, exact, stopped
 from validation.cases import braking_stop as case
 
 

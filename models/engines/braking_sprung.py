@@ -13,8 +13,19 @@ from models.brake.plane_step import KNOWN, REPORTED, begin
 from models.brake.plane_vehicle import Plane
 from models.brake.samples import moved
 from models.brake.sprung import Sprung
-from models.brake.sprung_forces import ROW, STEER, fill, held, held_forces, hold
-from models.brake.sprung_step import GAVE_UP, OVER, UPRIGHT, OnEngine, advance
+from models.brake.sprung_step import (
+    GAVE_UP,
+    OVER,
+    ROW,
+    STEER,
+    UPRIGHT,
+    OnEngine,
+    advance,
+    fill,
+    held,
+    held_forces,
+    hold,
+)
 from models.brake.surfaces import under_wheels
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model

@@ -1,6 +1,6 @@
 """Tyre tables from property files of the magic formula (`.tir`, MF-Tyre 5.x and PAC2002).
 
-Read are the coefficients of pure slip over load; slipping in both directions goes by similarity, as in ``similarity``.
+Read are the coefficients of pure slip over load; slipping in both directions goes by similarity (``magic_formula``).
 Left out: camber, inflation pressure, shifts of the curves (a table is 0 at no slip), the difference of left and right,
 combined coefficients. Along the wheel the curve is that of braking. Slips beyond the file's range are the formula's.
 Source: H. B. Pacejka, Tyre and vehicle dynamics, sec. 4.3.2, Delft-Tyre '97 and its equations (4.E9) to (4.E28).
@@ -15,8 +15,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.tables import whole_text
-from models.tyre.magic_formula import Curve
-from models.tyre.similarity import by_similarity
+from models.tyre.magic_formula import Curve, by_similarity
 from models.tyre.tyre_table import TyreTable
 
 UNITS = {"LENGTH": ("meter", "metre", "m"), "FORCE": ("newton", "n"), "ANGLE": ("radians", "radian", "rad")}

@@ -12,7 +12,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.table_stream import Block, blocks
 from models.core.tables import NEWTONS, RADIANS, SHARES, Columns
-from models.tyre.similarity import factors
+from models.tyre.magic_formula import factors
 from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
 
 FRICTION: Columns = {"slip angle": {"deg": RADIANS["deg"], "rad": 1.0}, "slip": SHARES, "mu_x": SHARES, "mu_y": SHARES}

@@ -13,8 +13,8 @@ from models.core.errors import RunFailed
 from models.engines.braking import Carried
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.braking_schemes import exact
-from validation.braking.stepping import Moving
+from validation.braking.braked_truck import Moving
+from validation.braking.quarter_stops import exact
 
 Error = Callable[[str, Path], float]
 STEP, SPEED = 5.5e-3, 10.0

@@ -1,15 +1,147 @@
-"""A quarter vehicle braked to a stop by a constant torque on the surfaces that have a name."""
+"""A quarter vehicle braked to a stop by a constant torque: by the product, by other people's schemes, and exactly.
+
+Explicit Euler and Runge-Kutta 4 take wheel and vehicle together. The literal scheme is the paper's as it is written:
+the wheel exact over a step with the secant slope F(s) / s, the vehicle by the tyre's force at the start of the step.
+None of them knows a locked state; slips beyond 1 have the force of 1, below 0 the opposite one.
+"""
 
 import math
 from functools import cache
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import Quarter, Stop, braked
 from models.brake.surfaces import EVEN
+from models.machine.compiled import njit
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, stacked
+from models.tyre.tyre_table import Tables, TyreTable, place, stacked
+
+EULER, RK4, LITERAL = "explicit Euler", "RK4", "paper's, literal"
+SCHEMES = (EULER, RK4, LITERAL)
+SLOWEST = 1e-6
+"""Speed (m/s) below which slip is taken at this one."""
+SETTLED = 1e-11
+"""Rate of the slip by that of the start at which it has settled."""
+PATIENCE = 3.0
+
+
+@njit(cache=True, error_model="numpy")
+def force_at(u, w, radius, load, slips, mu):
+    """Force (N) and slip of a wheel (rad/s) whose centre has a speed (m/s)."""
+    u = max(u, SLOWEST)
+    slip = (u - radius * w) / u
+    cell, share = place(slips, min(abs(slip), 1.0))
+    return math.copysign(load * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
+
+
+@njit(cache=True, error_model="numpy")
+def rates(u, w, torque, mass, radius, inertia, slips, mu):
+    """Rates of speed and turning (m/s^2, rad/s^2); a brake holds a wheel that stands."""
+    force, _ = force_at(u, w, radius, mass * GRAVITY, slips, mu)
+    brake = torque if w > 0.0 else min(torque, radius * force)
+    return -force / mass, (radius * force - brake) / inertia
+
+
+@njit(cache=True, error_model="numpy")
+def literal(u, w, torque, mass, radius, inertia, slips, mu, step):
+    """One step of the paper's scheme; returns speed and turning."""
+    force, slip = force_at(u, w, radius, mass * GRAVITY, slips, mu)
+    secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * mu[1] / slips[1]
+    decay = secant * radius * radius / (inertia * max(u, SLOWEST))
+    settled = (u - torque * u / (radius * secant)) / radius if secant > 0.0 else w - torque / inertia * step
+    return u - step * force / mass, max(settled + (w - settled) * math.exp(-decay * step), 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, mu, step):
+    """Speed and turning after one step of a scheme, 0 Euler, 1 RK4, 2 literal, under the brake's torques (N m) at its
+    start, middle and end."""
+    if scheme == 2:
+        return literal(u, w, middle, mass, radius, inertia, slips, mu, step)
+    a, b = rates(u, w, now, mass, radius, inertia, slips, mu)
+    if scheme == 0:
+        return u + step * a, w + step * b
+    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, mass, radius, inertia, slips, mu)
+    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, mass, radius, inertia, slips, mu)
+    a4, b4 = rates(u + step * a3, w + step * b3, then, mass, radius, inertia, slips, mu)
+    return u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4), w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
+
+
+@njit(cache=True, error_model="numpy")
+def march(scheme, u, w, torques, change, mass, radius, inertia, slips, mu, step):
+    """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, the steps (s) taken, -1 if it does not stop
+    under the torques (n + 1,) in N m at the ends of steps, and the speed (m/s) that is left.
+
+    u (m/s), w (rad/s) : speeds at the start; mu (2, s) : before and behind ``change`` (m).
+    """
+    x = 0.0
+    for n in range(torques.size - 1):
+        table, now, then = mu[0] if x < change else mu[1], torques[n], torques[n + 1]
+        middle = 0.5 * (now + then)
+        after, turning = advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, table, step)
+        if after <= 0.0:
+            return x + 0.5 * u * step * u / (u - after), n + 1, 0.0
+        x += 0.5 * step * (u + after)
+        u, w = after, max(turning, 0.0)
+    return x, -1, u
+
+
+def marched(
+    scheme: int,
+    quarter: Quarter,
+    torques: np.ndarray,
+    slips: np.ndarray,
+    mu: np.ndarray,
+    speed: float,
+    step: float,
+    change: float = math.inf,
+) -> tuple[float, int, float]:
+    """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
+    turning, parts = speed / quarter.radius, (quarter.mass, quarter.radius, quarter.spin_inertia)
+    way, steps, left = march(scheme, speed, turning, torques, change, *parts, slips, mu, step)
+    return way, steps, left
+
+
+def stopped(
+    scheme: str, quarter: Quarter, tyre: TyreTable, torque: float, speed: float, step: float
+) -> tuple[float, float]:
+    """Stopping distance (m) by one of SCHEMES under a constant torque (N m), from rolling at a speed (m/s).
+
+    A scheme may chatter or creep for ever. After PATIENCE times the time that the torque alone would take, the way
+    until then is given, with the speed (m/s) that is left, else 0.
+    """
+    most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))
+    mu = tyre.mu_x[:1, 0].repeat(2, axis=0)
+    way, _, left = marched(SCHEMES.index(scheme), quarter, np.full(most + 1, torque), tyre.slips, mu, speed, step)
+    return way, left
+
+
+def exact(quarter: Quarter, tyre: TyreTable, torque: float, speed: float) -> float:
+    """Stopping distance (m) from rolling under a constant torque (N m), to 1e-9 of it.
+
+    In the variable q with dt = u dq the slip has an equation of its own, s' = -(r^2 / J) (F - T / r) - (1 - s) F / m,
+    and ln u falls by F / m: no speed stands in a denominator. Once the slip has settled, or is 1, the force is
+    constant and the rest u^2 m / (2 F).
+    """
+    nodes, forces = tyre.slips, quarter.mass * GRAVITY * tyre.mu_x[0, 0]
+    m, r, inertia = quarter.mass, quarter.radius, quarter.spin_inertia
+
+    def rates_in(q: float, y: np.ndarray) -> list[float]:
+        force = float(np.interp(y[0], nodes, forces))
+        return [-(r * r / inertia) * (force - torque / r) - (1.0 - y[0]) * force / m, -force / m, math.exp(2.0 * y[1])]
+
+    def settled(q: float, y: np.ndarray) -> float:
+        return float(min(rates_in(q, y)[0] / (r * torque / inertia) - SETTLED, 1.0 - y[0]))
+
+    settled.terminal = True  # type: ignore[attr-defined]
+    part = solve_ivp(
+        rates_in, (0.0, 1e9), [0.0, math.log(speed), 0.0], "DOP853", rtol=1e-12, atol=1e-14, events=settled
+    )
+    slip, log_speed, way = part.y[:, -1]
+    return float(way + math.exp(2.0 * log_speed) * m / (2.0 * np.interp(slip, nodes, forces)))
+
 
 FRONT = Quarter(mass=16900.0 / GRAVITY, radius=0.5, spin_inertia=13.35)
 """A front wheel of the paper's truck under what it bears while braking."""

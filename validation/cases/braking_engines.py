@@ -16,8 +16,7 @@ from models.brake.trailer import CHOSEN, follow, hooked
 from models.engines.braking import Carried
 from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked
-from validation.braking.braked_truck import ICE, PLANE, sideways_with_locked_front_wheels, transfer_errors
-from validation.braking.stepping import Moving
+from validation.braking.braked_truck import ICE, PLANE, Moving, sideways_with_locked_front_wheels, transfer_errors
 from validation.braking.truck_equations import Turned, turned
 from validation.common.rows import Row, System, Table, aim, at_most
 

@@ -11,8 +11,7 @@ from models.brake.plane_vehicle import GRAVITY
 from models.brake.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
 from models.brake.surfaces import EVEN
 from models.tyre.magic_formula import SURFACES
-from validation.braking.braking_schemes import PATIENCE, SCHEMES, exact, stopped
-from validation.braking.quarter_stops import FRONT, STEP, met, steady, stop
+from validation.braking.quarter_stops import FRONT, PATIENCE, SCHEMES, STEP, exact, met, steady, stop, stopped
 from validation.common.rows import Row, System, Table, at_most, finding, within
 
 TITLE = "Braking to a stop"

@@ -14,8 +14,8 @@ from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.scene import Scene, settings_of
 from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
-from validation.absence.bare_stops import ratio_of_stops
 from validation.absence.hand_built import exudyn_run, mujoco_run
+from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files

@@ -21,8 +21,8 @@ from models.brake.surfaces import EVEN, Road, Stretch, road
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
-from validation.braking.braking_schemes import LITERAL, exact, stopped
-from validation.braking.stepping import Moving
+from validation.braking.braked_truck import Moving
+from validation.braking.quarter_stops import LITERAL, exact, stopped
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 

@@ -25,8 +25,7 @@ from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
-from validation.braking.braking_schemes import marched
-from validation.braking.quarter_stops import FRONT
+from validation.braking.quarter_stops import FRONT, marched
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
