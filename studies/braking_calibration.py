@@ -54,15 +54,17 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse a procedure that is no J-turn."""
     check_reference(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
-    own = scene.procedures.get(options.procedure)
-    if own is None or own.kind != "j_turn":
-        names = tuple(name for name, one in scene.procedures.items() if one.kind == "j_turn")
+    procedure = scene.procedures.get(options.procedure)
+    if procedure is None or procedure.kind != "j_turn":
+        names = tuple(name for name, turn in scene.procedures.items() if turn.kind == "j_turn")
         raise InputError(scene.file, "options.procedure", options.procedure, "must be a J-turn of the scene", names)
-    if own.steer is None:
+    if procedure.steer is None:
         allowed = "has no meaning here: one angle is fitted, steer"
-        raise InputError(scene.file, f"procedures.{options.procedure}.steering", own.steering, allowed)
-    if own.steer <= 0.0:
-        raise InputError(scene.file, f"procedures.{options.procedure}.steer", own.steer, "must be above 0 to be fitted")
+        raise InputError(scene.file, f"procedures.{options.procedure}.steering", procedure.steering, allowed)
+    if procedure.steer <= 0.0:
+        raise InputError(
+            scene.file, f"procedures.{options.procedure}.steer", procedure.steer, "must be above 0 to be fitted"
+        )
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -86,7 +88,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             steer *= WANTED["aside"] / means["aside"].mean
         progress("as fitted", options.rounds / (options.rounds + 2))
         last = fitted(scene, options, scale, steer)
-        found = _means(last, options, options.last, pool, options.seed + 1)
+        scatters = _means(last, options, options.last, pool, options.seed + 1)
     columns = zip(ROUNDS.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
     result(scene, rounds, {}, engine="reference").save(folder / "rounds.nc")
@@ -100,8 +102,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "table": table(options, scale, steer, found),
-        "answer": {"scale": scale, "steer": steer, **{key: one.mean for key, one in found.items()}},
+        "table": table(options, scale, steer, scatters),
+        "answer": {"scale": scale, "steer": steer, **{key: figure.mean for key, figure in scatters.items()}},
     }
 
 
@@ -109,9 +111,9 @@ def fitted(scene: BrakingScene, options: Options, scale: float, steer: float) ->
     """The scene with another friction and steer angle; RunFailed where the fit leaves what is possible."""
     if not (0.05 < scale < 2.0 and steer < 1.0):
         raise RunFailed("calibration", f"the fit goes astray: friction times {scale:.3g}, steer angle {steer:.3g} rad")
-    own = scene.procedures[options.procedure].model_copy(update={"steer": steer})
+    procedure = scene.procedures[options.procedure].model_copy(update={"steer": steer})
     tyres = scene.tyres.model_copy(update={"scale": {**scene.tyres.scale, options.surface: scale}})
-    return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: own}})
+    return scene.model_copy(update={"tyres": tyres, "procedures": {**scene.procedures, options.procedure: procedure}})
 
 
 def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: int | None = None) -> dict[str, Scatter]:
@@ -123,11 +125,11 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    found = run_paths(job, runs, executor=pool, block=max(1, runs // (2 * options.workers)))
-    return {key: scatter(found[key]) for key in PAPER}
+    stops = run_paths(job, runs, executor=pool, block=max(1, runs // (2 * options.workers)))
+    return {key: scatter(stops[key]) for key in PAPER}
 
 
-def table(options: Options, scale: float, steer: float, found: dict[str, Scatter]) -> list[str]:
+def table(options: Options, scale: float, steer: float, scatters: dict[str, Scatter]) -> list[str]:
     """What was fitted, and each figure beside the paper's."""
     lines = [
         f"  calibration: friction of {options.surface} times {scale:.4f}, steer angle {steer:.5f} rad",
@@ -135,7 +137,7 @@ def table(options: Options, scale: float, steer: float, found: dict[str, Scatter
         f"    {'':<34}{'here':>18}   {'paper, simulated':<36}{'paper, measured':<18}",
     ]
     for key, (label, simulated, measured, how) in PAPER.items():
-        here = f"{found[key].mean:.3f} +- {found[key].deviation:.3f}"
+        here = f"{scatters[key].mean:.3f} +- {scatters[key].deviation:.3f}"
         lines.append(f"    {label:<34}{here:>18}   {simulated:<36}{measured:<18}{how}")
     return lines
 

@@ -68,26 +68,26 @@ def cases(scene: BrakingScene) -> list[Case]:
         Case(
             surface,
             name,
-            controller + " + trailer" * (own.trailer is not None),
-            _alone(own, surface, right, name, table),
+            controller + " + trailer" * (train.trailer is not None),
+            _alone(train, surface, right, name, table),
         )
         for surface, right in options.surfaces.items()
         for name in scene.procedures
-        for own in trains
+        for train in trains
         for controller, table in options.controllers.items()
     ]
 
 
 def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
     """The scene with one procedure on one surface under one controller."""
-    own = scene.procedures[name]
-    if own.kind == "split":
-        own = own.model_copy(update={"right": right})
+    procedure = scene.procedures[name]
+    if procedure.kind == "split":
+        procedure = procedure.model_copy(update={"right": right})
     return scene.model_copy(
         update={
             "road": RoadTable(stretches=[Stretch(left=surface)]),
             "controller": controller,
-            "procedures": {name: own},
+            "procedures": {name: procedure},
         }
     )
 
@@ -101,7 +101,7 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
-    every, found, failed = cases(scene), list[tuple[Case, dict[str, float]]](), dict[str, str]()
+    every, stops, failed = cases(scene), list[tuple[Case, dict[str, float]]](), dict[str, str]()
     for i, case in enumerate(every):
         progress(f"{case.surface}, {case.procedure}, {case.controller}", i / len(every))
         try:
@@ -114,36 +114,36 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             continue
         stop = Stop(path)
         values = stop.of_vehicle()
-        found.append(
+        stops.append(
             (case, {key: values[name] for key, name in SHOWN.items()} | {"locked [s]": float(stop.locks().time.max())})
         )
-    _save(scene, found, folder)
-    _figure(scene, found, folder / "controllers.png")
+    _save(scene, stops, folder)
+    _figure(scene, stops, folder / "controllers.png")
     answer = [
         {"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
-        for case, values in found
+        for case, values in stops
     ]
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table(found)}
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table(stops)}
 
 
-def table(found: list[tuple[Case, dict[str, float]]]) -> list[str]:
+def table(stops: list[tuple[Case, dict[str, float]]]) -> list[str]:
     """One line per run."""
     heads = [*SHOWN, "locked [s]"]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
-    for case, values in found:
+    for case, values in stops:
         name = case.procedure.replace("_", " ")
         lines.append(
             f"  {case.surface:<10}{name:<12}{case.controller:<32}" + "".join(f"{values[head]:>17.2f}" for head in heads)
         )
     lines += ["  locked: longest of the wheels, above 15 km/h"]
-    return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in found)
+    return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in stops)
 
 
-def _save(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], folder: Path) -> None:
+def _save(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], folder: Path) -> None:
     """A stop per line, or along the axis of the result."""
-    names, heads = ("surface", "procedure", "controller"), list(found[0][1]) if found else []
-    cases = [[getattr(case, name) for name in names] for case, _ in found]
-    values = [[stop[head] for head in heads] for _, stop in found]
+    names, heads = ("surface", "procedure", "controller"), list(stops[0][1]) if stops else []
+    cases = [[getattr(case, name) for name in names] for case, _ in stops]
+    values = [[stop[head] for head in heads] for _, stop in stops]
     channels = {
         head.partition(" [")[0].replace("/", " by "): Channel("stop", np.array(column), head.partition(" [")[2][:-1])
         for head, column in zip(heads, zip(*values, strict=True), strict=True)
@@ -157,14 +157,14 @@ def _save(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], folde
 PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}
 
 
-def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], file: Path) -> None:
+def _figure(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], file: Path) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
     from models.drawing.figures import plt, save
 
-    surfaces = list(dict.fromkeys(case.surface for case, _ in found))
+    surfaces = list(dict.fromkeys(case.surface for case, _ in stops))
     rights = read(Options, scene.options, scene.file, "options").surfaces
     each = len(read(Options, scene.options, scene.file, "options").controllers)
-    names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in found))
+    names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in stops))
     figure, axes = plt.subplots(
         len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4), squeeze=False, sharey="row"
     )
@@ -173,12 +173,12 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
         for row, (key, heading) in enumerate(PANELS.items()):
             axis = axes[row, column]
             for k, kind in enumerate(kinds):
-                own = {
+                bars = {
                     case.procedure: values[key]
-                    for case, values in found
+                    for case, values in stops
                     if case.surface == surface and case.controller == kind
                 }
-                heights = [own.get(name, np.nan) for name in names]
+                heights = [bars.get(name, np.nan) for name in names]
                 axis.bar(
                     np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width,
                     heights,
@@ -192,7 +192,7 @@ def _figure(scene: BrakingScene, found: list[tuple[Case, dict[str, float]]], fil
                 title=f"{heading} on {surface}; split: {rights[surface]} on the right",
                 ylabel=key.replace("^2", "²") if column == 0 else "",
             )
-    if found:
+    if stops:
         axes[0, 0].legend(fontsize=8)
     figure.suptitle(f"{scene.title}, each procedure from its speed to a stop", x=0.01, ha="left", fontweight="bold")
     save(figure, file)

@@ -63,7 +63,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
-    found = []
+    ensembles = []
     progress("loading", 0.0)
     drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
     with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
@@ -73,23 +73,23 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             def tell(done: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
 
-            found.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
-    for name, table, arrays in zip(options.names, tables, found, strict=False):
+            ensembles.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
+    for name, table, arrays in zip(options.names, tables, ensembles, strict=False):
         units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in SHOWN.items()}}
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
         stops = result(build(table, scene.file, Path(scene.folder)), channels, {}, engine="reference")
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
-    scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in found]
-    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(found) > 1 else {}
-    _figure(scene, options, found, scatters, tests, folder)
+    scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in ensembles]
+    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(ensembles) > 1 else {}
+    _figure(scene, options, ensembles, scatters, tests, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "table": table_of(options, scatters, tests),
         "answer": {
-            "means": [{key: one[key].mean for key in SHOWN} for one in scatters],
+            "means": [{key: means[key].mean for key in SHOWN} for means in scatters],
             "p": {key: test.p for key, test in tests.items()},
         },
     }
@@ -105,7 +105,8 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
     ]
     for key, label in SHOWN.items():
         parts = "".join(
-            f"{one[key].mean:>14.3f} +- {one[key].error:<6.3f}{one[key].deviation:>10.3f}" for one in scatters
+            f"{figures[key].mean:>14.3f} +- {figures[key].error:<6.3f}{figures[key].deviation:>10.3f}"
+            for figures in scatters
         )
         lines.append(f"    {label:<26}{parts}")
     for key in tests:
@@ -122,7 +123,7 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
 def _figure(
     scene: BrakingScene,
     options: Options,
-    found: list[dict[str, np.ndarray]],
+    ensembles: list[dict[str, np.ndarray]],
     scatters: list[dict[str, Scatter]],
     tests: dict[str, Welch],
     folder: Path,
@@ -130,14 +131,14 @@ def _figure(
     from models.drawing.figures import plt, save
 
     figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
-    edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in found]), bins=24)
-    for i, (arrays, one) in enumerate(zip(found, scatters, strict=True)):
-        own = one["distance"]
-        label = f"{options.names[i]}: {own.mean:.2f} m, scatter {own.deviation:.2f} m"
+    edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
+    for i, (arrays, figures) in enumerate(zip(ensembles, scatters, strict=True)):
+        distance = figures["distance"]
+        label = f"{options.names[i]}: {distance.mean:.2f} m, scatter {distance.deviation:.2f} m"
         histogram.hist(arrays["distance"], edges, color=f"C{i}", alpha=0.5, label=label)
-        histogram.axvline(own.mean, color=f"C{i}")
+        histogram.axvline(distance.mean, color=f"C{i}")
         cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6, label=options.names[i])
-    speeds = np.sort(found[0]["speed"])
+    speeds = np.sort(ensembles[0]["speed"])
     cloud.plot(
         speeds,
         scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2,

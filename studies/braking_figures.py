@@ -28,14 +28,14 @@ def stop_figure(
 ) -> File:
     """Six panels: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension also its body's
     lean, and loads."""
-    own = scene.procedures[name]
+    procedure = scene.procedures[name]
     lean = stop.lean
     columns = 3 if lean is None else 4
     figure, axes = plt.subplots(2, columns, figsize=(14 * columns / 3, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
     figure.suptitle(
-        f"{scene.title}: {name.replace('_', ' ')} from {own.speed:g} m/s, "
+        f"{scene.title}: {name.replace('_', ' ')} from {procedure.speed:g} m/s, "
         f"{behind(scene).replace('{procedure}', name)}; {ended}",
         x=0.01,
         ha="left",

@@ -61,7 +61,9 @@ def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
     width = max(12, *(len(name) + 2 for name in answer))
     rows = [f"  {'mu under ' + format(load / 1e3, '.4g') + ' kN':<22}" + "".join(f"{name:>{width}}" for name in answer)]
     keys = next(iter(answer.values()))
-    return rows + [f"  {key:<22}" + "".join(f"{own[key]:>{width}.4g}" for own in answer.values()) for key in keys]
+    return rows + [
+        f"  {key:<22}" + "".join(f"{figures[key]:>{width}.4g}" for figures in answer.values()) for key in keys
+    ]
 
 
 def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> None:

@@ -39,11 +39,11 @@ def turned(
         return float(np.hypot(state[3], state[4]) - until)
 
     slow.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(equations, (0.0, 200.0), start, method="LSODA", rtol=TIGHT, atol=TIGHT, events=slow)
-    if not found.success or not found.t_events[0].size:
-        raise RunFailed("written", "the vehicle does not slow down", float(found.t[-1]))
-    x, y, heading = found.y_events[0][0][:3]
-    return Turned(float(x), float(y), float(heading), float(found.t_events[0][0]))
+    solution = solve_ivp(equations, (0.0, 200.0), start, method="LSODA", rtol=TIGHT, atol=TIGHT, events=slow)
+    if not solution.success or not solution.t_events[0].size:
+        raise RunFailed("written", "the vehicle does not slow down", float(solution.t[-1]))
+    x, y, heading = solution.y_events[0][0][:3]
+    return Turned(float(x), float(y), float(heading), float(solution.t_events[0][0]))
 
 
 class _Equations:
@@ -57,8 +57,8 @@ class _Equations:
         self.radius = np.array([axle.radius for axle in axles])
         self.inertia = np.array([axle.spin_inertia for axle in axles])
         self.c, self.s = np.cos([steer, steer, 0.0, 0.0]), np.sin([steer, steer, 0.0, 0.0])
-        other, m, h = np.array([-vehicle.rear.x] * 2 + [vehicle.front.x] * 2), vehicle.mass, vehicle.height
-        self.rest = m * GRAVITY * other / vehicle.wheelbase / 2.0
+        arms, m, h = np.array([-vehicle.rear.x] * 2 + [vehicle.front.x] * 2), vehicle.mass, vehicle.height
+        self.rest = m * GRAVITY * arms / vehicle.wheelbase / 2.0
         self.by_x = m * h / vehicle.wheelbase / 2.0 * np.array([-1.0, -1.0, 1.0, 1.0])
         self.by_y = -sides * m * h * [axle.roll_share / axle.track for axle in axles]
 

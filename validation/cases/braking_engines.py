@@ -32,7 +32,7 @@ STIFF = 100.0
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Turn by all means, mirror image, straight way, trailer; the quick share turns down to 10 m/s only."""
     until = 10.0 if quick else UNTIL
-    own = turn(until)
+    compiled = turn(until)
     beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
     beside |= {name: turn(until, go=Carried(name, PLANE).advance) for name in ("exudyn", "mujoco")}
     rows = [
@@ -40,15 +40,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             f"braking_engines.{name.replace(' ', '_')}",
             SYSTEM,
             f"end of the turn, {name} beside the compiled step at 1 ms",
-            float(np.hypot(other.x - own.x, other.y - own.y)),
+            float(np.hypot(end.x - compiled.x, end.y - compiled.y)),
             "m",
             5e-3,
             "the same vehicle by other equations and another method",
             "native" if name == "written out" else "shared kernel",
         )
-        for name, other in beside.items()
+        for name, end in beside.items()
     ]
-    rows += [*_symmetry_rows(until, own), *_load_rows(), *_trailer_rows(quick)]
+    rows += [*_symmetry_rows(until, compiled), *_load_rows(), *_trailer_rows(quick)]
     rows += [
         aim(
             f"braking_engines.speed.{steps}",
@@ -62,7 +62,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         )
         for steps in (1, 4)
     ]
-    turns = {"compiled step": own, **beside}
+    turns = {"compiled step": compiled, **beside}
     return rows, {name: list(where) for name, where in turns.items()}
 
 
@@ -117,9 +117,9 @@ def _load_rows() -> list[Row]:
     ]
 
 
-def _symmetry_rows(until: float, own: Turned) -> list[Row]:
+def _symmetry_rows(until: float, steered: Turned) -> list[Row]:
     mirrored, straight = turn(until, -STEER), turn(until, 0.0)
-    apart = max(abs(mirrored.x - own.x), abs(mirrored.y + own.y), abs(mirrored.heading + own.heading))
+    apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
     return [
         at_most(
             "braking_engines.mirror",

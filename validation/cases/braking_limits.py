@@ -170,12 +170,12 @@ def _cycle_row() -> Row:
     """The limit cycle from a rolling wheel whose brake is applied fast, against the exact one, begun slowly."""
     frozen = Frozen(20.0, 16900.0, 0.5, 13.35, LINE, surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
-    found = limit_cycle(frozen, replace(ROLLING), 1e-4).period
+    reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
     return at_most(
         "braking_limits.cycle_from_rolling",
         SYSTEM,
         "period of the limit cycle that a rolling wheel reaches by a fast first application, by the exact one, less 1",
-        found / period - 1.0,
+        reached / period - 1.0,
         "",
         1e-4,
         "the cycle does not know how it was begun",
@@ -223,14 +223,14 @@ REFUSED: dict[str, Callable[[], Any]] = {
 def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
     try:
         ask()
-        found = "taken"
+        outcome = "taken"
     except InputError as error:
-        found = "refused" if error.place and error.value is not None else "refused without its value"
+        outcome = "refused" if error.place and error.value is not None else "refused without its value"
     return behaves(
         f"braking_limits.refused.{name.replace(' ', '-')}",
         SYSTEM,
         name,
-        found,
+        outcome,
         "refused",
         "a vehicle that cannot be has no answer",
     )

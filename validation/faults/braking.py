@@ -85,13 +85,13 @@ def _pulls_left() -> float:
 
 def _loop() -> float:
     """Area of a brake's loop from 0 to 5 bar and back against its closed form, by it."""
-    own = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
+    brakes = brake.of_wheels(brake.Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
     pressures = np.concatenate((np.linspace(0.0, 5.0, 401), np.linspace(5.0, 0.0, 401)))
-    found = brake.torques(pressures, own)
+    torques = brake.torques(pressures, brakes)
     top, down = 1400.0 * 4.2, 1500.0
     left = 0.3 + top / down
     wanted = 0.5 * top * (left - 0.3) + top * (5.0 - left) - 0.5 * top * 4.2
-    return float(abs(-np.trapezoid(found, pressures) / wanted - 1.0))
+    return float(abs(-np.trapezoid(torques, pressures) / wanted - 1.0))
 
 
 def _push_out() -> float:
@@ -113,8 +113,8 @@ def _settled() -> float:
 def _code() -> float:
     """Largest error of a ramp converted to 12 bits against half of a code, by that."""
     ramp = np.linspace(0.0, 30.0, 100_001)
-    own = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
-    return float(abs(np.abs(own(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
+    channels = sensors.Channels(sensors.Conversion(bits=12, range=30.0), ramp.size, 0)
+    return float(abs(np.abs(channels(0, ramp) - ramp).max() / (0.5 * 30.0 / (2**12 - 1)) - 1.0))
 
 
 CHECKS = {
@@ -137,8 +137,8 @@ def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
 
 
 def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
-    own: dict[str, Any] = {name: of(getattr(plane, name)) for name, of in change.items()}
-    return plane._replace(**own)
+    parts: dict[str, Any] = {name: of(getattr(plane, name)) for name, of in change.items()}
+    return plane._replace(**parts)
 
 
 def _brakes(change: Callable[[Any], Any]) -> Patch:

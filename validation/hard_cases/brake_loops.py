@@ -13,11 +13,11 @@ OWN = of_wheels(Brake(push_out=0.8, release=0.3, rising=1400.0, falling=1500.0))
 def ways(implementation: str, folder: Path) -> float:
     """A way of random turns walked in 1, 7 and 50 parts between its turns: largest difference at the turns, N m."""
     turns = np.concatenate(([0.0], np.random.default_rng(2).uniform(0.0, 6.0, 60)))
-    found = []
+    levels = []
     for parts in (1, 7, 50):
         between = np.linspace(turns[:-1], turns[1:], parts, endpoint=False, axis=1).ravel()
-        found.append(torques(np.append(between, turns[-1]), OWN)[::parts])
-    return float(max(np.abs(one - found[0]).max() for one in found))
+        levels.append(torques(np.append(between, turns[-1]), OWN)[::parts])
+    return float(max(np.abs(walk - levels[0]).max() for walk in levels))
 
 
 def loops(implementation: str, folder: Path) -> float:
@@ -25,9 +25,9 @@ def loops(implementation: str, folder: Path) -> float:
     worst = 0.0
     for low, high in np.sort(np.random.default_rng(3).uniform(0.0, 6.0, (20, 2)), axis=1):
         once = np.concatenate((np.linspace(low, high, 1001), np.linspace(high, low, 1001)))
-        found = torques(np.concatenate((once, once)), OWN)
-        area = -float(np.trapezoid(found[once.size :], once))
-        worst = max(worst, -area, -float(found.min()))
+        levels = torques(np.concatenate((once, once)), OWN)
+        area = -float(np.trapezoid(levels[once.size :], once))
+        worst = max(worst, -area, -float(levels.min()))
     return worst
 
 

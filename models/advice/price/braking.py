@@ -113,6 +113,6 @@ def own(scene: BrakingScene, quantity: str | None, engines: tuple[str, ...]) -> 
         )
     name, asked = part_of(quantity, USUAL, scene.procedures, "procedure")
     chosen(asked, QUANTITIES)
-    others = [one for one in scene.procedures if one != name]
+    others = [procedure for procedure in scene.procedures if procedure != name]
     note = f"procedure {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
     return OwnBraking(scene, name, asked, engines_of(scene, engines), note)

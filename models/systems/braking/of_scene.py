@@ -60,9 +60,9 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
 
 def plane_of(scene: BrakingScene) -> Plane:
     """Numbers of the truck, or of the truck and its trailer."""
-    own, transfer = vehicle_of(scene), scene.load_transfer is not None
+    vehicle, transfer = vehicle_of(scene), scene.load_transfer is not None
     try:
-        return truck(own, transfer) if scene.trailer is None else train(own, scene.trailer, transfer)
+        return truck(vehicle, transfer) if scene.trailer is None else train(vehicle, scene.trailer, transfer)
     except InputError as error:
         raise InputError(scene.file, f"vehicle or trailer: {error.place}", error.value, error.allowed) from None
 
@@ -72,15 +72,17 @@ def sprung_of(scene: BrakingScene) -> Any:
     from models.brake.sprung import sprung
     from models.vehicles.vehicle_file import load_vehicle
 
-    own = scene.vehicle
-    return sprung(load_vehicle(str(own.file), scene.folder, scene.file, "vehicle.file"), float(own.spin_inertia or 0.0))
+    vehicle = scene.vehicle
+    return sprung(
+        load_vehicle(str(vehicle.file), scene.folder, scene.file, "vehicle.file"), float(vehicle.spin_inertia or 0.0)
+    )
 
 
-def on_springs(engine: str, own: Any) -> Any:
+def on_springs(engine: str, vehicle: Any) -> Any:
     """A vehicle on its suspension in an engine."""
     from models.engines.braking_sprung import OnSprings
 
-    return OnSprings(engine, own)
+    return OnSprings(engine, vehicle)
 
 
 def vehicle_of(scene: BrakingScene) -> Truck:
@@ -163,14 +165,14 @@ def tables_of(scene: BrakingScene) -> dict[str, TyreTable]:
 
 def brake_of(scene: BrakingScene, axle: str) -> Brake:
     """Brake of one axle's wheels."""
-    own: BrakeTable = getattr(scene.brakes, axle)
+    brake: BrakeTable = getattr(scene.brakes, axle)
     return read(
         Brake,
         {
-            "push_out": own.push_out,
-            "release": own.push_out if own.release is None else own.release,
-            "rising": own.gradient,
-            "falling": own.gradient if own.falling is None else own.falling,
+            "push_out": brake.push_out,
+            "release": brake.push_out if brake.release is None else brake.release,
+            "rising": brake.gradient,
+            "falling": brake.gradient if brake.falling is None else brake.falling,
         },
         scene.file,
         f"brakes.{axle}",
@@ -179,12 +181,16 @@ def brake_of(scene: BrakingScene, axle: str) -> Brake:
 
 def chambers_of(scene: BrakingScene, wheels: int) -> Chambers:
     """Chambers of all wheels; without dynamics their time constants are zero."""
-    own, none = scene.pressure, np.zeros(wheels)
-    if own is None:
+    pressure, none = scene.pressure, np.zeros(wheels)
+    if pressure is None:
         return Chambers(none, none, scene.brakes.supply)
-    held = Chambers(none + own.fill, none + own.empty, scene.brakes.supply, delay=own.delay)
-    held = held if own.slow is None else held._replace(slow=none + own.slow)
-    return held if own.reservoir is None else held._replace(volumes=none + own.volume, reservoir=own.reservoir)
+    chambers = Chambers(none + pressure.fill, none + pressure.empty, scene.brakes.supply, delay=pressure.delay)
+    chambers = chambers if pressure.slow is None else chambers._replace(slow=none + pressure.slow)
+    return (
+        chambers
+        if pressure.reservoir is None
+        else chambers._replace(volumes=none + pressure.volume, reservoir=pressure.reservoir)
+    )
 
 
 def measured_of(scene: BrakingScene, procedure: str, wheels: int) -> MeasuredPressures | None:
@@ -208,18 +214,18 @@ def controller_of(scene: BrakingScene, wheels: int, procedure: str) -> Controlle
     kind = scene.controller.kind
     if kind not in CONTROLLERS:
         raise InputError(scene.file, "controller.kind", kind, "no such controller", tuple(CONTROLLERS))
-    make, given = CONTROLLERS[kind], scene.controller.parameters
+    make, parameters = CONTROLLERS[kind], scene.controller.parameters
     known = tuple(field.name for field in fields(make) if field.name not in ("wheels", "period"))
-    for name, value in given.items():
+    for name, value in parameters.items():
         if name not in known:
             raise InputError(scene.file, f"controller.parameters.{name}", value, f"no parameter of {kind}", known)
-    if given.get("slow") is True and (scene.pressure is None or scene.pressure.slow is None):
+    if parameters.get("slow") is True and (scene.pressure is None or scene.pressure.slow is None):
         allowed = "needs valves that can apply slowly: pressure.slow"
         raise InputError(scene.file, "controller.parameters.slow", True, allowed)
     period = {"period": scene.run.sample} if kind != "none" else {}
     try:
-        return make(wheels, **given, **period)
+        return make(wheels, **parameters, **period)
     except InputError as error:
         raise InputError(scene.file, error.place, error.value, error.allowed) from None
     except TypeError:
-        raise InputError(scene.file, "controller.parameters", given, "must be numbers") from None
+        raise InputError(scene.file, "controller.parameters", parameters, "must be numbers") from None

@@ -32,11 +32,11 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Tyres, brakes, road, controller and port, without a step of the vehicle."""
-    for name, own in scene.procedures.items():
+    for name, procedure in scene.procedures.items():
         known = (*NAMES, *scene.tyres.files)
-        if own.right is not None and own.right not in known:
-            raise InputError(scene.file, f"procedures.{name}.right", own.right, "no such surface", known)
-        vehicle = braked(scene, own)
+        if procedure.right is not None and procedure.right not in known:
+            raise InputError(scene.file, f"procedures.{name}.right", procedure.right, "no such surface", known)
+        vehicle = braked(scene, procedure)
         controller_of(scene, vehicle.plane.wheels, name)
         if scene.port is not None:
             for engine in engines:

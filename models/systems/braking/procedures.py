@@ -34,25 +34,25 @@ STEADY = 1e-6
 
 def ready(scene: BrakingScene, name: str) -> tuple[Braked, Start]:
     """Vehicle and start of a procedure; InputError for a circle that tyres cannot hold."""
-    own = scene.procedures[name]
-    vehicle = braked(scene, own)
+    procedure = scene.procedures[name]
+    vehicle = braked(scene, procedure)
     try:
-        check_way(vehicle.road, scene.run.sample / scene.run.substeps * own.speed)
+        check_way(vehicle.road, scene.run.sample / scene.run.substeps * procedure.speed)
     except InputError as error:
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
-    if own.radius is not None:
-        turn = steady_turn(vehicle, own.speed, own.radius)
+    if procedure.radius is not None:
+        turn = steady_turn(vehicle, procedure.speed, procedure.radius)
         if turn is None:
-            allowed = f"tyres do not hold a steady circle of this radius at {own.speed:g} m/s on this surface"
-            raise InputError(scene.file, f"procedures.{name}.radius", own.radius, allowed)
+            allowed = f"tyres do not hold a steady circle of this radius at {procedure.speed:g} m/s on this surface"
+            raise InputError(scene.file, f"procedures.{name}.radius", procedure.radius, allowed)
         return replace(vehicle, steer=turn.steer), turn.start
-    start, steering = vehicle.rolling(own.speed), steering_of(own, vehicle)
-    return replace(vehicle, steer=steering(0.0), steering=steering if own.steering else None), start
+    start, steering = vehicle.rolling(procedure.speed), steering_of(procedure, vehicle)
+    return replace(vehicle, steer=steering(0.0), steering=steering if procedure.steering else None), start
 
 
-def steering_of(own: Procedure, vehicle: Braked) -> Steering:
+def steering_of(procedure: Procedure, vehicle: Braked) -> Steering:
     """What the driver does at the wheel from time 0 on; one angle is there at once."""
-    knots = own.steering or [[0.0, own.steer or 0.0]]
+    knots = procedure.steering or [[0.0, procedure.steer or 0.0]]
     times, angles = np.array(knots, float).T
     return Steering(times, angles, steered(vehicle, 1.0))
 
@@ -83,10 +83,10 @@ def check_engine(scene: BrakingScene, engine: str) -> None:
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:
     """One run from a start with the scene's controller in the loop, or with what stands behind the port instead; of
     the engine only the name is needed, for files."""
-    own = controller_of(scene, vehicle.plane.wheels, name)
+    usual = controller_of(scene, vehicle.plane.wheels, name)
     if scene.port is None:
-        return vehicle.run(own, start, scene.run.duration)
-    with opened(scene.port, port_of(scene, name, vehicle, engine), own) as (controller, clock):
+        return vehicle.run(usual, start, scene.run.duration)
+    with opened(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
         path = vehicle.run(controller, start, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
 

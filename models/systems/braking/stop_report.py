@@ -130,10 +130,10 @@ class Stop:
         path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
         lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
-        found = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
-        found |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
+        wheels = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
+        wheels |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
         locks = self.locks()
-        return found | {
+        return wheels | {
             "locked above 15 km/h [s]": locks.time,
             "longest lock [s]": locks.longest,
             "mean pressure [bar]": lengths @ pressures / whole,

@@ -56,9 +56,9 @@ class Stops:
         }
 
     def _stopped(self, scene: BrakingScene, number: int) -> dict[str, float]:
-        own = scene.procedures[self.procedure]
+        procedure = scene.procedures[self.procedure]
         drawn = float(normal(self.seed, number, 1, 1, source=SPEED)[0, 0])
-        changed = own.model_copy(update={"speed": own.speed * (1.0 + self.spread * drawn)})
+        changed = procedure.model_copy(update={"speed": procedure.speed * (1.0 + self.spread * drawn)})
         scene = scene.model_copy(update={"procedures": {**scene.procedures, self.procedure: changed}})
         try:
             path = run(scene, procedure=self.procedure).detail
