@@ -1,6 +1,5 @@
 """Brakes and controllers: the brake's loop, the supply, the five-phase limit cycle, stops without locking, substeps."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from models.brake.brake import PAPER_BRAKES, PAPER_FRONT, Brake, of_wheels, torq
 from models.brake.controller import SAMPLE
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.five_phase import FivePhase
-from models.brake.controllers.five_phase_cycle import Cycle, Frozen, limit_cycle, sampled
+from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle, sampled
 from models.brake.plane_step import LOCKED
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
@@ -39,7 +38,7 @@ LOCK_FREE = 15.0 / 3.6
 BRIEF = 0.1
 """s"""
 SUBSTEPS = (1, 2, 4, 8)
-CONTROLLED = ("slip_bang_bang", "acceleration_phases", "five_phase", "slip_pi")
+CONTROLLED = tuple(CONTROLLERS)[1:]
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -187,22 +186,17 @@ def _cycle_rows(name: str) -> list[Row]:
             "told",
             "a planted fault",
         ),
-        *_sampled_rows(name, own),
+        finding(
+            f"braking_controllers.sampled_{name}",
+            SYSTEM,
+            f"period of the same controller sampled every 5.5 ms, {name}, by the continuous one, less 1",
+            sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / own.period - 1.0,
+            "",
+            0.0,
+            "each switch comes up to a sample late",
+            "native",
+        ),
     ]
-
-
-def _sampled_rows(name: str, own: Cycle) -> Iterator[Row]:
-    found = sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3)
-    yield finding(
-        f"braking_controllers.sampled_{name}",
-        SYSTEM,
-        f"period of the same controller sampled every 5.5 ms, {name}, by the continuous one, less 1",
-        found.period / own.period - 1.0,
-        "",
-        0.0,
-        "each switch comes up to a sample late",
-        "native",
-    )
 
 
 def truck_stop(on: str, name: str, speed: float) -> Recorded:
