@@ -18,7 +18,7 @@ from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, build
-from models.systems.braking.stops import Scatter, Stops, Welch, scatter, welch
+from models.systems.braking.stops import KEPT, Scatter, Stops, Welch, scatter, welch
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -26,13 +26,6 @@ BLOCKS = "blocks"
 """Folder of the finished blocks, within that of the results: a killed run can be resumed."""
 BLOCK = 5
 """Runs per block."""
-SHOWN = {
-    "distance": "stopping distance [m]",
-    "time": "stopping time [s]",
-    "deceleration": "v0/T [m/s^2]",
-    "aside": "y [m]",
-    "yaw": "final yaw [deg]",
-}
 
 
 class Options(Strict):
@@ -75,13 +68,13 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
             ensembles.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
     for name, table, arrays in zip(options.names, tables, ensembles, strict=False):
-        units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in SHOWN.items()}}
+        units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
         stops = result(build(table, scene.file, Path(scene.folder)), channels, {}, engine="reference")
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
-    scatters = [{key: scatter(arrays[key]) for key in SHOWN} for arrays in ensembles]
-    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in SHOWN} if len(ensembles) > 1 else {}
+    scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]
+    tests = {key: welch(scatters[0][key], scatters[1][key]) for key in KEPT} if len(ensembles) > 1 else {}
     _figure(scene, options, ensembles, scatters, tests, folder)
     return {
         "scene": scene.title,
@@ -89,7 +82,7 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": {},
         "table": table_of(options, scatters, tests),
         "answer": {
-            "means": [{key: means[key].mean for key in SHOWN} for means in scatters],
+            "means": [{key: means[key].mean for key in KEPT} for means in scatters],
             "p": {key: test.p for key, test in tests.items()},
         },
     }
@@ -103,7 +96,7 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
         + " " * 26
         + "".join(f"{name + ': mean':>24}{'scatter':>10}" for name, _ in zip(options.names, scatters, strict=False)),
     ]
-    for key, label in SHOWN.items():
+    for key, label in KEPT.items():
         parts = "".join(
             f"{figures[key].mean:>14.3f} +- {figures[key].error:<6.3f}{figures[key].deviation:>10.3f}"
             for figures in scatters
@@ -113,7 +106,7 @@ def table_of(options: Options, scatters: list[dict[str, Scatter]], tests: dict[s
         test = tests[key]
         if np.isfinite(test.t) and test.half_width > 0.0:
             lines.append(
-                f"  difference of {SHOWN[key]}: {test.difference:+.3f}, 95 % interval "
+                f"  difference of {KEPT[key]}: {test.difference:+.3f}, 95 % interval "
                 f"+-{test.half_width:.3f}; Welch's t = {test.t:.2f}, {test.freedoms:.0f} degrees of freedom, "
                 f"p = {test.p:.2g}"
             )

@@ -17,13 +17,13 @@ from models.systems.braking.scene import BrakingScene, build
 from models.systems.braking.stop_report import Stop
 
 KEPT = {
-    "stopping distance [m]": "distance",
-    "stopping time [s]": "time",
-    "v0/T [m/s^2]": "deceleration",
-    "y [m]": "aside",
-    "final yaw [deg]": "yaw",
+    "distance": "stopping distance [m]",
+    "time": "stopping time [s]",
+    "deceleration": "v0/T [m/s^2]",
+    "aside": "y [m]",
+    "yaw": "final yaw [deg]",
 }
-"""Quantities of every stop, and their names in the arrays."""
+"""Names of arrays, and the quantities of every stop that they hold."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,8 @@ class Stops:
         """Named arrays (len(paths),) of ``KEPT`` and of the initial speed (m/s)."""
         scene = build(self.table, self.file, Path(self.folder))
         rows = [self._stopped(scene, number) for number in paths]
-        return {name: np.array([row[key] for row in rows]) for key, name in KEPT.items()} | {
-            "speed": np.array([row["initial speed [m/s]"] for row in rows])
-        }
+        kept = {**KEPT, "speed": "initial speed [m/s]"}
+        return {name: np.array([row[key] for row in rows]) for name, key in kept.items()}
 
     def facts(self) -> dict[str, Any]:
         """Everything that the result depends on."""
