@@ -6,6 +6,7 @@ that springs and tyres have at the time. Wheels turn as in the plane and are no 
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -69,25 +70,25 @@ def centre(vehicle: SpatialVehicle) -> np.ndarray:
     return masses @ np.array([body.position for body in vehicle.bodies]) / masses.sum()
 
 
+PLACES = ("position", "point", "point_one", "point_two", "point_left", "point_right")
+"""What parts of a vehicle call their places."""
+
+
 def _moved(vehicle: SpatialVehicle, way: np.ndarray) -> SpatialVehicle:
     """The vehicle drawn elsewhere on the ground."""
-    by = np.array([*way[:2], 0.0])
 
-    def at(point: Vector) -> Vector:
-        x, y, z = np.add(point, by)
+    def at(part: Any, name: str) -> Vector:
+        x, y, z = np.add(getattr(part, name), (way[0], way[1], 0.0))
         return float(x), float(y), float(z)
 
-    return replace(
-        vehicle,
-        bodies=tuple(replace(body, position=at(body.position)) for body in vehicle.bodies),
-        springs=tuple(replace(s, point_one=at(s.point_one), point_two=at(s.point_two)) for s in vehicle.springs),
-        tyres=tuple(replace(tyre, point=at(tyre.point)) for tyre in vehicle.tyres),
-        bars=tuple(
-            replace(bar, point_left=at(bar.point_left), point_right=at(bar.point_right)) for bar in vehicle.bars
-        ),
-        side_forces=tuple(replace(force, point=at(force.point)) for force in vehicle.side_forces),
-        axles=tuple(float(x + by[0]) for x in vehicle.axles),
-    )
+    parts: dict[str, Any] = {
+        kind: tuple(
+            replace(part, **{name: at(part, name) for name in PLACES if hasattr(part, name)})
+            for part in getattr(vehicle, kind)
+        )
+        for kind in ("bodies", "springs", "tyres", "bars", "side_forces")
+    }
+    return replace(vehicle, **parts, axles=tuple(float(x + way[0]) for x in vehicle.axles))
 
 
 def _plane(vehicle: SpatialVehicle, spin_inertia: float, front: float) -> Truck:

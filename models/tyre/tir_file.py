@@ -8,6 +8,7 @@ Source: H. B. Pacejka, Tyre and vehicle dynamics, sec. 4.3.2, Delft-Tyre '97 and
 
 import math
 import re
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,7 +43,8 @@ def tir_table(path: str | Path) -> TyreTable:
     """Table of the tyre in a `.tir` file; raises InputError that names file, line, key, value and what is allowed."""
     found = _properties(path)
     _check(path, found)
-    c = {name: _number(path, found, name) for name in found if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name)}
+    named = (name for name in found if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name))
+    c = defaultdict(float, dict.fromkeys(ONE, 1.0)) | {name: _number(path, found, name) for name in named}
     least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
@@ -59,40 +61,29 @@ def tir_table(path: str | Path) -> TyreTable:
 
 def along(c: dict[str, float], load: float) -> Curve:
     """Magic formula of braking under a load (N) from a file's coefficients."""
-    of = _Of(c)
-    _, off = of.excess(load)
-    peak = (of["PDX1"] + of["PDX2"] * off) * of["LMUX"]
-    shape = of["PCX1"] * of["LCX"]
-    bend = (of["PEX1"] + of["PEX2"] * off + of["PEX3"] * off**2) * (1.0 + of["PEX4"]) * of["LEX"]
-    stiffness = (of["PKX1"] + of["PKX2"] * off) * math.exp(of["PKX3"] * off) * of["LKX"]
+    _, off = _excess(c, load)
+    peak = (c["PDX1"] + c["PDX2"] * off) * c["LMUX"]
+    shape = c["PCX1"] * c["LCX"]
+    bend = (c["PEX1"] + c["PEX2"] * off + c["PEX3"] * off**2) * (1.0 + c["PEX4"]) * c["LEX"]
+    stiffness = (c["PKX1"] + c["PKX2"] * off) * math.exp(c["PKX3"] * off) * c["LKX"]
     return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
 def across(c: dict[str, float], load: float) -> Curve:
     """Magic formula of cornering under a load (N) from a file's coefficients, without their signs."""
-    of = _Of(c)
-    nominal, off = of.excess(load)
-    peak = abs(of["PDY1"] + of["PDY2"] * off) * of["LMUY"]
-    shape = of["PCY1"] * of["LCY"]
-    bend = (of["PEY1"] + of["PEY2"] * off) * of["LEY"]
-    turn = math.sin(2.0 * math.atan2(load, of["PKY2"] * nominal))
-    stiffness = abs(of["PKY1"]) * nominal * turn * of["LKY"] / load
+    nominal, off = _excess(c, load)
+    peak = abs(c["PDY1"] + c["PDY2"] * off) * c["LMUY"]
+    shape = c["PCY1"] * c["LCY"]
+    bend = (c["PEY1"] + c["PEY2"] * off) * c["LEY"]
+    turn = math.sin(2.0 * math.atan2(load, c["PKY2"] * nominal))
+    stiffness = abs(c["PKY1"]) * nominal * turn * c["LKY"] / load
     return Curve(peak, stiffness / (shape * peak) if shape * peak else math.nan, shape, min(bend, 1.0))
 
 
-class _Of:
-    """Coefficients by name, with what a file may leave out."""
-
-    def __init__(self, c: dict[str, float]) -> None:
-        self._c = c
-
-    def __getitem__(self, name: str) -> float:
-        return self._c.get(name, 1.0 if name in ONE else 0.0)
-
-    def excess(self, load: float) -> tuple[float, float]:
-        """Scaled nominal load (N), and by which share of it a load is above."""
-        nominal = self["FNOMIN"] * self["LFZO"]
-        return nominal, (load - nominal) / nominal
+def _excess(c: dict[str, float], load: float) -> tuple[float, float]:
+    """Scaled nominal load (N), and by which share of it a load is above."""
+    nominal = c["FNOMIN"] * c["LFZO"]
+    return nominal, (load - nominal) / nominal
 
 
 def _properties(path: str | Path) -> dict[str, Property]:
