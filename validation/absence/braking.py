@@ -56,7 +56,8 @@ def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
     chain = [controller]
     while hasattr(chain[-1], "inner"):
         chain.append(chain[-1].inner)
-    last = chain[-1]
+    last, seeing = chain[-1], [part for part in chain if hasattr(part, "teeth")]
+    conversions = [channels.conversion for part in seeing for channels in (part.wheels, part.pressures)]
     return {
         "coordinates": len(vehicle.coordinates),
         "wheels": plane.wheels,
@@ -73,15 +74,7 @@ def _counts(vehicle: Any, controller: Any) -> dict[str, int]:
         "controllers": int(not isinstance(last, (CONTROLLERS["none"], MeasuredPressures))),
         "surfaces": int(max(vehicle.road.left.max(), vehicle.road.right.max())) + 1,
         "tables": len(vehicle.tables.mu_x),
-        **_sensed(chain, plane.wheels),
-    }
-
-
-def _sensed(chain: list[Any], wheels: int) -> dict[str, int]:
-    """Signals and pressures that do not arrive as they are."""
-    read = [channels.conversion for one in chain if hasattr(one, "teeth") for channels in (one.wheels, one.pressures)]
-    return {
-        "noisy signals": wheels * sum(own.noise > 0.0 for own in read),
-        "converted signals": wheels * sum(own.bits is not None for own in read),
-        "wrong signals": wheels * sum((own.gain, own.offset) != (1.0, 0.0) for own in read),
+        "noisy signals": plane.wheels * sum(read.noise > 0.0 for read in conversions),
+        "converted signals": plane.wheels * sum(read.bits is not None for read in conversions),
+        "wrong signals": plane.wheels * sum((read.gain, read.offset) != (1.0, 0.0) for read in conversions),
     }

@@ -69,33 +69,32 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _curve(name: str, slip: float, speed: float, steps: tuple[float, ...]) -> dict[str, Any]:
-    """Error of the stopping distance by step, of every scheme, and the speed at which it still rolls."""
+    """By step, of ours and every other scheme, error of the stopping distance and speed at which it still rolls."""
     tyre, _ = both = met(name)
-    torque = steady(FRONT, tyre, slip)[1]
+    force, torque = steady(FRONT, tyre, slip)
     true = exact(FRONT, tyre, torque, speed)
-    others = {key: [stopped(key, FRONT, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
-    own = [stop(FRONT, both, torque, speed, step).distance / true - 1.0 for step in steps]
-    force = steady(FRONT, tyre, slip)[0]
-    held = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
+    ways = {"ours": [(stop(FRONT, both, torque, speed, step).distance, 0.0) for step in steps]}
+    ways |= {key: [stopped(key, FRONT, tyre, torque, speed, step) for step in steps] for key in SCHEMES}
+    steadily = stop(FRONT, both, torque, speed, turning=(1.0 - slip) * speed / FRONT.radius).distance
     return {
         "exact": true,
-        "ours": own,
-        "steady": held / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
-        "others": {key: [way / true - 1.0 for way, _ in found] for key, found in others.items()},
-        "rolls": {key: [left for _, left in found] for key, found in others.items()},
+        "steady": steadily / (FRONT.mass * speed**2 / (2.0 * force)) - 1.0,
+        "errors": {key: [(way / true - 1.0, left) for way, left in ends] for key, ends in ways.items()},
         "at": steps.index(STEP),
     }
 
 
 def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     key, at = f"braking_stop.{name.replace(', ', '.').replace(' %', '').replace(' ', '.')}", curve["at"]
+    errors = {scheme: curves[at] for scheme, curves in curve["errors"].items()}
+    ours, _ = errors.pop("ours")
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
     rows = [
         at_most(
             f"{key}.distance",
             SYSTEM,
             f"{name}, 5.5 ms: stopping distance from rolling",
-            curve["ours"][at],
+            ours,
             "",
             BOUND,
             why,
@@ -112,17 +111,16 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
             "closed form",
         ),
     ]
-    for scheme, errors in curve["others"].items():
-        left = curve["rolls"][scheme][at]
+    for scheme, (error, left) in errors.items():
         said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
         rows.append(
             finding(
                 f"{key}.{scheme.split()[-1].lower()}",
                 SYSTEM,
                 f"{name}, 5.5 ms: {scheme}{said}",
-                100.0 * errors[at],
+                100.0 * error,
                 "%",
-                f"{100.0 * curve['ours'][at]:.1e} % of ours",
+                f"{100.0 * ours:.1e} % of ours",
                 "the same vehicle, torque and table",
                 "closed form",
             )
@@ -250,21 +248,14 @@ def _friction_row(levels: int) -> Row:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Error of the stopping distance by scheme and step."""
-    names = ("ours", *SCHEMES)
     lines = [
-        (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in _errors(curve, scheme)))
+        (case, scheme, *(f"{100.0 * error:+.2g}{'*' if left else ''}" for error, left in errors))
         for case, curve in data["curves"].items()
-        for scheme in names
+        for scheme, errors in curve["errors"].items()
     ]
     note = f"In per cent of the exact distance. *: it does not stop in {PATIENCE:g} times its time; the way until then."
     heads = ("case", "scheme", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     return [Table("Stopping distance of a quarter vehicle", note, heads, tuple(lines))]
-
-
-def _errors(curve: dict[str, Any], scheme: str) -> list[tuple[float, float]]:
-    if scheme == "ours":
-        return [(error, 0.0) for error in curve["ours"]]
-    return list(zip(curve["others"][scheme], curve["rolls"][scheme], strict=True))
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -272,18 +263,14 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from models.drawing.figures import plt
 
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True, sharey=True)
+    milliseconds = 1e3 * np.array(data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
     for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):
         for scheme, style in styles.items():
-            errors = 100.0 * np.abs([error for error, _ in _errors(curve, scheme)])
+            errors, left = 100.0 * np.abs(np.transpose(curve["errors"][scheme]))
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
-            ax.loglog(1e3 * np.array(data["steps"]), np.maximum(errors, 1e-7), style, label=label)
-            never = [
-                (1e3 * step, error)
-                for step, error, (_, left) in zip(data["steps"], errors, _errors(curve, scheme), strict=True)
-                if left
-            ]
-            ax.plot(*np.reshape(never, (-1, 2)).T, "x", color="black", markersize=9)
+            ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
+            ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
         ax.axhline(100.0 * BOUND, color="grey", linewidth=0.8)
         ax.axvline(1e3 * STEP, color="grey", linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
