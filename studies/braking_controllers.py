@@ -1,7 +1,6 @@
 """Controllers of anti-lock brakes compared on several surfaces in all procedures, by distance and course."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ SHOWN = {
     "yaw [deg]": "final yaw [deg]",
     "side slip [deg]": "largest side slip [deg]",
 }
+LOCKED = "locked [s]"
 
 
 ESTIMATED = (
@@ -50,32 +50,23 @@ class Options(Strict):
     )
 
 
-@dataclass(frozen=True)
-class Case:
-    """One run: names of surface, procedure and controller, and the scene of it alone."""
-
-    surface: str
-    procedure: str
-    controller: str
-    scene: BrakingScene
+LABELS = ("surface", "procedure", "controller")
+"""What a run is known by."""
 
 
-def cases(scene: BrakingScene) -> list[Case]:
-    """All runs, surface by surface."""
+def cases(scene: BrakingScene) -> dict[tuple[str, str, str], BrakingScene]:
+    """All runs by their labels, surface by surface: the scene of each alone."""
     options = read(Options, scene.options, scene.file, "options")
     trains = [scene] if scene.trailer is None else [scene.model_copy(update={"trailer": None}), scene]
-    return [
-        Case(
-            surface,
-            name,
-            controller + " + trailer" * (train.trailer is not None),
-            _alone(train, surface, right, name, table),
+    return {
+        (surface, name, controller + " + trailer" * (train.trailer is not None)): _alone(
+            train, surface, right, name, table
         )
         for surface, right in options.surfaces.items()
         for name in scene.procedures
         for train in trains
         for controller, table in options.controllers.items()
-    ]
+    }
 
 
 def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller: ControllerTable) -> BrakingScene:
@@ -95,76 +86,67 @@ def _alone(scene: BrakingScene, surface: str, right: str, name: str, controller:
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Refuse what a controller or a surface cannot be."""
     check_reference(scene, engines)
-    for case in cases(scene):
-        check_scene(case.scene, ("reference",))
+    for alone in cases(scene).values():
+        check_scene(alone, ("reference",))
 
 
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
-    every, stops, failed = cases(scene), list[tuple[Case, dict[str, float]]](), dict[str, str]()
-    for i, case in enumerate(every):
-        progress(f"{case.surface}, {case.procedure}, {case.controller}", i / len(every))
+    every, answer, failed, estimated = cases(scene), list[dict[str, Any]](), dict[str, str](), False
+    for i, (labels, alone) in enumerate(every.items()):
+        name = ", ".join(labels)
+        progress(name, i / len(every))
         try:
-            path = drive(case.scene).detail
+            stop = Stop(drive(alone).detail)
         except RunFailed as error:
-            failed[f"{case.surface}, {case.procedure}, {case.controller}"] = str(error)
+            failed[name] = str(error)
             continue
-        if not path.stands:
-            failed[f"{case.surface}, {case.procedure}, {case.controller}"] = f"not stopped by {path.times[-1]:g} s"
+        if not stop.path.stands:
+            failed[name] = f"not stopped by {stop.times[-1]:g} s"
             continue
-        stop = Stop(path)
-        values = stop.of_vehicle()
-        stops.append(
-            (case, {key: values[name] for key, name in SHOWN.items()} | {"locked [s]": float(stop.locks().time.max())})
-        )
-    _save(scene, stops, folder)
-    _figure(scene, stops, folder / "controllers.png")
-    answer = [
-        {"surface": case.surface, "procedure": case.procedure, "controller": case.controller, **values}
-        for case, values in stops
-    ]
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table(stops)}
+        values, estimated = stop.of_vehicle(), estimated or not alone.controller.true_speed
+        shown = {head: values[quantity] for head, quantity in SHOWN.items()}
+        answer.append(dict(zip(LABELS, labels, strict=True)) | shown | {LOCKED: float(stop.locks().time.max())})
+    _save(scene, answer, folder)
+    _figure(scene, answer, folder / "controllers.png")
+    lines = table(answer) + [ESTIMATED] * estimated
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": lines}
 
 
-def table(stops: list[tuple[Case, dict[str, float]]]) -> list[str]:
+def table(stops: list[dict[str, Any]]) -> list[str]:
     """One line per run."""
-    heads = [*SHOWN, "locked [s]"]
+    heads = [*SHOWN, LOCKED]
     lines = [f"  {'surface':<10}{'procedure':<12}{'controller':<32}" + "".join(f"{head:>17}" for head in heads)]
-    for case, values in stops:
-        name = case.procedure.replace("_", " ")
-        lines.append(
-            f"  {case.surface:<10}{name:<12}{case.controller:<32}" + "".join(f"{values[head]:>17.2f}" for head in heads)
-        )
-    lines += ["  locked: longest of the wheels, above 15 km/h"]
-    return lines + [ESTIMATED] * any(not case.scene.controller.true_speed for case, _ in stops)
+    for stop in stops:
+        labels = f"  {stop['surface']:<10}{stop['procedure'].replace('_', ' '):<12}{stop['controller']:<32}"
+        lines.append(labels + "".join(f"{stop[head]:>17.2f}" for head in heads))
+    return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
 
-def _save(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], folder: Path) -> None:
+def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path) -> None:
     """A stop per line, or along the axis of the result."""
-    names, heads = ("surface", "procedure", "controller"), list(stops[0][1]) if stops else []
-    cases = [[getattr(case, name) for name in names] for case, _ in stops]
-    values = [[stop[head] for head in heads] for _, stop in stops]
+    heads = [*SHOWN, LOCKED] if stops else []
+    texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
+    columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
     channels = {
-        head.partition(" [")[0].replace("/", " by "): Channel("stop", np.array(column), head.partition(" [")[2][:-1])
-        for head, column in zip(heads, zip(*values, strict=True), strict=True)
+        head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
+        for head, column in columns.items()
     }
-    texts = {name: Channel("stop", list(column)) for name, column in zip(names, zip(*cases, strict=True), strict=False)}
     result(scene, channels, texts, engine="reference").save(folder / "controllers.nc")
-    rows = [",".join((*case, *(f"{value:.17g}" for value in row))) for case, row in zip(cases, values, strict=True)]
-    write_whole(folder / "controllers.csv", "\n".join([",".join((*names, *heads)), *rows]) + "\n")
+    rows = [(*(stop[name] for name in LABELS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
+    write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABELS, *heads), *rows]))
 
 
 PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}
 
 
-def _figure(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], file: Path) -> None:
+def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
     from models.drawing.figures import plt, save
 
-    surfaces = list(dict.fromkeys(case.surface for case, _ in stops))
-    rights = read(Options, scene.options, scene.file, "options").surfaces
-    each = len(read(Options, scene.options, scene.file, "options").controllers)
-    names, kinds = list(scene.procedures), list(dict.fromkeys(case.controller for case, _ in stops))
+    options = read(Options, scene.options, scene.file, "options")
+    surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
+    names, each = list(scene.procedures), len(options.controllers)
     figure, axes = plt.subplots(
         len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4), squeeze=False, sharey="row"
     )
@@ -174,9 +156,9 @@ def _figure(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], fil
             axis = axes[row, column]
             for k, kind in enumerate(kinds):
                 bars = {
-                    case.procedure: values[key]
-                    for case, values in stops
-                    if case.surface == surface and case.controller == kind
+                    stop["procedure"]: stop[key]
+                    for stop in stops
+                    if (stop["surface"], stop["controller"]) == (surface, kind)
                 }
                 heights = [bars.get(name, np.nan) for name in names]
                 axis.bar(
@@ -189,7 +171,7 @@ def _figure(scene: BrakingScene, stops: list[tuple[Case, dict[str, float]]], fil
                 )
             axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
             axis.set(
-                title=f"{heading} on {surface}; split: {rights[surface]} on the right",
+                title=f"{heading} on {surface}; split: {options.surfaces[surface]} on the right",
                 ylabel=key.replace("^2", "²") if column == 0 else "",
             )
     if stops:
