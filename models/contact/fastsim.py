@@ -28,14 +28,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.contact.falling_friction import Falling
 from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
 from models.contact.hertz import LEAST_AXIS
 from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
 from models.contact.linear_theory import flexibilities as linear_flexibilities
-from models.contact.material import Pair
+from models.contact.material import Falling, Pair
 from models.core.errors import InputError
 
 Flexibilities = Literal["blended", "one", "three"]

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.falling_friction import Falling
 from models.contact.fastsim import (
     KINDS,
     MARCHES,
@@ -18,7 +17,7 @@ from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN, RATE, advance, cut
 from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_slip
 from models.contact.fields import Fields
-from models.contact.material import Pair
+from models.contact.material import Falling, Pair
 from models.core.errors import InputError
 from models.machine.compiled import njit
 

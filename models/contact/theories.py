@@ -96,6 +96,17 @@ class Linear(OnEllipse):
         return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
 
 
+def beyond_friction(used: np.ndarray) -> str:
+    """What is said against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    beyond = used[used > 1.0]
+    if not beyond.size:
+        return ""
+    return (
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
+        f"to {beyond.max():.3g} mu N: it knows no slip"
+    )
+
+
 class Fastsim(OnEllipse):
     """The simplified theory of 1982; ``choices`` are those of ``fastsim``."""
 

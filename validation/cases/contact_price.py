@@ -4,6 +4,7 @@ What accuracy costs in rolling contact stands among the problems of ``price``.
 """
 
 import time
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from models.contact.hertz import by_axes
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import answer
+from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import Case, exact
 from validation.common.rows import Row, System, Table, aim, at_most, finding
@@ -244,7 +246,7 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    found = answer(path, out, PAIR, Method())
+    found = answer(path, out, partial(Built, PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()

@@ -16,7 +16,7 @@ from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_w
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
 from models.contact.theories import Simplified
-from models.systems.contact.of_scene import interpenetrating
+from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import Case
 from validation.contact.contact_set import FITTED, FRICTION, LOAD, read, read_drawn, read_wide
 

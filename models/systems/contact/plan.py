@@ -25,7 +25,7 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     """A doubt about every radius that is not large beside the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
-    from models.systems.contact.of_scene import hertz_of
+    from models.systems.contact.run import hertz_of
 
     area = hertz_of(scene)
     out = list[Finding]()

@@ -7,9 +7,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from models.contact.falling_friction import Falling
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Falling, Material, Pair
 from models.core.errors import InputError
 from models.core.scene_effects import check, with_own
 from models.core.scene_file import SceneFile, checked
