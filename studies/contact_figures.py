@@ -8,6 +8,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from models.contact.fields import Fields
+from models.contact.inputs import Array
 from models.contact.theories import Rolled
 from models.core.result import Result
 from models.drawing.figures import plt, save
@@ -36,7 +37,7 @@ def contact_figure(patches: list[Fields], friction: float, title: str, pressure:
     save(figure, path)
 
 
-def _rectangles(f: Fields) -> list[np.ndarray]:
+def _rectangles(f: Fields) -> list[Array]:
     """Corners of every cell inside, (4, 2) in mm."""
     x, y, dx, dy = (MILLI * getattr(f, name)[f.inside] for name in ("x", "y", "dx", "dy"))
     corners = [(x + i * dx / 2, y + j * dy / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -74,9 +75,9 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
     axis.set_title("traction on the wheel")
 
 
-def _arrows(f: Fields, spacing: float) -> np.ndarray:
+def _arrows(f: Fields, spacing: float) -> Array:
     """Position and traction (4, n) at points of an even net: in every so many rows of cells, and linear along each."""
-    arrows, lines = list[np.ndarray](), f.y[:, 0]
+    arrows, lines = list[Array](), f.y[:, 0]
     step = max(1, round(spacing / float(f.dy[0, 0])))
     for row in range(len(lines) // 2 % step, len(lines), step):
         inside = np.flatnonzero(f.inside[row])

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
+from models.contact.inputs import Array
 
 
 @dataclass(frozen=True)
@@ -13,12 +13,12 @@ class Fields:
     slips : whether the cell slips. inside : whether it belongs to the contact area.
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    dx: np.ndarray
-    dy: np.ndarray
-    pressure: np.ndarray
-    px: np.ndarray
-    py: np.ndarray
-    slips: np.ndarray
-    inside: np.ndarray
+    x: Array
+    y: Array
+    dx: Array
+    dy: Array
+    pressure: Array
+    px: Array
+    py: Array
+    slips: Array
+    inside: Array

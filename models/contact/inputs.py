@@ -7,7 +7,8 @@ import numpy as np
 
 from models.core.errors import InputError
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+Array = np.ndarray
+"""Of numbers or flags, of any shape."""
 LARGEST_LOAD = 1e10
 """N"""
 LARGEST_APPROACH = 0.05

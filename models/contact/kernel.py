@@ -19,24 +19,22 @@ from numba import carray
 
 from models.contact.fastsim import LEAST_CELLS, MOST_CELLS
 from models.contact.fastsim_grid import MOST_STRIPS, grid, strips_of
-from models.contact.fastsim_kernels import LANES, ROWS, march_second_order
+from models.contact.fastsim_kernels import SECOND_ORDER
 from models.contact.fastsim_many import (
     BLENDED,
-    HALF,
     L1,
     L2,
     L3,
     LOAD,
     MU,
     PER_SLIP,
+    ROOM,
     SPIN,
     XI_X,
     XI_Y,
     A,
     B,
-    _collect,
-    _fill,
-    rigid_slip,
+    forces_within,
 )
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
@@ -60,7 +58,8 @@ _CELLS, _FIRST, _COUNT, _ALONG = range(4)
 """Places in the net: cells per strip, strips of the first net, how many nets, where the rows of the cells begin."""
 _LAW = 1
 """Place of the law's address where the first number is below zero."""
-_LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, PER_SLIP, 4
+_CONTACT, _FORCES = 10, 4
+"""Columns of a contact and of its forces, as ``forces_within`` has them."""
 
 
 @lru_cache(maxsize=64)
@@ -199,20 +198,12 @@ def _creep(own, table, out):
     k = (m - first) // 2
     at = _ALONG + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
     cells, strips = carray(beyond(table, _ALONG), (5, n)), carray(beyond(table, at + 1), (4, m))
-    contacts, slips = carray(doubles(_CONTACT), (1, _CONTACT)), carray(doubles(_SLIPS), (1, _SLIPS))
-    found, lanes = carray(doubles(_FOUND), (1, _FOUND)), carray(doubles(_LANES), (_LANES,))
+    contacts, slips = carray(doubles(_CONTACT), (1, _CONTACT)), carray(doubles(PER_SLIP), (1, PER_SLIP))
+    forces, lanes = carray(doubles(_FORCES), (1, _FORCES)), carray(doubles(ROOM), (ROOM,))
     one = contacts[0]
     one[A], one[B], one[LOAD], one[MU] = out[AXIS_A], out[AXIS_B], out[NORMAL], own[FRICTION]
     one[XI_X], one[XI_Y], one[SPIN] = own[CREEP_X], own[CREEP_Y], own[TURNING]
     one[L1], one[L2], one[L3] = flexibilities_at(one[A], one[B], own[MODULUS], own[POISSON])
-    rigid_slip(one, n, carray(beyond(table, at), (1,))[0], BLENDED, slips[0])
-    found[0] = 0.0
-    area = 0.0
-    for start in range(0, m, LANES):
-        count = min(LANES, m - start)
-        _fill(lanes, start, count, contacts, strips, slips)
-        march_second_order(lanes, cells)
-        _collect(lanes, start, count, contacts, strips, slips, found)
-    for s in range(m):
-        area += strips[HALF, s] * n
-    out[FX], out[FY], out[MZ], out[STICK] = found[0, 0], found[0, 1], found[0, 2], 1.0 - found[0, 3] / area
+    middle = carray(beyond(table, at), (1,))[0]
+    forces_within(contacts, strips, cells, middle, BLENDED, SECOND_ORDER, slips, lanes, forces)
+    out[FX], out[FY], out[MZ], out[STICK] = forces[0]

@@ -7,13 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.machine.compiled import njit
 
-Map = Callable[[np.ndarray], np.ndarray]
+Map = Callable[[Array], Array]
 
 
-def solve(apply: Map, precondition: Map, wanted: np.ndarray, tolerance: float, most: int) -> np.ndarray:
+def solve(apply: Map, precondition: Map, wanted: Array, tolerance: float, most: int) -> Array:
     """x with |apply(x) - wanted| <= tolerance |wanted|, vectors (n,); raises RunFailed after ``most`` products."""
     size = float(np.linalg.norm(wanted))
     if size == 0.0:

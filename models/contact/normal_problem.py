@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
-from models.contact.inputs import number, quantity
+from models.contact.inputs import Array, number, quantity
 from models.core.errors import InputError, RunFailed
 
 if TYPE_CHECKING:
@@ -37,9 +37,9 @@ class Pressed:
     pressure : (ny, nx) in Pa, zero outside the contact. x, y : (nx,), (ny,) centres of the cells (m), evenly spaced.
     """
 
-    pressure: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    pressure: Array
+    x: Array
+    y: Array
 
     def __post_init__(self) -> None:
         shape = (np.size(self.y), np.size(self.x))
@@ -67,7 +67,7 @@ class Pressed:
         return float(self.y[1] - self.y[0])
 
     @property
-    def contact(self) -> np.ndarray:
+    def contact(self) -> Array:
         """Cells in contact, (ny, nx) bool."""
         return self.pressure > 0
 
@@ -93,24 +93,18 @@ class NormalSolution(Pressed):
     """
 
     approach: float
-    gap: np.ndarray
+    gap: Array
     residual: float
     iterations: int
 
 
-def centres(cells: int, step: float) -> np.ndarray:
+def centres(cells: int, step: float) -> Array:
     """Centres (m) of ``cells`` cells about zero."""
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
 def solve_normal(
-    distance: np.ndarray,
-    dx: float,
-    dy: float,
-    pair: "Pair",
-    *,
-    load: float | None = None,
-    approach: float | None = None,
+    distance: Array, dx: float, dy: float, pair: "Pair", *, load: float | None = None, approach: float | None = None
 ) -> NormalSolution:
     """Pressure and contact area of two bodies pressed together.
 
@@ -139,7 +133,7 @@ def solve_normal(
     return _proved(pressure, distance, displace, approach, x, y, iterations)
 
 
-def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, approach: float | None) -> np.ndarray:
+def _checked(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
     """The distance as an array of numbers; raises InputError."""
     distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
     if distance.ndim != 2 or min(distance.shape) < 2:
@@ -153,15 +147,15 @@ def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, app
     return distance
 
 
-def _apart(distance: np.ndarray, x: np.ndarray, y: np.ndarray, approach: float | None) -> NormalSolution:
+def _apart(distance: Array, x: Array, y: Array, approach: float | None) -> NormalSolution:
     """Bodies that do not press on each other: at the given approach, or at first touch."""
     least = float(distance.min()) if approach is None else approach
     return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
 
 
 def _conjugate_gradients(
-    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
-) -> tuple[np.ndarray, int]:
+    distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float
+) -> tuple[Array, int]:
     """Pressure (ny, nx) that meets the contact conditions, and the iterations taken."""
     pressure = _start(distance, displace, load, approach, cell)
     direction, square, restart = np.zeros_like(pressure), 1.0, True
@@ -187,9 +181,7 @@ def _conjugate_gradients(
     raise RunFailed("normal problem", f"contact conditions not met in {MOST_ITERATIONS} iterations")
 
 
-def _start(
-    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
-) -> np.ndarray:
+def _start(distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float) -> Array:
     """A first pressure: even over the grid for a load, proportional to the overlap for an approach."""
     if load is not None:
         return np.full(distance.shape, load / (distance.size * cell))
@@ -197,20 +189,14 @@ def _start(
     return overlap * (overlap.max() / displace(overlap[..., None]).max())
 
 
-def _violation(gap: np.ndarray, contact: np.ndarray, displacement: np.ndarray) -> float:
+def _violation(gap: Array, contact: Array, displacement: Array) -> float:
     """Largest violated condition as a part of the greatest displacement."""
     inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
     return float(max(inside, outside) / displacement.max())
 
 
 def _proved(
-    pressure: np.ndarray,
-    distance: np.ndarray,
-    displace: Convolution,
-    approach: float | None,
-    x: np.ndarray,
-    y: np.ndarray,
-    iterations: int,
+    pressure: Array, distance: Array, displace: Convolution, approach: float | None, x: Array, y: Array, iterations: int
 ) -> NormalSolution:
     """The solution with its conditions evaluated afresh."""
     contact = pressure > 0

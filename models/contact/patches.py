@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from models.contact.distance_kernels import sides
+from models.contact.inputs import Array
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
@@ -19,7 +20,7 @@ RIDGE = 1e-6
 """Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""
 NO_DEPTH = 1e-12
 """m: a valley that is no deeper within its sides is none."""
-Table = tuple[np.ndarray, np.ndarray]
+Table = tuple[Array, Array]
 Box = tuple[float, float, float, float]
 
 
@@ -127,7 +128,7 @@ def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tu
     ]
 
 
-def ridges(heights: np.ndarray, least: float) -> list[int]:
+def ridges(heights: Array, least: float) -> list[int]:
     """Indices of the maxima of a line that rise more than ``least`` above the valleys on both sides."""
     found: list[int] = []
     low, top, at = heights[0], heights[0], 0
@@ -167,7 +168,7 @@ def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> f
     return float(min(max(moved, points[0]), points[2]))
 
 
-def _rooted(lines: np.ndarray, least: np.ndarray, bottom: float, low: float) -> Table:
+def _rooted(lines: Array, least: Array, bottom: float, low: float) -> Table:
     """Lines and the root of their height above the bottom, with the bottom itself as one more line."""
     k = int(np.searchsorted(lines, bottom))
     roots = np.sqrt(np.maximum(least - low, 0.0))

@@ -17,12 +17,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.profiles import Profile, profile
 from models.core.errors import InputError, similar_file
 
 MM = 1e-3
 Kind = Literal["wheel", "rail"]
-Points = tuple[np.ndarray, np.ndarray]
+Points = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
 OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
@@ -194,7 +195,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
     return y[order] / key["units.len.f"], z[order] / key["units.len.f"]
 
 
-def _laid(y: np.ndarray, z: np.ndarray, kind: Kind) -> Points:
+def _laid(y: Array, z: Array, kind: Kind) -> Points:
     """The points with the rail's top up, or the wheel's flange down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.contact.inputs import NOTHING, creepages, number
+from models.contact.inputs import NOTHING, Array, creepages, number
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
@@ -51,7 +51,7 @@ SWEEPS = 3
 """In each round."""
 MOST_ROUNDS = 60
 """Rounds of sweeps and Newton steps before the problem is given up."""
-RigidSlip = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+RigidSlip = Callable[[Array, Array, float], Array]
 """Rigid slip (ny, nx, 2) at x (nx,) and y (ny,) of cells of a length."""
 
 
@@ -69,9 +69,9 @@ class RollingSolution:
     fx: float
     fy: float
     mz: float
-    traction: np.ndarray
-    slip: np.ndarray
-    stick: np.ndarray
+    traction: Array
+    slip: Array
+    stick: Array
     power: float
     residual: float
     rounds: int
@@ -123,13 +123,13 @@ def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: "Pair", weights
     return _assembled(state, rounds, pressed, box, pair.G)
 
 
-def rigid_slip(x: np.ndarray, y: np.ndarray, xi_x: float, xi_y: float, spin: float) -> np.ndarray:
+def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Array:
     """Slip (ny, nx, 2) of rigid bodies, by the rolling speed, at x (nx,) and y (ny,)."""
     along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
     return np.stack([along, across], axis=-1)
 
 
-def _box(contact: np.ndarray) -> tuple[slice, slice]:
+def _box(contact: Array) -> tuple[slice, slice]:
     """Rows and columns that hold the contact; nothing where there is none."""
     spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
     rows, columns = (slice(span[0], span[-1] + 1) if span.size else slice(0) for span in spans)
@@ -139,7 +139,7 @@ def _box(contact: np.ndarray) -> tuple[slice, slice]:
 class _State:
     """Tractions, by G, with their slip and how far they are from meeting every cell's condition."""
 
-    def __init__(self, operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray, traction: np.ndarray) -> None:
+    def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
         self.traction, self.bound = traction, bound
         self.slip = rigid + operator(traction)
         self.trial = traction - self.slip / operator.own.max()
@@ -148,12 +148,12 @@ class _State:
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
     @property
-    def stick(self) -> np.ndarray:
+    def stick(self) -> Array:
         """Cells whose traction need not be cut to the bound."""
         return (self.size <= self.bound) & (self.bound > 0)
 
 
-def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
+def _limited(traction: Array, bound: Array) -> Array:
     """Tractions (..., 2) cut to their bounds, along their own directions."""
     size = np.linalg.norm(traction, axis=-1)
     return traction * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[..., None]
@@ -163,11 +163,11 @@ def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
 class _Cells:
     """Centres x (nx,) and y (ny,) of cells (m), their sides dx and dy (m), bounds of their tractions by G (ny, nx)."""
 
-    x: np.ndarray
-    y: np.ndarray
+    x: Array
+    y: Array
     dx: float
     dy: float
-    bound: np.ndarray
+    bound: Array
 
     def coarser(self) -> "_Cells":
         """Cells twice as long and wide, whose bounds are the means over the old ones; a last one may reach beyond."""
@@ -201,7 +201,7 @@ def _solve(cells: _Cells, rigid: RigidSlip, pair: "Pair", weights: tuple[float, 
     return _settled(operator, motion, min(state, nothing, key=_residual))
 
 
-def _between(values: np.ndarray) -> np.ndarray:
+def _between(values: Array) -> Array:
     """Values (2 ny, 2 nx, 2) in the quarters of cells, linear between the cells' centres, from values (ny, nx, 2)."""
     for axis in (0, 1):
         ends = np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
@@ -211,7 +211,7 @@ def _between(values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _settled(operator: SlipOperator, rigid: np.ndarray, state: _State) -> tuple[_State, int]:
+def _settled(operator: SlipOperator, rigid: Array, state: _State) -> tuple[_State, int]:
     """Tractions that meet all conditions, by sweeps and Newton's steps in turn, and the rounds taken."""
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
@@ -227,7 +227,7 @@ def _settled(operator: SlipOperator, rigid: np.ndarray, state: _State) -> tuple[
     return state, done
 
 
-def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State, relaxation: float) -> _State:
+def _swept(operator: SlipOperator, rigid: Array, state: _State, relaxation: float) -> _State:
     """The state after a few sweeps."""
     traction = np.ascontiguousarray(np.moveaxis(state.traction, -1, 0))
     motion = np.ascontiguousarray(np.moveaxis(rigid, -1, 0))
@@ -240,7 +240,7 @@ def _residual(state: _State) -> float:
     return state.residual
 
 
-def _turned(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
+def _turned(operator: SlipOperator, rigid: Array, state: _State) -> _State:
     """The state after Newton's step; the same where the step is lost in rounding."""
     try:
         return _State(operator, rigid, state.bound, _newton(operator, rigid, state))
@@ -248,7 +248,7 @@ def _turned(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
         return state
 
 
-def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndarray:
+def _newton(operator: SlipOperator, rigid: Array, state: _State) -> Array:
     """Tractions after Newton's step for the cells that stick and slip in ``state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root
 
+from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import (
@@ -48,16 +49,16 @@ class Net:
     dx, dy of a mesh (m). volume : W times the load (m^3).
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    height: np.ndarray
-    pressure: np.ndarray
-    cover: np.ndarray
+    x: Array
+    y: Array
+    height: Array
+    pressure: Array
+    cover: Array
     step: tuple[float, float]
     volume: float
 
     @property
-    def forces(self) -> np.ndarray:
+    def forces(self) -> Array:
         """W times the load of every mesh, flat (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
@@ -81,9 +82,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     return Net(x, y, height, pressure, cover, (dx, dy), volume)
 
 
-def together(
-    nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
     pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
@@ -104,7 +103,7 @@ def together(
     return stiffness, np.array(approach)
 
 
-def _by(source: Net, target: Net, pair: Pair) -> np.ndarray:
+def _by(source: Net, target: Net, pair: Pair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
         return displacement(source.pressure, *source.step, pair.modulus)
@@ -112,7 +111,7 @@ def _by(source: Net, target: Net, pair: Pair) -> np.ndarray:
     return found.reshape(target.x.shape) / (np.pi * pair.modulus)
 
 
-def _product(net: Net, one: np.ndarray, other: np.ndarray, kind: int) -> float:
+def _product(net: Net, one: Array, other: Array, kind: int) -> float:
     """What least squares sum up: products of the slopes, or of what differs from the mean."""
     if kind == GRADIENT:
         return float(slope_products(one, other, net.cover, *net.step, True)[0])
@@ -120,8 +119,8 @@ def _product(net: Net, one: np.ndarray, other: np.ndarray, kind: int) -> float:
 
 
 def settled(
-    patches: Sequence[Patch], start: np.ndarray, load: float | None, pair: Pair, options: tuple[int, int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    patches: Sequence[Patch], start: Array, load: float | None, pair: Pair, options: tuple[int, int, int]
+) -> tuple[Array, Array, Array]:
     """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
 
     start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
@@ -131,7 +130,7 @@ def settled(
     zero, (cells, shape, kind) = np.append(lows, lows.min()), options
     unit = float(start[-1] - lows.min())
 
-    def state(over: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def state(over: Array) -> tuple[Array, Array, Array, Array]:
         *depths, approach = found = zero + unit * over
         nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
         stiffness, reached = together(nets, pair, kind, lows, found[:-1])
@@ -152,7 +151,7 @@ def settled(
     raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
 
 
-def dragged(nets: Sequence[Net], tractions: Sequence[np.ndarray], k: int, pair: Pair) -> np.ndarray:
+def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, pair: Pair) -> Array:
     """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
     found, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):

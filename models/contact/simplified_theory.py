@@ -37,7 +37,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.fields import Fields
-from models.contact.inputs import creepages, number, whole_number
+from models.contact.inputs import Array, creepages, number, whole_number
 from models.contact.material import Pair
 from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, whole
 from models.contact.several_patches import crude, dragged, settled
@@ -289,7 +289,7 @@ def _area(part: PatchPressure, rows: int = 100) -> float:
     return float((high - low).sum() * (part.box[3] - part.box[2]) / rows) if y.size else 0.0
 
 
-def _strips(part: PatchPressure, rows: int, cells: int, shape: int) -> tuple[np.ndarray, ...]:
+def _strips(part: PatchPressure, rows: int, cells: int, shape: int) -> tuple[Array, ...]:
     patch, (origin, step) = part.patch, _grid(part.patch)
     return strips(patch.distance.padded, origin, step, part.box, part.depth, patch.low, rows, cells, shape)
 
@@ -336,14 +336,14 @@ def _fine(part: PatchPressure, options: Options, cells: int) -> tuple[Any, ...]:
 
 
 def _march(
-    fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...], traction: np.ndarray
+    fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...], traction: Array
 ) -> tuple[float, ...]:
     """FASTSIM on the strips of a patch, into its tractions; creepage: friction first."""
     friction, *motion = creepage
     return march(*fine, friction, flexibility, *motion, traction)
 
 
-def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float]:
+def _refitted(pressed: NormalContact, tractions: list[Array]) -> list[float]:
     """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
 
     W_3 where no traction can be fitted.
@@ -358,7 +358,7 @@ def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float
     return found
 
 
-def _fields(fine: tuple[Any, ...], traction: np.ndarray, friction: float) -> Fields:
+def _fields(fine: tuple[Any, ...], traction: Array, friction: float) -> Fields:
     """Pressure and tractions by strip and cell."""
     y, low, high, width, pressure = fine
     cells = pressure.shape[1]

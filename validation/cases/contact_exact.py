@@ -8,6 +8,7 @@ import numpy as np
 
 from models.contact.hertz import by_axes
 from models.contact.hertz_cells import hertzian
+from models.contact.inputs import Array
 from models.contact.material import Material, Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
@@ -63,7 +64,7 @@ def _row(name: str, words: str, value: float, bound: float, why: str, unit: str 
     return at_most(f"contact_exact.{name}", SYSTEM, words, value, unit, bound, why, side)
 
 
-def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, np.ndarray]:
+def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
     """The normal problem of an ellipse a/b = ratio on cells, and its errors of approach, peak and area (3,)."""
     a, b = SIZE * ratio**0.5, SIZE / ratio**0.5
     truth = by_axes(a, b, PAIR, load=LOAD)
@@ -107,7 +108,7 @@ def _hertz_rows() -> list[Row]:
     return rows
 
 
-def carter(x: np.ndarray, a: float, share: float) -> np.ndarray:
+def carter(x: Array, a: float, share: float) -> Array:
     """Traction by mu p0 on a strip -a < x < a that rolls to +x, at a creepage of ``share`` of that of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
@@ -166,7 +167,7 @@ def _shift_rows() -> list[Row]:
     ]
 
 
-def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> np.ndarray:
+def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Array:
     """fx, fy by mu N and mz by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
     ratio, xi_x, xi_y, spin = CASES[name]
     creepage = LIMIT / (PAIR.G * SIZE**2) * sign

@@ -10,6 +10,7 @@ from models.contact.fastsim import KINDS as KINDS_OF_FLEXIBILITY
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
@@ -91,7 +92,7 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     }
 
 
-def _vector(given: Contacts, **options: Any) -> np.ndarray:
+def _vector(given: Contacts, **options: Any) -> Array:
     """Forces (n, 2) by mu N."""
     found = fastsim(**given, pair=PAIR, **options)
     return np.stack([found.fx, found.fy], axis=1) / (FRICTION * LOAD)
@@ -298,12 +299,12 @@ def _moved(given: Contacts, name: str, step: float) -> Contacts:
     return moved
 
 
-def _forces(given: Contacts) -> np.ndarray:
+def _forces(given: Contacts) -> Array:
     found = fastsim(**given, pair=PAIR)
     return np.stack([found.fx, found.fy, found.mz], axis=1)
 
 
-def _units() -> np.ndarray:
+def _units() -> Array:
     return FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_axes
+from models.contact.inputs import Array
 from models.contact.theories import Simplified
 from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import Case
@@ -40,29 +41,29 @@ class Held:
     ``groups``.
     """
 
-    force: np.ndarray
-    moment: np.ndarray
-    error: np.ndarray
-    moment_error: np.ndarray
-    spinning: np.ndarray
-    group: np.ndarray
+    force: Array
+    moment: Array
+    error: Array
+    moment_error: Array
+    spinning: Array
+    group: Array
 
     @property
-    def used(self) -> np.ndarray:
+    def used(self) -> Array:
         """Size of the force, (n,)."""
         return np.linalg.norm(self.force, axis=1)
 
     @property
-    def used_with_moment(self) -> np.ndarray:
+    def used_with_moment(self) -> Array:
         """Size of force and moment, (n,)."""
         return used_with_moment(self.used, self.moment)
 
-    def of(self, which: np.ndarray) -> "Held":
+    def of(self, which: Array) -> "Held":
         """Some of the contacts, by a mask (n,)."""
         return Held(*(getattr(self, part.name)[which] for part in fields(self)))
 
 
-def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
+def forces(name: str, cases: list[Case], cells: int) -> Array:
     """Force by mu N and moment by mu N and the longer semi-axis (n, 3) of a theory, of FASTSIM or "simplified"."""
     axes, motions = _arrays(cases)
     unit = FRICTION * LOAD * np.array([np.ones(len(cases)), np.ones(len(cases)), axes.max(axis=0)]).T
@@ -80,7 +81,7 @@ def forces(name: str, cases: list[Case], cells: int) -> np.ndarray:
     return moved / unit
 
 
-def _arrays(cases: list[Case]) -> tuple[np.ndarray, np.ndarray]:
+def _arrays(cases: list[Case]) -> tuple[Array, Array]:
     """Semi-axes (2, n) and motions (3, n)."""
     return np.array([(c.a, c.b) for c in cases]).T, np.array([c.motion for c in cases]).T
 
@@ -89,7 +90,7 @@ def _simplified(case: Case) -> Simplified:
     return Simplified(interpenetrating(by_axes(case.a, case.b, case.pair, load=LOAD), case.pair), FRICTION)
 
 
-def groups(cases: list[Case]) -> np.ndarray:
+def groups(cases: list[Case]) -> Array:
     """Number (n,) of the group of each contact, of which theories err in different ways: by Poisson's ratio, whether
     spin is against the lateral creepage, and whether the ellipse is longer across the rolling direction.
     """
@@ -115,7 +116,7 @@ def kept(name: str, one: Held) -> tuple[float, float]:
     )
 
 
-def measured(error: np.ndarray, used: np.ndarray, one: Held) -> tuple[tuple[float, ...], ...]:
+def measured(error: Array, used: Array, one: Held) -> tuple[tuple[float, ...], ...]:
     """Quantiles of the error at each knot, without spin and with it, of the group with the largest."""
     ends = (0.0, *KNOTS, 1.1)
     within = [(used >= low) & (used <= high) for low, high in zip(ends, ends[2:], strict=False)]
@@ -125,7 +126,7 @@ def measured(error: np.ndarray, used: np.ndarray, one: Held) -> tuple[tuple[floa
     )
 
 
-def _largest(error: np.ndarray, rows: np.ndarray, group: np.ndarray) -> float:
+def _largest(error: Array, rows: Array, group: Array) -> float:
     """Largest quantile of a group with more than a few contacts; of all together where none has them."""
     parts = [error[rows & (group == value)] for value in np.unique(group)]
     told = [part for part in parts if part.size >= FEW] or [error[rows]]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.patches import Patch
@@ -43,7 +44,7 @@ class Shape:
     box: Box | None = None
 
 
-def _over(name: str, height: Callable[[np.ndarray, np.ndarray], np.ndarray], load: float, x: float, y: float) -> Shape:
+def _over(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
     """A shape from a formula, its exact contact within -x..x and -y..y."""
     distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
     return Shape(name, distance, load, (-x, x, -y, y))
@@ -202,7 +203,7 @@ FAR = 1e-3
 """Height (m) where a distance is not known."""
 
 
-def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
     known, own = patch.distance, y - patch.place
     over = (own >= known.y[0]) & (own <= known.y[-1])

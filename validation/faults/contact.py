@@ -10,6 +10,7 @@ import numpy as np
 from models.contact import fastsim as creep
 from models.contact import hertz, normal_problem, rolling_problem
 from models.contact.fastsim_kernels import PLAIN
+from models.contact.inputs import Array
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import NormalSolution, centres
@@ -91,7 +92,7 @@ def _theories() -> float:
 
 
 @cache
-def _stuck() -> np.ndarray:
+def _stuck() -> Array:
     a = _ball()[0]
     return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
 
@@ -114,7 +115,7 @@ CHECKS = {
 }
 
 
-def _columns(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _columns(change: Callable[[Array], Array]) -> Patch:
     """Contacts (n, 10) of FASTSIM changed: a, b, load, mu, xi_x, xi_y, spin and flexibilities."""
 
     def contacts(real: Any) -> Any:

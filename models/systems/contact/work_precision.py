@@ -78,7 +78,7 @@ class Case:
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
 
     @property
-    def force(self) -> np.ndarray:
+    def force(self) -> Array:
         """Exact force by mu N, (2,)."""
         return np.array([self.fx, self.fy])
 
@@ -108,7 +108,7 @@ def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
     return replace(case, fx=float(found[0]), fy=float(found[1]), mz=float(found[2]), error=error)
 
 
-def without_grid(grids: list[np.ndarray]) -> tuple[np.ndarray, float]:
+def without_grid(grids: list[Array]) -> tuple[Array, float]:
     """Answers (fx, fy, mz) of three grids, each with cells half as long, led on to none, and the error of fx and fy.
 
     The error of the cells is of first order where much sticks and of second where all slips: taken is the order by
