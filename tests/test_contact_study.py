@@ -11,7 +11,7 @@ import pytest
 from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
 from models.contact.fastsim import fastsim
-from models.contact.fastsim_fields import fastsim_fields
+from models.contact.fields import fastsim_fields
 from models.contact.material import Pair
 from models.core.errors import InputError
 from models.core.table_stream import blocks

@@ -8,8 +8,8 @@ import pytest
 from models.contact import hertz
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
-from models.contact.fastsim_fields import fastsim_fields
 from models.contact.fastsim_grid import POWERS, grid, strips_of
+from models.contact.fields import fastsim_fields
 from models.contact.linear_theory import coefficients, flexibilities
 from models.contact.material import Falling, Pair
 from models.core.errors import InputError

@@ -9,21 +9,17 @@ with A in closed form below. Far from its cell an influence number falls as 1/di
 convolution, done by the fast Fourier transform on a grid padded with zeros to twice its size: exact but for rounding.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import fft
 
 from models.contact.inputs import Array
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
+from models.contact.material import Pair
 
 X, Y, Z = 0, 1, 2
 """Indices of the axes in ``influence``."""
 
 
-def influence(x: Array, y: Array, dx: float, dy: float, pair: "Pair") -> Array:
+def influence(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
     """Displacement difference (m) at a point by a unit traction (1 Pa) on a rectangle dx by dy (m).
 
     x, y : (...) coordinates of the point from the rectangle's centre (m), broadcast against each other.

@@ -1,17 +1,15 @@
 """Slip of a rolling contact as a linear function of its tractions, and Newton's step for cells that stick or slip."""
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.contact import krylov
 from models.contact.half_space import Convolution, Y, influence, offsets
 from models.contact.inputs import Array
-from models.contact.rolling_kernels import factor, substitute
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
+from models.contact.material import Pair
+from models.contact.rolling_kernels import factor, orthogonalise, substitute, turned
+from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
@@ -31,7 +29,7 @@ class SlipOperator:
     """
 
     def __init__(
-        self, columns: int, rows: int, dx: float, dy: float, pair: "Pair", weights: tuple[float, ...] = UPSTREAM
+        self, columns: int, rows: int, dx: float, dy: float, pair: Pair, weights: tuple[float, ...] = UPSTREAM
     ) -> None:
         x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
         ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
@@ -63,6 +61,30 @@ class SlipOperator:
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
 
 
+Map = Callable[[Array], Array]
+
+
+def gmres(apply: Map, precondition: Map, wanted: Array, tolerance: float, most: int) -> Array:
+    """x with |apply(x) - wanted| <= tolerance |wanted|, vectors (n,); raises RunFailed after ``most`` products.
+
+    GMRES (Saad and Schultz, 1986), preconditioned from the right. Its own loops instead of a library's, whose calls of
+    threaded linear algebra on short vectors stall on busy cores.
+    """
+    size = float(np.linalg.norm(wanted))
+    if size == 0.0:
+        return np.zeros_like(wanted)
+    basis, triangle, turns = np.empty((most + 1, wanted.size)), np.zeros((most, most)), np.empty((most, 2))
+    left = np.append(size, np.zeros(most))
+    basis[0] = wanted / size
+    for count in range(1, most + 1):
+        triangle[:count, count - 1] = turned(
+            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
+        )
+        if abs(left[count]) <= tolerance * size:
+            return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
+    raise RunFailed("linear solver", f"residual {abs(left[most]) / size:.2g} after {most} products")
+
+
 class FreeSystem:
     """The system free (C + stiff) d = free wanted for changes d of traction within the free directions.
 
@@ -80,7 +102,7 @@ class FreeSystem:
         """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
         # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
         right = (self.scale * _times(self.free, _times(self.free, wanted))).ravel()
-        return krylov.solve(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
+        return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
 
     def _apply(self, flat: Array) -> Array:
         change = flat.reshape(*self.scale.shape[:2], 2)

@@ -25,18 +25,15 @@ met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.contact.inputs import NOTHING, Array, creepages, number
+from models.contact.material import Pair
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
 from models.core.errors import RunFailed
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
 
 TOLERANCE = 1e-8
 """Largest residual of a solution."""
@@ -77,7 +74,7 @@ class RollingSolution:
     rounds: int
 
 
-def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: "Pair") -> RollingSolution:
+def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair) -> RollingSolution:
     """Tractions of steady rolling.
 
     Parameters
@@ -97,7 +94,7 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
     return _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, *motion), pair, UPSTREAM)
 
 
-def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: "Pair") -> RollingSolution:
+def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: Pair) -> RollingSolution:
     """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
 
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
@@ -111,7 +108,7 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
     return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
 
 
-def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> RollingSolution:
+def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> RollingSolution:
     """Solution for a rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     pair.require_likeness()
@@ -183,7 +180,7 @@ class _Cells:
         )
 
 
-def _solve(cells: _Cells, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> tuple[_State, int]:
+def _solve(cells: _Cells, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> tuple[_State, int]:
     """Tractions that meet all conditions, and the rounds taken on these cells."""
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, pair, weights)

@@ -13,12 +13,10 @@ import numpy as np
 
 from models.contact import linear_theory
 from models.contact.fastsim import fastsim
-from models.contact.fastsim_fields import fastsim_fields
-from models.contact.fields import Fields
+from models.contact.fields import Fields, fastsim_fields
 from models.contact.hertz import Hertz
-from models.contact.hertz_cells import hertzian
 from models.contact.material import Pair
-from models.contact.normal_problem import NormalSolution, Pressed, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, Pressed, centres, hertzian, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling
 from models.contact.simplified_theory import NormalContact, PatchPressure
 from models.contact.simplified_theory import roll as roll_simplified

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.contact.hertz import by_axes
-from models.contact.hertz_cells import hertzian
 from models.contact.inputs import Array
 from models.contact.material import Material, Pair
-from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
 from models.systems.contact.work_precision import Case
