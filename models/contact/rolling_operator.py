@@ -95,8 +95,23 @@ class FreeSystem:
         """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
         self.operator, self.free, self.stiff = operator, free, stiff[..., None]
         self.scale = 1.0 / (operator.own.max() + self.stiff)  # a cell near the edge is many times stiffer than others
-        self.factors, self.spans = _strip_systems(operator, free, stiff), _spans(np.any(free, axis=(2, 3)))
+        self.factors = self._strips()
+        inside = np.any(free, axis=(2, 3))
+        first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)
+        self.spans = 2 * np.stack([first, np.where(inside.any(axis=1), last, first)], axis=1)
         factor(self.factors, self.spans)
+
+    def _strips(self) -> Array:
+        """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
+
+        On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
+        """
+        free, stiff = self.free, self.stiff[..., None]
+        rows, columns = free.shape[:2]
+        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip, free, optimize=True)
+        index = np.arange(columns)
+        system[:, index, :, index, :] += np.moveaxis((1.0 + stiff) * np.eye(2) - free, 1, 0)
+        return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
 
     def solve(self, wanted: Array, tolerance: float = INNER_TOLERANCE) -> Array:
         """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
@@ -116,21 +131,3 @@ class FreeSystem:
 def _times(matrices: Array, vectors: Array) -> Array:
     """Product of each cell's matrix (..., 2, 2) with its vector (..., 2)."""
     return matrices[..., 0] * vectors[..., :1] + matrices[..., 1] * vectors[..., 1:]
-
-
-def _strip_systems(operator: SlipOperator, free: Array, stiff: Array) -> Array:
-    """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
-
-    On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
-    """
-    rows, columns = stiff.shape
-    system = np.einsum("riab,ibjc,rjcd->riajd", free, operator.strip, free, optimize=True)
-    index = np.arange(columns)
-    system[:, index, :, index, :] += np.moveaxis((1.0 + stiff[..., None, None]) * np.eye(2) - free, 1, 0)
-    return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
-
-
-def _spans(free: Array) -> Array:
-    """Component of every strip's first free cell, and one beyond that of its last, (ny, 2), of cells (ny, nx)."""
-    first, last = free.argmax(axis=1), free.shape[1] - free[:, ::-1].argmax(axis=1)
-    return 2 * np.stack([first, np.where(free.any(axis=1), last, first)], axis=1)
