@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
-from models.contact.fastsim_grid import Bound, grid, strips_of
+from models.contact.fastsim_grid import Bound, nets
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness
 from models.contact.fastsim_many import (
     HALF,
@@ -80,9 +80,7 @@ def derivatives(
     check_choices(cells, bound, flexibilities, "second-order")
     contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
     found, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
-    strips = strips_of(contacts[:, A] / contacts[:, B], cells)
-    for count in np.unique(strips):
-        rows, net = np.flatnonzero(strips == count), grid(cells, int(count), bound)
+    for rows, net in nets(contacts, cells, bound):
         _slopes(contacts, rows, net.strips, net.cells, net.middle, KINDS[flexibilities], found, slopes)
     _to_load(contacts, found, slopes, growing)
     return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))

@@ -5,15 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import (
-    KINDS,
-    MARCHES,
-    Flexibilities,
-    March,
-    check_choices,
-    contacts_of,
-    require_second_order,
-)
+from models.contact.fastsim import KINDS, MARCHES, Flexibilities, March, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, grid, strips_of
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, PLAIN, RATE, advance, cut
 from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_slip
@@ -63,10 +55,10 @@ def fastsim_fields(
     Arrays of the shape (strips, cells in a strip), each strip from its leading edge back. The pressure is that of the
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.
     """
-    check_choices(cells, bound, flexibilities, march)
-    contacts, given = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
-    if given:
-        raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(given), "must be plain numbers: one ellipse")
+    check_choices(cells, bound, flexibilities, march, falling)
+    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
+    if shape:
+        raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(shape), "must be plain numbers: one ellipse")
     contact = contacts[0]
     net = grid(cells, int(strips_of(contact[A] / contact[B], cells)), bound)
     slip = np.zeros(PER_SLIP)
@@ -77,7 +69,6 @@ def fastsim_fields(
         for strip in range(y.size):
             _strip(contact, net.strips[:, strip], net.cells, slip, MARCHES[march], relative[:, strip])
     else:
-        require_second_order(march)
         from models.contact.fastsim_falling import strip_falling
 
         for strip in range(y.size):
