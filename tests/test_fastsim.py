@@ -14,8 +14,7 @@ from models.contact.linear_theory import coefficients, flexibilities
 from models.contact.material import Falling, Pair
 from models.core.errors import InputError
 from validation.cases import fastsim as case
-from validation.contact.friction_limit import most_moment
-from validation.contact.fuzzed_creepage import OPTIONS, contacts, worst
+from validation.contact.fuzzed_creepage import OPTIONS, contacts, most_moment, worst
 
 PAIR = Pair()
 AT = {"a": 6e-3, "b": 4e-3, "load": 80e3, "mu": 0.3, "xi_x": 1e-3, "xi_y": -5e-4, "spin": 0.3}
