@@ -41,7 +41,7 @@ from models.contact.fastsim_many import (
 )
 from models.contact.inputs import Array
 from models.contact.material import Pair
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> Non
     slopes[touching, :, 3] = change / own[:, LOAD, None]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
     """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
     slip, sums, moved, total = np.empty(PER_SLIP), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
@@ -125,7 +125,7 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
                 slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _scale_slopes(own, cells, middle, kind, scale):
     """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
     a, c = own[A], math.sqrt(own[A] * own[B])
@@ -150,7 +150,7 @@ def _scale_slopes(own, cells, middle, kind, scale):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _strip(own, strip, cells, slip, sums, moved):
     """Sums of q_x, q_y, t q_y along one strip, and their derivatives (3, 3) to the three numbers of rigid slip."""
     spread, off, arm = strip[SPREAD], own[B] * strip[Y], own[A] * strip[HALF]
@@ -197,13 +197,13 @@ def _strip(own, strip, cells, slip, sums, moved):
             moved[2, k] += t * dy[k]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _lateness_slope(z):
     """``lateness`` and its derivative."""
     return lateness(z), (0.5 if z < 0.4 else 0.2 if z < 1.75 else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _turning(px, py, u, v, before, rate):
     """What ``advance`` does to a slipping traction: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
     size = math.sqrt(u * u + v * v)

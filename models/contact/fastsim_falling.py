@@ -25,10 +25,10 @@ from models.contact.fastsim_many import (
     rigid_slip,
     touches,
 )
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
@@ -58,7 +58,7 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
             found[c, 3] += half * stuck / (n * area)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def strip_falling(own, strip, cells, slip, floor, decay, found):
     """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``found`` (3, cells)."""
     y, half, spread = strip[Y], strip[HALF], strip[SPREAD]
@@ -81,7 +81,7 @@ def strip_falling(own, strip, cells, slip, floor, decay, found):
         found[0, i], found[1, i], found[2, i] = px, py, slips
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _left(along, across, floor, decay):
     """Share of the friction that is left at a slip."""
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

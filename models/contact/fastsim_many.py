@@ -22,7 +22,7 @@ from models.contact.fastsim_kernels import (
     march_second_order,
 )
 from models.contact.inputs import NOTHING
-from models.machine.compiled import lean, njit
+from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
@@ -41,7 +41,7 @@ SLIDING, MOST = 8.0, 100.0
 """Square of the reach at which creepage without spin slides all over; exponents beyond which nothing changes."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def forces(contacts, strips, cells, middle, kind, march, found):
     """Fill ``found`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
 
@@ -193,7 +193,7 @@ def _collect(lanes, first, count, contacts, strips, slips, found):
             c, s = c + 1, 0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, middle, kind, march):
     """fx, fy, mz of one ellipse of semi-axes a and a ``by_ratio``, flexibilities a (l1, l2, l3); NaN for bad input."""
     contacts, found = np.empty((1, 10)), np.empty((1, 4))

@@ -12,7 +12,7 @@ from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_s
 from models.contact.inputs import Array
 from models.contact.material import Falling, Pair
 from models.core.errors import InputError
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def fastsim_fields(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _strip(own: Any, strip: Any, cells: Any, slip: Any, march: int, found: Any) -> None:
     """Traction by the bound in the strip's middle, along x and y, and slip or not, in ``found`` (3, cells)."""
     half, spread = strip[HALF], strip[SPREAD]

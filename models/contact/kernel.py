@@ -40,7 +40,7 @@ from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, int
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.core.errors import InputError
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.stack import ask, beyond, doubles
 
 (SHAPE_X, SHAPE_Y, PRESSING, FRICTION, CREEP_X, CREEP_Y, TURNING, MODULUS, POISSON) = range(9)
@@ -82,7 +82,7 @@ def net(cells: int) -> Array:
     return table
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def contact(given, inputs, table, outputs):
     """Status of one contact, FINE or another; fills ``outputs``.
 
@@ -107,7 +107,7 @@ def contact(given, inputs, table, outputs):
     return FINE
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _status(given, own, any_shape):
     """Whether the inputs are numbers, and numbers in SI."""
     if not BY_LOAD <= given <= AXES_BY_APPROACH or (any_shape and given != BY_APPROACH):
@@ -136,7 +136,7 @@ def _status(given, own, any_shape):
     return FINE if plausible else NOT_PLAUSIBLE
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _press(given, own, out):
     """Axes, approach and load by Hertz; whether the ellipse is one that the theories of rolling take."""
     x, y, elastic = own[SHAPE_X], own[SHAPE_Y], own[MODULUS] / (1.0 - own[POISSON])
@@ -166,7 +166,7 @@ def _press(given, own, out):
     return rolls and load <= LARGEST_LOAD
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _linear(own, out):
     """Forces as long as nothing slips."""
     a, b, shear = out[AXIS_A], out[AXIS_B], own[MODULUS]
@@ -188,7 +188,7 @@ def _linear(own, out):
     out[STICK] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _creep(own, table, out):
     """FASTSIM on one ellipse: as ``fastsim_many.forces``, all arrays on the stack."""
     head = carray(table, (_ALONG,))

@@ -49,7 +49,7 @@ from models.contact.simplified_kernels import (
 from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.stack import DOUBLES, beyond
 
 _CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
@@ -96,7 +96,7 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
     return made
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def box_at(numbers, head, depth):
     """Rectangle x0, x1, y0, y1 (m) about {h < depth}, as ``Patch.box`` has it."""
     m, n = int(head[_LINES_X]), int(head[_LINES_Y])
@@ -108,7 +108,7 @@ def box_at(numbers, head, depth):
     return x0, x1, y0, y1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def fit_at(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
     head = carray(numbers, (_HEAD,))
@@ -128,7 +128,7 @@ def fit_at(numbers, depth, modulus):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def settle(numbers, approach, modulus):
     """Depth (m), stiffness and sum of W p dA that belong to an approach (m); not a number beyond the table's edge.
 
@@ -164,7 +164,7 @@ def settle(numbers, approach, modulus):
     return math.nan, math.nan, math.nan
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def simplified(inputs, numbers, outputs):
     """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``, of ``inputs`` that ``kernel`` has found fine.
 
@@ -184,7 +184,7 @@ def simplified(inputs, numbers, outputs):
     return NOT_PLAUSIBLE
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _roll(own, numbers, head, depth, stiffness, load, out):
     """Fill ``out`` of the patch at a depth: as ``simplified_theory.roll``."""
     after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
@@ -222,7 +222,7 @@ def _roll(own, numbers, head, depth, stiffness, load, out):
     out[NORMAL], out[APPROACH] = load, own[PRESSING]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def normalise(pressure, low_x, high_x, width, load):
     """Scale the pressure of strips (s, n) to carry the load (N), so that full sliding gives mu N exactly."""
     carried = 0.0

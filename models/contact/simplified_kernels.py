@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from models.contact.distance_kernels import along, row_at, value_and_slopes
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
 """Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
@@ -18,7 +18,7 @@ LEAST = 0.2
 bottom leaves the fit undefined, and this bound keeps it positive."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def overlap_pressure(depth, height, low, shape):
     """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
     over = depth - height
@@ -27,7 +27,7 @@ def overlap_pressure(depth, height, low, shape):
     return over if shape == PARABOLIC else math.sqrt(over * (depth - low))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crude_net(padded, origin, step, box, depth, low, cells, shape):
     """Height, W p and covered share of every mesh (cells, cells), rows along y.
 
@@ -47,7 +47,7 @@ def crude_net(padded, origin, step, box, depth, low, cells, shape):
     return height, pressure, cover
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def resultant(padded, origin, step, box, depth, low, points, shape):
     """Sum of W p dA over the box from points x points midpoints."""
     total = 0.0
@@ -60,7 +60,7 @@ def resultant(padded, origin, step, box, depth, low, points, shape):
     return total * dx * dy
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def corner(x, y):
     """Integral of 1/r over the rectangle from the origin to (x, y), signed (Boussinesq; Johnson, section 3.3)."""
     along = x * math.asinh(y / abs(x)) if x != 0.0 else 0.0
@@ -68,7 +68,7 @@ def corner(x, y):
     return along + across
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def displacement(pressure, dx, dy, modulus):
     """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
     cells = pressure.shape[0]
@@ -93,7 +93,7 @@ def displacement(pressure, dx, dy, modulus):
     return found / (math.pi * modulus)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def covariances(u, h, cover):
     """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
@@ -105,7 +105,7 @@ def covariances(u, h, cover):
     return mean_u, both, square
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def weighted_mean(values, weights):
     """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
     total = weight = 0.0
@@ -115,7 +115,7 @@ def weighted_mean(values, weights):
     return total / weight
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def slope_products(u, h, cover, dx, dy, along_y):
     """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
     product = square = 0.0
@@ -134,7 +134,7 @@ def slope_products(u, h, cover, dx, dy, along_y):
     return product, square
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
 
@@ -153,7 +153,7 @@ def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus
     return stiffness, approach, total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def tangential(traction, dx, dy, nu):
     """Displacement (2, cells, cells) at the meshes' centres by a traction (2, cells, cells), times pi G (Cerruti)."""
     cells = traction.shape[1]
@@ -185,7 +185,7 @@ def tangential(traction, dx, dy, nu):
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def tangential_fit(u, traction, cover, dx, dy, kind):
     """W_1 = W_2 (m/Pa) by least squares of u = W p + a, both (2, cells, cells); 0 where none can be fitted.
 
@@ -202,7 +202,7 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
     return both / square if square > 0.0 and both > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push(x, y, force, at_x, at_y):
     """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
 
@@ -216,7 +216,7 @@ def push(x, y, force, at_x, at_y):
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def drag(x, y, force, at_x, at_y, nu):
     """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
     found = np.zeros((2, at_x.size))
@@ -230,7 +230,7 @@ def drag(x, y, force, at_x, at_y, nu):
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
 
@@ -268,7 +268,7 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crossing(row, depth, inner, outer):
     """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
     at_inner, at_outer = along(row, inner) - depth, along(row, outer) - depth
@@ -289,7 +289,7 @@ def crossing(row, depth, inner, outer):
     return middle
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
     """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
 
@@ -319,7 +319,7 @@ def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, 
     return fx, fy, mz, stuck, area
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def step_on(px, py, u, v, bound, middle, slips):
     """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
 
@@ -342,7 +342,7 @@ def step_on(px, py, u, v, bound, middle, slips):
     return bound * x / size, bound * y / size, True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gather(y, low_x, high_x, width, traction, box, cells):
     """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
     found = np.zeros((2, cells, cells))

@@ -32,6 +32,10 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
     return lambda function: _kept_apart(numba.njit(**{"_nrt": True, **options})(function))
 
 
+compiled = njit(cache=True, error_model="numpy")
+"""``njit`` with numpy's rules where a number is divided by zero; kept on disk."""
+
+
 def lean(function: Callable) -> Any:
     """``njit`` for a function that makes no array: it counts no references to those it gets, and is kept on disk.
 

@@ -11,7 +11,7 @@ from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
 from models.contact.material import Pair
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
 from validation.common.rows import Row, System, aim
 
@@ -124,7 +124,7 @@ def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.nda
     return dict(zip(jobs, seconds.T, strict=True))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _bound(values, repeats):
     """A root and a division per element, each independent of all others, in vector registers."""
     total = 0.0
@@ -142,13 +142,13 @@ def _zeros(count: int) -> np.ndarray:
     return room[first : first + count]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _plain(lanes, cells, repeats):
     for _ in range(repeats):
         march_plain(lanes, cells)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _second(lanes, cells, repeats):
     for _ in range(repeats):
         march_second_order(lanes, cells)
