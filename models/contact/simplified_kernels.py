@@ -119,16 +119,12 @@ def weighted_mean(values, weights):
 def slope_products(u, h, cover, dx, dy, along_y):
     """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
     product = square = 0.0
-    rows, columns = u.shape
-    for j in range(rows):
-        for i in range(columns - 1):
-            w, du, dh = cover[j, i] * cover[j, i + 1], (u[j, i + 1] - u[j, i]) / dx, (h[j, i + 1] - h[j, i]) / dx
-            product += w * du * dh
-            square += w * du * du
-    if along_y:
-        for j in range(rows - 1):
-            for i in range(columns):
-                w, du, dh = cover[j, i] * cover[j + 1, i], (u[j + 1, i] - u[j, i]) / dy, (h[j + 1, i] - h[j, i]) / dy
+    for down in range(2 if along_y else 1):
+        right, step = 1 - down, dy if down else dx
+        for j in range(u.shape[0] - down):
+            for i in range(u.shape[1] - right):
+                w = cover[j, i] * cover[j + down, i + right]
+                du, dh = (u[j + down, i + right] - u[j, i]) / step, (h[j + down, i + right] - h[j, i]) / step
                 product += w * du * dh
                 square += w * du * du
     return product, square
