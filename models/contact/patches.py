@@ -8,6 +8,7 @@ with the load, so nothing jumps when two areas of contact grow together.
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,11 @@ class Patch:
         """Position x, y of the least distance (m), and that distance (m)."""
         lines, least, where = self.distance.valley_y
         k = int(np.argmin(least))
-        return _lowest(self.distance, float(where[k]), float(lines[k]))
+        x, y = float(where[k]), float(lines[k])
+        for _ in range(3):  # the parabola through three lines, in turn
+            x = _vertex(self.distance, x, y, 0)
+            y = _vertex(self.distance, x, y, 1)
+        return x, y, float(self.distance.at(np.array(x), np.array(y)))
 
     @property
     def low(self) -> float:
@@ -59,11 +64,25 @@ class Patch:
 
     @cached_property
     def lines(self) -> tuple[Table, Table]:
-        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola."""
-        return tuple(
-            _rooted(valley[0], valley[1], at, self.low)
-            for valley, at in ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1]))
-        )  # type: ignore[return-value]
+        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola.
+
+        The bottom itself is one more line.
+        """
+        tables = []
+        for (lines, least, _), bottom in zip(
+            (self.distance.valley_x, self.distance.valley_y), self.bottom, strict=False
+        ):
+            k, roots = int(np.searchsorted(lines, bottom)), np.sqrt(np.maximum(least - self.low, 0.0))
+            tables.append((np.insert(lines, k, bottom), np.insert(roots, k, 0.0)))
+        return tables[0], tables[1]
+
+    def surface(self, depth: float) -> tuple[Any, ...]:
+        """What compiled functions read of the patch at a depth (m): padded heights, first node and spacing along x and
+        y, box, depth and least distance.
+        """
+        known = self.distance
+        origin = float(known.x[0]), float(known.y[0])
+        return known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low
 
     def box(self, depth: float) -> Box:
         """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.
@@ -147,17 +166,9 @@ def ridges(heights: Array, least: float) -> list[int]:
     return found
 
 
-def _lowest(distance: Distance, x: float, y: float) -> tuple[float, float, float]:
-    """Position and value of the minimum near x, y: the parabola through three lines, in turn, a few times."""
-    for _ in range(3):
-        x, y = (_vertex(distance, x, y, distance.dx, 0), y)
-        x, y = (x, _vertex(distance, x, y, distance.dy, 1))
-    return x, y, float(distance.at(np.array(x), np.array(y)))
-
-
-def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> float:
+def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
     """Minimum along an axis of the parabola through three points near by; the place itself if there is none."""
-    nodes, here = (distance.y, y) if axis else (distance.x, x)
+    nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step
     left, centre, right = distance.at(points if not axis else np.full(3, x), np.full(3, y) if not axis else points)
@@ -166,10 +177,3 @@ def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> f
         return here
     moved = middle - 0.125 * step * (right - left) / curvature
     return float(min(max(moved, points[0]), points[2]))
-
-
-def _rooted(lines: Array, least: Array, bottom: float, low: float) -> Table:
-    """Lines and the root of their height above the bottom, with the bottom itself as one more line."""
-    k = int(np.searchsorted(lines, bottom))
-    roots = np.sqrt(np.maximum(least - low, 0.0))
-    return np.insert(lines, k, bottom), np.insert(roots, k, 0.0)

@@ -70,10 +70,9 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     empty = Net(nothing + x, nothing + y + patch.place, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
     if depth <= low:
         return empty
-    known, box = patch.distance, patch.box(depth)
-    net = (known.padded, (float(known.x[0]), float(known.y[0])), (known.dx, known.dy), box, depth, low)
-    height, pressure, cover = crude_net(*net, cells, shape)
-    volume = float(resultant(*net, FINER * cells, shape))
+    surface, box = patch.surface(depth), patch.box(depth)
+    height, pressure, cover = crude_net(*surface, cells, shape)
+    volume = float(resultant(*surface, FINER * cells, shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
     dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
