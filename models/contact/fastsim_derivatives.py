@@ -82,19 +82,14 @@ def derivatives(
     found, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
     for rows, net in nets(contacts, cells, bound):
         _slopes(contacts, rows, net.strips, net.cells, net.middle, KINDS[flexibilities], found, slopes)
-    _to_load(contacts, found, slopes, growing)
-    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
-
-
-def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> None:
-    """Fill in the derivatives to the load from those to the creepages."""
     touching = (contacts[:, LOAD] > 0.0) & (contacts[:, MU] > 0.0)
-    own, moving = contacts[touching], slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
+    moving = slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
     if growing:  # fx / N is a function of xi N^(-1/3) and spin, mz / N^(4/3) as well
         change = found[touching] * np.array([1.0, 1.0, 4.0 / 3.0]) - moving[:, :, :2].sum(axis=2) / 3.0
     else:
         change = found[touching] - moving.sum(axis=2)
-    slopes[touching, :, 3] = change / own[:, LOAD, None]
+    slopes[touching, :, 3] = change / contacts[touching, LOAD, None]
+    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
 
 
 @compiled
@@ -169,7 +164,8 @@ def _strip(own, strip, cells, slip, sums, moved):
         else:
             x, y, now = advance(px, py, slips, u, v, v1 * change, g, cells[BEFORE, i], cells[RATE, i])
         turns = slips * (u * u + v * v) > STILL
-        late, steep = _lateness_slope((abs(u) + abs(v)) * cells[RATE, i]) if turns else (0.0, 0.0)
+        reach = (abs(u) + abs(v)) * cells[RATE, i] if turns else 0.0
+        late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
             kept, pull, size = _turning(px, py, u, w, cells[BEFORE, i], cells[RATE, i])
@@ -195,12 +191,6 @@ def _strip(own, strip, cells, slip, sums, moved):
             moved[0, k] += dx[k]
             moved[1, k] += dy[k]
             moved[2, k] += t * dy[k]
-
-
-@compiled
-def _lateness_slope(z):
-    """``lateness`` and its derivative."""
-    return lateness(z), (0.5 if z < 0.4 else 0.2 if z < 1.75 else 0.0)
 
 
 @compiled

@@ -171,20 +171,12 @@ def _linear(own, out):
     """Forces as long as nothing slips."""
     a, b, shear = out[AXIS_A], out[AXIS_B], own[MODULUS]
     area, ratio, nu = a * b, a / b, own[POISSON]
-    along = across = mixed = turn = 0.0
+    c = carray(doubles(4), (4,))
     for kind in range(4):  # a loop, as numba compiles one function for each number that is written out
-        c = coefficient_at(kind, ratio, nu)
-        if kind == 0:
-            along = c
-        elif kind == 1:
-            across = c
-        elif kind == 2:
-            mixed = c
-        else:
-            turn = c
-    out[FX] = -shear * area * along * own[CREEP_X]
-    out[FY] = -shear * (area * across * own[CREEP_Y] + area**1.5 * mixed * own[TURNING])
-    out[MZ] = shear * (area**1.5 * mixed * own[CREEP_Y] - area**2 * turn * own[TURNING])
+        c[kind] = coefficient_at(kind, ratio, nu)
+    out[FX] = -shear * area * c[0] * own[CREEP_X]
+    out[FY] = -shear * (area * c[1] * own[CREEP_Y] + area**1.5 * c[2] * own[TURNING])
+    out[MZ] = shear * (area**1.5 * c[2] * own[CREEP_Y] - area**2 * c[3] * own[TURNING])
     out[STICK] = 1.0
 
 

@@ -105,7 +105,8 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple
     spin = quantity("spin", spin, "a spin in 1/m")
     xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
     a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
-    c, area = coefficients(_ratio(a, b), pair.nu), a * b
+    ratio = np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))  # 1 where nothing touches
+    c, area = coefficients(ratio, pair.nu), a * b
     fy = -pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
     mz = pair.G * (area**1.5 * c.c23 * xi_y - area**2 * c.c33 * spin)
     return -pair.G * area * c.c11 * xi_x, fy, mz
@@ -130,11 +131,6 @@ def _axes(a: Any, b: Any) -> tuple[Array, ...]:
     a, b = together(a=a, b=b)
     quantity("sqrt(a b)", np.sqrt(a * b), f"at most {LARGEST_PATCH:g} m; axes are in m, not in mm", 0.0, LARGEST_PATCH)
     return a, b
-
-
-def _ratio(a: Array, b: Array) -> Array:
-    """a/b, and 1 where nothing touches."""
-    return np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))
 
 
 @njit(cache=True)
@@ -195,12 +191,19 @@ def _tabulated(kind: int, ratio: float, nu: float) -> float:
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    s, power, found = 4.0 * nu, POWERS[kind], 0.0
-    for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
+    power, found = POWERS[kind], 0.0
+    for k, weight in enumerate(_parabola(nu)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
         found += weight * math.exp(power * logarithm)
     return found ** (1.0 / power)
+
+
+@njit(cache=True)
+def _parabola(nu: float) -> tuple[float, float, float]:
+    """Weights of the values at nu = 0, 1/4 and 1/2."""
+    s = 4.0 * nu
+    return (1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0
 
 
 @njit(cache=True)
@@ -226,15 +229,9 @@ def _long(kind: int, ratio: float, nu: float) -> float:
         return 2.0 * math.pi * ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
     if kind == 2:
         return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
-    return _long_c33(ratio, nu)
-
-
-@njit(cache=True)
-def _long_c33(ratio: float, nu: float) -> float:
-    """C33 of a long patch: ln C33 linear in ln(a/b) between its nodes and on beyond, its power a parabola of nu."""
     i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
     t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
-    s, power, found = 4.0 * nu, POWERS[3], 0.0
-    for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
+    power, found = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
+    for k, weight in enumerate(_parabola(nu)):
         found += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
     return found ** (1.0 / power)
