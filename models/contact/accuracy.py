@@ -92,7 +92,7 @@ def left(contact: Contact, motion: Motion, cells: int, fine: Rolled) -> tuple[fl
     if limit == 0.0:
         return 0.0, 0.0
     coarse = contact.roll(motion, halved(cells))
-    here, there = (np.array([one.fx, one.fy, one.mz / contact.lever]) / limit for one in (fine, coarse))
+    here, there = (np.array([creep.fx, creep.fy, creep.mz / contact.lever]) / limit for creep in (fine, coarse))
     error = limit * float(cells_error(here, there, cells, contact.order))
     return error, contact.lever * error
 

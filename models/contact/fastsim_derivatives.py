@@ -98,16 +98,16 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
     slip, sums, moved, total = np.empty(PER_SLIP), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     scale = np.empty((3, 3))
     for c in rows:
-        own = contacts[c]
-        if not touches(own):
+        contact = contacts[c]
+        if not touches(contact):
             continue
-        rigid_slip(own, cells.shape[1], middle, kind, slip)
-        _scale_slopes(own, cells.shape[1], middle, kind, scale)
+        rigid_slip(contact, cells.shape[1], middle, kind, slip)
+        _scale_slopes(contact, cells.shape[1], middle, kind, scale)
         total[:] = 0.0
         for s in range(strips.shape[1]):
-            _strip(own, strips[:, s], cells, slip, sums, moved)
-            part = own[MU] * own[LOAD] * strips[PART, s]
-            arm, off = own[A] * strips[HALF, s], own[B] * strips[Y, s]
+            _strip(contact, strips[:, s], cells, slip, sums, moved)
+            part = contact[MU] * contact[LOAD] * strips[PART, s]
+            arm, off = contact[A] * strips[HALF, s], contact[B] * strips[Y, s]
             found[c, 0] += part * sums[0]
             found[c, 1] += part * sums[1]
             found[c, 2] += part * (arm * sums[2] - off * sums[0])
@@ -121,34 +121,34 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
 
 
 @compiled
-def _scale_slopes(own, cells, middle, kind, scale):
+def _scale_slopes(contact, cells, middle, kind, scale):
     """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
-    a, c = own[A], math.sqrt(own[A] * own[B])
-    bound = own[MU] * middle * own[LOAD] / (a * own[B])
-    step, creep = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c)
-    k, change = stiffness(own, bound, kind), np.zeros(3)
-    blended = blend(own, bound, kind)
+    a, c = contact[A], math.sqrt(contact[A] * contact[B])
+    bound = contact[MU] * middle * contact[LOAD] / (a * contact[B])
+    step, creep = 2.0 * a / (cells * bound), (contact[XI_X], contact[XI_Y], contact[SPIN] * c)
+    k, change = stiffness(contact, bound, kind), np.zeros(3)
+    blended = blend(contact, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
-    mean = mean_flexibility(own, creep[2], kind)
+    mean = mean_flexibility(contact, creep[2], kind)
     for j in range(3):
         unit = c if j == 2 else 1.0
         if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
             if kind == ONE:
-                d_mean = (sign * own[L1 + j] - mean * creep[j] / size) / size
+                d_mean = (sign * contact[L1 + j] - mean * creep[j] / size) / size
             else:
-                d_mean = 2.0 * creep[j] * (own[L1 + j] - mean) / (size * size)
+                d_mean = 2.0 * creep[j] * (contact[L1 + j] - mean) / (size * size)
             d_one = -d_mean / (mean * mean)
             for i in range(3):
-                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / own[L1 + i]) + blended[0] * d_one)
+                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / contact[L1 + i]) + blended[0] * d_one)
         for i in range(3):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
 
 
 @compiled
-def _strip(own, strip, cells, slip, sums, moved):
+def _strip(contact, strip, cells, slip, sums, moved):
     """Sums of q_x, q_y, t q_y along one strip, and their derivatives (3, 3) to the three numbers of rigid slip."""
-    spread, off, arm = strip[SPREAD], own[B] * strip[Y], own[A] * strip[HALF]
+    spread, off, arm = strip[SPREAD], contact[B] * strip[Y], contact[A] * strip[HALF]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
     dx, dy = np.zeros(3), np.zeros(3)

@@ -29,7 +29,7 @@ from models.machine.compiled import compiled
 
 
 @compiled
-def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
+def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
     slip, tractions = np.empty(PER_SLIP), np.empty((3, n))
@@ -37,14 +37,14 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
     for s in range(m):
         area += strips[HALF, s]
     for c in range(len(contacts)):
-        own = contacts[c]
-        found[c] = 0.0
-        if not touches(own):
+        contact = contacts[c]
+        answers[c] = 0.0
+        if not touches(contact):
             continue
-        rigid_slip(own, n, middle, kind, slip)
-        limit = own[MU] * own[LOAD]
+        rigid_slip(contact, n, middle, kind, slip)
+        limit = contact[MU] * contact[LOAD]
         for s in range(m):
-            strip_falling(own, strips[:, s], cells, slip, floor, decay, tractions)
+            strip_falling(contact, strips[:, s], cells, slip, floor, decay, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
@@ -52,19 +52,23 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
                 turn += cells[CENTRE, i] * tractions[1, i]
                 stuck += 1.0 - tractions[2, i]
             part, half = limit * strips[PART, s], strips[HALF, s]
-            found[c, 0] += part * x
-            found[c, 1] += part * y
-            found[c, 2] += part * (own[A] * half * turn - own[B] * strips[Y, s] * x)
-            found[c, 3] += half * stuck / (n * area)
+            answers[c, 0] += part * x
+            answers[c, 1] += part * y
+            answers[c, 2] += part * (contact[A] * half * turn - contact[B] * strips[Y, s] * x)
+            answers[c, 3] += half * stuck / (n * area)
 
 
 @compiled
-def strip_falling(own, strip, cells, slip, floor, decay, found):
-    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``found`` (3, cells)."""
+def strip_falling(contact, strip, cells, slip, floor, decay, answers):
+    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells)."""
     y, half, spread = strip[Y], strip[HALF], strip[SPREAD]
-    u, v0 = spread * (slip[0] - slip[2] * own[B] * y), spread * slip[1]
-    v1 = spread * slip[2] * own[A] * half
-    along, across, turn = own[XI_X] - own[SPIN] * own[B] * y, own[XI_Y], own[SPIN] * own[A] * half
+    u, v0 = spread * (slip[0] - slip[2] * contact[B] * y), spread * slip[1]
+    v1 = spread * slip[2] * contact[A] * half
+    along, across, turn = (
+        contact[XI_X] - contact[SPIN] * contact[B] * y,
+        contact[XI_Y],
+        contact[SPIN] * contact[A] * half,
+    )
     change, last = -2.0 / cells.shape[1], 0.0
     px = py = slips = 0.0
     for i in range(cells.shape[1]):
@@ -78,7 +82,7 @@ def strip_falling(own, strip, cells, slip, floor, decay, found):
             rate = cells[RATE, i] / middle
             px, py, slips = advance(px, py, slips, u, v, v1 * change, g, last * cells[BEFORE, i], rate)
         last = here
-        found[0, i], found[1, i], found[2, i] = px, py, slips
+        answers[0, i], answers[1, i], answers[2, i] = px, py, slips
 
 
 @compiled

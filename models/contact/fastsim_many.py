@@ -42,22 +42,22 @@ SLIDING, MOST = 8.0, 100.0
 
 
 @compiled
-def forces(contacts, strips, cells, middle, kind, march, found):
-    """Fill ``found`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
+def forces(contacts, strips, cells, middle, kind, march, answers):
+    """Fill ``answers`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
 
     contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
     march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
     """
     slips, lanes = np.empty((len(contacts), PER_SLIP)), np.empty(ROOM)
-    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found)
+    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers)
 
 
 @lean
-def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found):
+def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers):
     """``forces`` that makes no array: slips (n, PER_SLIP) and lanes (ROOM,) are room to work in."""
     for c in range(len(contacts)):
         rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
-        found[c, 0] = found[c, 1] = found[c, 2] = found[c, 3] = 0.0
+        answers[c, 0] = answers[c, 1] = answers[c, 2] = answers[c, 3] = 0.0
     m = strips.shape[1]
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
@@ -66,13 +66,13 @@ def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, fo
             march_second_order(lanes, cells)
         else:
             march_plain(lanes, cells)
-        _collect(lanes, first, count, contacts, strips, slips, found)
+        _collect(lanes, first, count, contacts, strips, slips, answers)
     area = 0.0
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
         area += strips[HALF, s] * cells.shape[1]
     for c in range(len(contacts)):
         if touches(contacts[c]):
-            found[c, 3] = 1.0 - found[c, 3] / area
+            answers[c, 3] = 1.0 - answers[c, 3] / area
 
 
 @lean
@@ -105,8 +105,8 @@ def stiffness(contact, bound, kind):
     part = blend(contact, bound, kind)[0]
     if part == 0.0:
         return k1, k2, k3
-    one = 1.0 / mean_flexibility(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]), kind)
-    return k1 + part * (one - k1), k2 + part * (one - k2), k3 + part * (one - k3)
+    mean = 1.0 / mean_flexibility(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]), kind)
+    return k1 + part * (mean - k1), k2 + part * (mean - k2), k3 + part * (mean - k3)
 
 
 @lean
@@ -176,18 +176,18 @@ def _fill(lanes, first, count, contacts, strips, slips):
 
 
 @lean
-def _collect(lanes, first, count, contacts, strips, slips, found):
+def _collect(lanes, first, count, contacts, strips, slips, answers):
     """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
     c, s = first // strips.shape[1], first % strips.shape[1]
     for j in range(count):
         if touches(contacts[c]):
             part, half = contacts[c, MU] * contacts[c, LOAD] * strips[PART, s], strips[HALF, s]
             x = lanes[SUM_X * LANES + j]
-            found[c, 0] += part * x
-            found[c, 1] += part * lanes[SUM_Y * LANES + j]
+            answers[c, 0] += part * x
+            answers[c, 1] += part * lanes[SUM_Y * LANES + j]
             arm, off = contacts[c, A] * half, contacts[c, B] * strips[Y, s]
-            found[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
-            found[c, 3] += half * lanes[SLID * LANES + j]
+            answers[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
+            answers[c, 3] += half * lanes[SLID * LANES + j]
         s += 1
         if s == strips.shape[1]:
             c, s = c + 1, 0
@@ -196,13 +196,13 @@ def _collect(lanes, first, count, contacts, strips, slips, found):
 @compiled
 def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, middle, kind, march):
     """fx, fy, mz of one ellipse of semi-axes a and a ``by_ratio``, flexibilities a (l1, l2, l3); NaN for bad input."""
-    contacts, found = np.empty((1, 10)), np.empty((1, 4))
+    contacts, answers = np.empty((1, 10)), np.empty((1, 4))
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
     own = contacts[0]
     own[A], own[B], own[LOAD], own[MU] = a, a * by_ratio, load, mu
     own[XI_X], own[XI_Y], own[SPIN] = xi_x, xi_y, spin
     own[L1], own[L2], own[L3] = a * l1, a * l2, a * l3
-    forces(contacts, strips, cells, middle, kind, march, found)
+    forces(contacts, strips, cells, middle, kind, march, answers)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
-    return found[0, 0] + bad, found[0, 1] + bad, found[0, 2] + bad
+    return answers[0, 0] + bad, answers[0, 1] + bad, answers[0, 2] + bad

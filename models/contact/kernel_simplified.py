@@ -160,13 +160,13 @@ def simplified(inputs, numbers, outputs):
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
     """
-    own, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
+    values, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
     out[:] = 0.0
-    if own[PRESSING] <= head[_LOW]:
+    if values[PRESSING] <= head[_LOW]:
         return FINE
-    depth, stiffness, volume = settle(numbers, own[PRESSING], own[MODULUS] / (1.0 - own[POISSON]))
+    depth, stiffness, volume = settle(numbers, values[PRESSING], values[MODULUS] / (1.0 - values[POISSON]))
     if stiffness * volume > 0.0:
-        _roll(own, numbers, head, depth, stiffness, stiffness * volume, out)
+        _roll(values, numbers, head, depth, stiffness, stiffness * volume, out)
     if math.isfinite(stiffness * volume + out[FX] + out[FY] + out[MZ]):
         return FINE
     out[:] = math.nan
@@ -174,10 +174,10 @@ def simplified(inputs, numbers, outputs):
 
 
 @compiled
-def _roll(own, numbers, head, depth, stiffness, load, out):
+def _roll(values, numbers, head, depth, stiffness, load, out):
     """Fill ``out`` of the patch at a depth: as ``simplified_theory.roll``."""
     surface = surface_at(numbers, depth)
-    box, cells, net, shear = surface[3], -int(head[_CELLS]), int(head[_NET]), own[MODULUS]
+    box, cells, net, shear = surface[3], -int(head[_CELLS]), int(head[_NET]), values[MODULUS]
     y, low_x, high_x, pressure = strips(*surface, cells, cells, int(head[_SHAPE]))
     width = (box[3] - box[2]) / cells
     normalise(pressure, low_x, high_x, width, load)
@@ -188,16 +188,16 @@ def _roll(own, numbers, head, depth, stiffness, load, out):
             crude = gather(y, low_x, high_x, width, traction, box, net)
             dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
             cover = crude_net(*surface, net, PARABOLIC)[2]
-            u = tangential(crude, dx, dy, own[POISSON]) / (math.pi * shear)
+            u = tangential(crude, dx, dy, values[POISSON]) / (math.pi * shear)
             fitted = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
             flexibility = fitted if fitted > 0.0 else flexibility
-        motion = own[CREEP_X], own[CREEP_Y], own[TURNING]
+        motion = values[CREEP_X], values[CREEP_Y], values[TURNING]
         fx, fy, mz, stuck, area = march(
-            y, low_x, high_x, width, pressure, own[FRICTION], flexibility, *motion, traction
+            y, low_x, high_x, width, pressure, values[FRICTION], flexibility, *motion, traction
         )
     out[FX], out[FY], out[MZ], out[STICK] = fx, fy, mz, stuck / area
     out[AXIS_A], out[AXIS_B] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
-    out[NORMAL], out[APPROACH] = load, own[PRESSING]
+    out[NORMAL], out[APPROACH] = load, values[PRESSING]
 
 
 @compiled

@@ -90,8 +90,8 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
     ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    found = _each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
-    return Coefficients(*(values[()] for values in found))
+    answer = _each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    return Coefficients(*(values[()] for values in answer))
 
 
 def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple[Array, Array, Array]:
@@ -122,8 +122,8 @@ def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
     """
     pair.require_likeness()
     a, b = _axes(a, b)
-    found = _flexible(a.flatten(), b.flatten(), pair.G, pair.nu).reshape(3, *a.shape)
-    return found[0][()], found[1][()], found[2][()]
+    answer = _flexible(a.flatten(), b.flatten(), pair.G, pair.nu).reshape(3, *a.shape)
+    return answer[0][()], answer[1][()], answer[2][()]
 
 
 def _axes(a: Any, b: Any) -> tuple[Array, ...]:
@@ -135,19 +135,19 @@ def _axes(a: Any, b: Any) -> tuple[Array, ...]:
 
 @njit(cache=True)
 def _each(ratio: Array, nu: Array) -> Array:
-    found = np.empty((4, ratio.size))
+    answer = np.empty((4, ratio.size))
     for i in range(ratio.size):
         for kind in range(4):
-            found[kind, i] = coefficient_at(kind, ratio[i], nu[i])
-    return found
+            answer[kind, i] = coefficient_at(kind, ratio[i], nu[i])
+    return answer
 
 
 @njit(cache=True)
 def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
-    found = np.empty((3, a.size))
+    answer = np.empty((3, a.size))
     for i in range(a.size):
-        found[0, i], found[1, i], found[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
-    return found
+        answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
+    return answer
 
 
 @njit(cache=True)
@@ -172,13 +172,13 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
 def coefficient_at(kind: int, ratio: float, nu: float) -> float:
     """One of C11, C22, C23, C33 (kind 0 to 3) of one patch; for compiled callers, nothing is checked."""
     inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
-    found = _tabulated(kind, inner, nu)
+    answer = _tabulated(kind, inner, nu)
     if inner == ratio:
-        return found
+        return answer
     if ratio < 1.0:
-        excess = found / _narrow(kind, inner, nu) - 1.0
+        excess = answer / _narrow(kind, inner, nu) - 1.0
         return _narrow(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = found / _long(kind, inner, nu) - 1.0
+    excess = answer / _long(kind, inner, nu) - 1.0
     return _long(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
 
 
@@ -191,12 +191,12 @@ def _tabulated(kind: int, ratio: float, nu: float) -> float:
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    power, found = POWERS[kind], 0.0
+    power, answer = POWERS[kind], 0.0
     for k, weight in enumerate(_parabola(nu)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
-        found += weight * math.exp(power * logarithm)
-    return found ** (1.0 / power)
+        answer += weight * math.exp(power * logarithm)
+    return answer ** (1.0 / power)
 
 
 @njit(cache=True)
@@ -231,7 +231,7 @@ def _long(kind: int, ratio: float, nu: float) -> float:
         return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
     i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
     t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
-    power, found = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
+    power, answer = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
     for k, weight in enumerate(_parabola(nu)):
-        found += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
-    return found ** (1.0 / power)
+        answer += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
+    return answer ** (1.0 / power)

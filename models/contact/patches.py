@@ -149,7 +149,7 @@ def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tu
 
 def ridges(heights: Array, least: float) -> list[int]:
     """Indices of the maxima of a line that rise more than ``least`` above the valleys on both sides."""
-    found: list[int] = []
+    maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
     for k, height in enumerate(heights):
@@ -161,9 +161,9 @@ def ridges(heights: Array, least: float) -> list[int]:
             top, at = height, k
         elif height < top - least:
             if at > 0:
-                found.append(at)
+                maxima.append(at)
             climbed, low = False, height
-    return found
+    return maxima
 
 
 def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:

@@ -131,11 +131,11 @@ def _check_rough(y: Array, keep: slice, file: object) -> None:
 
 def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
     """Coordinate at even lengths: interpolated, then the curve that minimises error^2 + (L / 2 pi)^4 curvature^2."""
-    found = CubicSpline(length, values)(even)
+    interpolated = CubicSpline(length, values)(even)
     if smoothing == 0.0:
-        return found
+        return interpolated
     penalty = (smoothing / (2.0 * np.pi)) ** 4 / (even[1] - even[0])
-    return make_smoothing_spline(even, found, lam=penalty)(even)
+    return make_smoothing_spline(even, interpolated, lam=penalty)(even)
 
 
 def _ascending(y: Array) -> slice:

@@ -20,10 +20,10 @@ def sweep(traction, rigid, kernel, bound, relaxation):
                 continue
             slip_x, slip_y = rigid[0, row, column], rigid[1, row, column]
             first = columns - 1 - column
-            for other in range(rows):
-                k = rows - 1 - row + other
+            for line in range(rows):
+                k = rows - 1 - row + line
                 for i in range(columns):
-                    p_x, p_y = traction[0, other, i], traction[1, other, i]
+                    p_x, p_y = traction[0, line, i], traction[1, line, i]
                     cross = kernel[1, k, first + i]
                     slip_x += kernel[0, k, first + i] * p_x + cross * p_y
                     slip_y += cross * p_x + kernel[2, k, first + i] * p_y

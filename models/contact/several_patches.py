@@ -106,15 +106,15 @@ def _by(source: Net, target: Net, pair: Pair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
         return displacement(source.pressure, *source.step, pair.modulus)
-    found = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
-    return found.reshape(target.x.shape) / (np.pi * pair.modulus)
+    answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
+    return answer.reshape(target.x.shape) / (np.pi * pair.modulus)
 
 
-def _product(net: Net, one: Array, other: Array, kind: int) -> float:
+def _product(net: Net, first: Array, second: Array, kind: int) -> float:
     """What least squares sum up: products of the slopes, or of what differs from the mean."""
     if kind == GRADIENT:
-        return float(slope_products(one, other, net.cover, *net.step, True)[0])
-    return float(covariances(one, other, net.cover)[1])
+        return float(slope_products(first, second, net.cover, *net.step, True)[0])
+    return float(covariances(first, second, net.cover)[1])
 
 
 def settled(
@@ -130,12 +130,12 @@ def settled(
     unit = float(start[-1] - lows.min())
 
     def state(over: Array) -> tuple[Array, Array, Array, Array]:
-        *depths, approach = found = zero + unit * over
+        *depths, approach = answer = zero + unit * over
         nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
-        stiffness, reached = together(nets, pair, kind, lows, found[:-1])
+        stiffness, reached = together(nets, pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
-        return np.append((reached - approach * along) / unit, last), found, stiffness, loads
+        return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
 
     for method, factor, share in TRIES:
         solved = root(
@@ -144,18 +144,18 @@ def settled(
             method=method,
             options={"xtol": 1e-14, "factor": factor},
         )
-        off, found, stiffness, loads = state(solved.x)
+        off, answer, stiffness, loads = state(solved.x)
         if np.abs(off).max() <= CLOSE:
-            return found, stiffness, loads
-    raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
+            return answer, stiffness, loads
+    raise RunFailed("simplified theory", f"patches at an approach near {answer[-1]:.4g} m did not settle")
 
 
 def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, pair: Pair) -> Array:
     """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
-    found, target = np.zeros_like(tractions[k]), nets[k]
+    answer, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:
             forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
             places = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
-            found += drag(*places[:2], forces, *places[2:], pair.nu).reshape(found.shape) / (np.pi * pair.G)
-    return found
+            answer += drag(*places[:2], forces, *places[2:], pair.nu).reshape(answer.shape) / (np.pi * pair.G)
+    return answer

@@ -81,7 +81,7 @@ def displacement(pressure, dx, dy, modulus):
         for i in range(2 * cells - 1):
             k = abs(i - cells + 1)
             influence[j, i] = edges[j + 1, k + 1] - edges[j + 1, k] - edges[j, k + 1] + edges[j, k]
-    found = np.zeros((cells, cells))
+    sums = np.zeros((cells, cells))
     for row in range(cells):
         for column in range(cells):
             p = pressure[row, column]
@@ -89,8 +89,8 @@ def displacement(pressure, dx, dy, modulus):
                 for j in range(cells):
                     k, first = abs(j - row), cells - 1 - column
                     for i in range(cells):
-                        found[j, i] += influence[k, first + i] * p
-    return found / (math.pi * modulus)
+                        sums[j, i] += influence[k, first + i] * p
+    return sums / (math.pi * modulus)
 
 
 @compiled
@@ -168,7 +168,7 @@ def tangential(traction, dx, dy, nu):
             influence[0, j, i] = (1.0 - nu) * whole[0] + whole[1]
             influence[1, j, i] = whole[0] + (1.0 - nu) * whole[1]
             influence[2, j, i] = nu * whole[2] if i >= cells - 1 else -nu * whole[2]
-    found = np.zeros((2, cells, cells))
+    sums = np.zeros((2, cells, cells))
     for row in range(cells):
         for column in range(cells):
             px, py = traction[0, row, column], traction[1, row, column]
@@ -176,9 +176,9 @@ def tangential(traction, dx, dy, nu):
                 k, first, side = abs(j - row), cells - 1 - column, 1.0 if j >= row else -1.0
                 for i in range(cells):
                     across = side * influence[2, k, first + i]
-                    found[0, j, i] += influence[0, k, first + i] * px + across * py
-                    found[1, j, i] += across * px + influence[1, k, first + i] * py
-    return found
+                    sums[0, j, i] += influence[0, k, first + i] * px + across * py
+                    sums[1, j, i] += across * px + influence[1, k, first + i] * py
+    return sums
 
 
 @compiled
@@ -204,26 +204,26 @@ def push(x, y, force, at_x, at_y):
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
     """
-    found = np.zeros(at_x.size)
+    sums = np.zeros(at_x.size)
     for k in range(at_x.size):
         for m in range(x.size):
             if force[m] > 0.0:
-                found[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
-    return found
+                sums[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
+    return sums
 
 
 @compiled
 def drag(x, y, force, at_x, at_y, nu):
     """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
-    found = np.zeros((2, at_x.size))
+    sums = np.zeros((2, at_x.size))
     for k in range(at_x.size):
         for m in range(x.size):
             u, v = at_x[k] - x[m], at_y[k] - y[m]
             r = math.hypot(u, v)
             along = nu * (u * force[0, m] + v * force[1, m]) / r**3
-            found[0, k] += (1.0 - nu) * force[0, m] / r + u * along
-            found[1, k] += (1.0 - nu) * force[1, m] / r + v * along
-    return found
+            sums[0, k] += (1.0 - nu) * force[0, m] / r + u * along
+            sums[1, k] += (1.0 - nu) * force[1, m] / r + v * along
+    return sums
 
 
 @compiled
@@ -326,9 +326,9 @@ def step_on(px, py, u, v, bound, middle, slips):
     size = math.hypot(x, y)
     if size <= bound:
         return x, y, False
-    slip, held = math.hypot(u, v), math.hypot(px, py)
-    if slips and slip > 0.0 and held > 0.0 and middle > 0.0:
-        cosine, sine = -(px * u + py * v) / (held * slip), (px * v - py * u) / (held * slip)
+    slip, before = math.hypot(u, v), math.hypot(px, py)
+    if slips and slip > 0.0 and before > 0.0 and middle > 0.0:
+        cosine, sine = -(px * u + py * v) / (before * slip), (px * v - py * u) / (before * slip)
         shrunk = math.exp(-slip / middle)
         over, aside = (1.0 + cosine, shrunk * sine) if cosine > 0.0 else (sine, shrunk * (1.0 - cosine))
         square = over * over + aside * aside
@@ -341,7 +341,7 @@ def step_on(px, py, u, v, bound, middle, slips):
 @compiled
 def gather(y, low_x, high_x, width, traction, box, cells):
     """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
-    found = np.zeros((2, cells, cells))
+    sums = np.zeros((2, cells, cells))
     dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
     steps = traction.shape[1]
     for s in range(y.size):
@@ -354,6 +354,6 @@ def gather(y, low_x, high_x, width, traction, box, cells):
                 left = right - length / dx
                 for k in range(max(int(left), 0), min(int(right) + 1, cells)):
                     share = high * max(min(right, k + 1.0) - max(left, 1.0 * k), 0.0)
-                    found[0, j, k] += share * traction[s, i, 0]
-                    found[1, j, k] += share * traction[s, i, 1]
-    return found
+                    sums[0, j, k] += share * traction[s, i, 0]
+                    sums[1, j, k] += share * traction[s, i, 1]
+    return sums

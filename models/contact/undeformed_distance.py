@@ -91,12 +91,12 @@ def from_function(
         if not (np.isfinite([first, last]).all() and first < last):
             raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
     nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
-    found = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
+    heights = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
     try:
-        found = np.broadcast_to(found, (nodes, nodes))
+        heights = np.broadcast_to(heights, (nodes, nodes))
     except ValueError:
-        raise InputError("", "height", list(found.shape), "must give one distance per point") from None
-    return from_arrays(nodes_x, nodes_y, found)
+        raise InputError("", "height", list(heights.shape), "must give one distance per point") from None
+    return from_arrays(nodes_x, nodes_y, heights)
 
 
 def from_arrays(x: Array, y: Array, height: Array) -> Distance:

@@ -70,16 +70,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
     """The kept forces against those that the exact theory gives now."""
     known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
-    found = []
+    answers = []
     for key in REPEATED[:2] if quick else REPEATED:
         now = exact(known[key], (20,) if quick else (40,))
-        found.append(float(np.linalg.norm(now.force - known[key].force)))
+        answers.append(float(np.linalg.norm(now.force - known[key].force)))
     return [
         at_most(
             "contact_price.reference",
             SYSTEM,
-            f"exact forces computed anew against those kept, {len(found)} cases, largest difference by mu N",
-            max(found),
+            f"exact forces computed anew against those kept, {len(answers)} cases, largest difference by mu N",
+            max(answers),
             "",
             REFERENCE[quick],
             "what the cells leave uncertain after their first order is taken out",
@@ -122,9 +122,9 @@ def _total_rows(cases: list[Case]) -> list[Row]:
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
         contact = _fastsim(case, {})
-        found, error = rolled(contact, case.motion, 21)
+        answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
-        off.append((np.linalg.norm(found.force - limit * case.force), abs(found.mz - moment)))
+        off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
     return [
@@ -200,13 +200,13 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
 
 def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[float]:
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
-    found = []
+    answers = []
     for case in cases:
         contact = _fastsim(case, choices)
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
-        found.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
-    return [float(value) for value in np.mean(found, axis=0)]
+        answers.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
+    return [float(value) for value in np.mean(answers, axis=0)]
 
 
 def _fastsim(case: Case, choices: dict[str, str]) -> Fastsim:
@@ -214,8 +214,8 @@ def _fastsim(case: Case, choices: dict[str, str]) -> Fastsim:
     return Fastsim(hertz, case.friction, case.pair, **{**BEST, **choices})
 
 
-def _program_rows(found: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(own) for name, own in found["seconds"].items()}
+def _program_rows(answers: dict[str, Any]) -> list[Row]:
+    t = {name: np.array(own) for name, own in answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "contact and forces by the program of 1983, by the time of the one of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
@@ -246,11 +246,11 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    found = answer(path, out, partial(Built, PAIR), Method())
+    answers = answer(path, out, partial(Built, PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
-    assert found == {"rows": ROWS, "wrong": 0}
+    assert answers == {"rows": ROWS, "wrong": 0}
     what = f"a CSV of {ROWS:,} contacts answered, with errors and status, once"
     return finding("contact_price.table", SYSTEM, what, seconds, "s", "seconds", "reported and never gated", "none")
 

@@ -68,9 +68,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows += _limits() + _spun() + _derivatives() + _drawn()
     if quick:
         return rows, data
-    found, data["model"] = _model()
+    answers, data["model"] = _model()
     timed, data["speed"] = speed(PAIR, LOAD, FRICTION, MEAN_AXIS)
-    return rows + found + timed, data
+    return rows + answers + timed, data
 
 
 def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
@@ -92,21 +92,21 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     }
 
 
-def _vector(given: Contacts, **options: Any) -> Array:
+def _vector(columns: Contacts, **options: Any) -> Array:
     """Forces (n, 2) by mu N."""
-    found = fastsim(**given, pair=PAIR, **options)
-    return np.stack([found.fx, found.fy], axis=1) / (FRICTION * LOAD)
+    answers = fastsim(**columns, pair=PAIR, **options)
+    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
 def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     """Largest error of every net, and the order between the second and the last."""
-    given = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(KINDS), LEVELS)
     rows: list[Row] = []
     data: dict[str, Any] = {}
     for bound in POWERS:
-        truth = _vector(given, cells=FINE, bound=bound)
+        truth = _vector(columns, cells=FINE, bound=bound)
         for march in ("second-order", "plain"):
-            errors = [np.hypot(*(_vector(given, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
+            errors = [np.hypot(*(_vector(columns, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
             data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
             if march == "plain":
                 continue
@@ -143,12 +143,12 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
 
 def _invariants(batches: int, count: int, first: int) -> list[Row]:
     """Everything that must always hold, over random contacts."""
-    found: dict[str, float] = {}
+    answers: dict[str, float] = {}
     for i in range(batches):
         options = OPTIONS[i % len(OPTIONS)]
         for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
-            found[name] = max(found.get(name, 0.0), value)
+            answers[name] = max(answers.get(name, 0.0), value)
     what = {
         "finite": "results that are not finite",
         "bound": "|F| beyond mu N",
@@ -174,17 +174,19 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
             *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
             "none",
         )
-        for name, value in found.items()
+        for name, value in answers.items()
     ]
 
 
 def _limits() -> list[Row]:
     """Small creepages against the linear theory, and the direction of full sliding."""
-    given = creepages(("x", "y", "spin"), (1e-6,))
-    found = fastsim(**given, pair=PAIR)
-    linear = np.stack(linear_forces(given["a"], given["b"], given["xi_x"], given["xi_y"], given["spin"], PAIR))
+    columns = creepages(("x", "y", "spin"), (1e-6,))
+    answers = fastsim(**columns, pair=PAIR)
+    linear = np.stack(
+        linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], PAIR)
+    )
     size = np.hypot(linear[0], linear[1])
-    slope = np.hypot(found.fx - linear[0], found.fy - linear[1]) / size
+    slope = np.hypot(answers.fx - linear[0], answers.fy - linear[1]) / size
     sliding = creepages(("x", "y"), SLIDING)
     turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
     most = np.hypot(sliding["xi_x"], sliding["xi_y"])
@@ -267,13 +269,13 @@ def _spun() -> list[Row]:
 
 def _derivatives() -> list[Row]:
     """Analytic derivatives against central differences of the forces."""
-    given = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
-    own = derivatives(**given, pair=PAIR)
+    own = derivatives(**columns, pair=PAIR)
     off = []
     for k, (name, unit) in enumerate(scale.items()):
         h = 1e-6 * unit
-        ends = [_forces(_moved(given, name, sign * h)) for sign in (1.0, -1.0)]
+        ends = [_forces(_moved(columns, name, sign * h)) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - own.slopes[..., k] * unit) / _units())
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
@@ -290,18 +292,18 @@ def _derivatives() -> list[Row]:
     ]
 
 
-def _moved(given: Contacts, name: str, step: float) -> Contacts:
+def _moved(columns: Contacts, name: str, step: float) -> Contacts:
     """The contacts with one value changed; a load that grows takes the ellipse with it."""
-    moved = {**given, name: given[name] + step}
+    moved = {**columns, name: columns[name] + step}
     if name == "load":
-        grown = np.cbrt(moved["load"] / given["load"])
-        moved |= {"a": given["a"] * grown, "b": given["b"] * grown}
+        grown = np.cbrt(moved["load"] / columns["load"])
+        moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
     return moved
 
 
-def _forces(given: Contacts) -> Array:
-    found = fastsim(**given, pair=PAIR)
-    return np.stack([found.fx, found.fy, found.mz], axis=1)
+def _forces(columns: Contacts) -> Array:
+    answers = fastsim(**columns, pair=PAIR)
+    return np.stack([answers.fx, answers.fy, answers.mz], axis=1)
 
 
 def _units() -> Array:
@@ -349,7 +351,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
         for name, values in data["cells"].items()
     )
-    found = [
+    answers = [
         Table(
             "FASTSIM: error of the cells",
             "Mean / largest error of the force in % of mu N against "
@@ -359,7 +361,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         )
     ]
     if "model" in data:
-        found.append(
+        answers.append(
             Table(
                 "FASTSIM: error of the model",
                 "Converged, against the exact theory: force in % of mu N, "
@@ -369,7 +371,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             )
         )
     if "speed" in data:
-        found.append(
+        answers.append(
             Table(
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
@@ -378,7 +380,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 tuple(tuple(row) for row in data["speed"]),
             )
         )
-    return found
+    return answers
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

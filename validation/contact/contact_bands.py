@@ -95,11 +95,13 @@ def groups(cases: list[Case]) -> Array:
 
 def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     """A theory's forces, moments and errors."""
-    found, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
+    answers, nu = forces(name, cases, cells), np.array([c.pair.nu for c in cases])
     axes, motions = _arrays(cases)
     exact = np.array([(*c.force, c.mz * np.sqrt(c.a * c.b) / max(c.a, c.b)) for c in cases])
-    off, share = found - exact, spin_share(axes[0], axes[1], motions, nu)
-    return Held(found[:, :2], found[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, groups(cases))
+    off, share = answers - exact, spin_share(axes[0], axes[1], motions, nu)
+    return Held(
+        answers[:, :2], answers[:, 2], np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2]), share, groups(cases)
+    )
 
 
 def kept(name: str, one: Held) -> tuple[float, float]:

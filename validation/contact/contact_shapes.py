@@ -102,7 +102,7 @@ def grown() -> list[Shape]:
         (3, 4, 40, 0),
         (10, 5, 80, 5),
     )
-    found = [
+    shapes = [
         _well(
             f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
             1e-6 * ridge,
@@ -113,7 +113,7 @@ def grown() -> list[Shape]:
         for ridge, half, load, tilt in wells
     ]
     return [
-        *found,
+        *shapes,
         _over(
             "two arcs that meet in an edge",
             lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2,
@@ -139,11 +139,11 @@ def grown() -> list[Shape]:
 
 def profiles() -> list[Shape]:
     """The main patch of the right wheel S1002 on UIC 60, inclined 1:40, at some lateral shifts (m) and loads (N)."""
-    found = []
+    shapes = []
     for shift, load in ((0.002, 5e4), (0.004, 5e4), (0.006, 2e4), (0.008, 2e4)):
         distance = wheel_on_rail(s1002(), uic60(), lateral_shift=shift)[0].patch.distance
-        found.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
-    return found
+        shapes.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
+    return shapes
 
 
 @dataclass(frozen=True)
@@ -161,13 +161,13 @@ def placed() -> list[Placed]:
 
     Half-spaces are joined along the contour there; flange and tread lie on none.
     """
-    found = []
+    wheelsets = []
     for yaw in (0.0, 0.01, -0.02):
         for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
             touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
             if max(touch.patch.lean for touch in touches) < UPRIGHT or len(touches) == 1:
-                found += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
-    return found
+                wheelsets += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
+    return wheelsets
 
 
 UPRIGHT = 0.15
@@ -207,10 +207,10 @@ def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
     known, own = patch.distance, y - patch.place
     over = (own >= known.y[0]) & (own <= known.y[-1])
-    found = np.full((y.size, x.size), FAR)
+    heights = np.full((y.size, x.size), FAR)
     inside = np.clip(x, known.x[0], known.x[-1])
-    found[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
-    return found
+    heights[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
+    return heights
 
 
 def exact_normal(shape: Shape, cells: int, box: Box) -> NormalSolution:

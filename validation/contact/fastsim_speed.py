@@ -74,9 +74,9 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     return rows, table
 
 
-def _call(one: Ellipse, values: tuple[float, ...]) -> None:
+def _call(ellipse: Ellipse, values: tuple[float, ...]) -> None:
     for _ in range(REPEATS):
-        one(*values)
+        ellipse(*values)
 
 
 def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:

@@ -64,12 +64,12 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
     return {"a": a, "b": b, "load": load, "mu": mu, "xi_x": xi_x, "xi_y": xi_y, "spin": spin}
 
 
-def worst(given: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
+def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
     """Largest violation of each invariant, by mu N and the creepages where it has a size; not finite counts as inf."""
-    creep = fastsim(**given, pair=pair, **options)
-    limit = given["mu"] * np.maximum(given["load"], 0.0)
-    least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(given["a"], given["b"])
-    motion = np.hypot(given["xi_x"], given["xi_y"]) + np.abs(given["spin"]) * arm
+    creep = fastsim(**columns, pair=pair, **options)
+    limit = columns["mu"] * np.maximum(columns["load"], 0.0)
+    least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
+    motion = np.hypot(columns["xi_x"], columns["xi_y"]) + np.abs(columns["spin"]) * arm
     still, power = (motion == 0.0) | (limit == 0.0), least * np.where(motion > 0.0, motion, 1.0)
     net = {name: options[name] for name in ("cells", "bound") if name in options}
 
@@ -79,15 +79,15 @@ def worst(given: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> d
 
     def unlike(name: str) -> float:
         factors, sizes = ALIKE[name]
-        changed = {key: value * factors.get(key, 1.0) for key, value in given.items()}
+        changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
         return _most(np.abs(forces - relative(fastsim(**changed, pair=pair, **options), sizes)))
 
     forces = relative(creep, (1.0, 1.0, 1.0))
     return {
         "finite": 0.0 if all(np.isfinite(values).all() for values in vars(creep).values()) else np.inf,
         "bound": _most(np.hypot(forces[0], forces[1]) - 1.0),
-        "moment": _most((np.abs(creep.mz) - most_moment(given, **net)) / (least * arm)),
-        "limit": _most((creep.dissipation - most_power(given, **net)) / power),
+        "moment": _most((np.abs(creep.mz) - most_moment(columns, **net)) / (least * arm)),
+        "limit": _most((creep.dissipation - most_power(columns, **net)) / power),
         "reversal": unlike("reversal"),
         "mirror": unlike("mirror"),
         "power": _most(-creep.dissipation / power),
@@ -104,19 +104,23 @@ def _most(values: Array) -> float:
     return float(max(0.0, np.where(np.isnan(values), np.inf, values).max()))
 
 
-def most_moment(given: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def most_moment(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
     """Largest moment (N m), (n,), of contacts with columns a, b (m), load (N) and mu, (n,) each."""
-    pure = {"xi_x": np.zeros_like(given["a"]), "xi_y": np.zeros_like(given["a"]), "spin": np.ones_like(given["a"])}
-    return most_power({**given, **pure}, cells, bound)
+    pure = {
+        "xi_x": np.zeros_like(columns["a"]),
+        "xi_y": np.zeros_like(columns["a"]),
+        "spin": np.ones_like(columns["a"]),
+    }
+    return most_power({**columns, **pure}, cells, bound)
 
 
-def most_power(given: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
+def most_power(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "intermediate") -> Array:
     """Largest power by the rolling speed (N), (n,), that friction takes from the motion; also xi_x, xi_y, spin."""
-    a, b, xi_x, xi_y, spin = (given[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
-    work = np.zeros(len(given["a"]))
-    for rows, net in nets(np.column_stack([given["a"], given["b"]]), cells, bound):
+    a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
+    work = np.zeros(len(columns["a"]))
+    for rows, net in nets(np.column_stack([columns["a"], columns["b"]]), cells, bound):
         y, half, part = (net.strips[row][:, None] for row in (Y, HALF, PART))
         along, across = -b[rows] * y, a[rows] * half * net.cells[CENTRE]
         slip = np.hypot(xi_x[rows] + spin[rows] * along, xi_y[rows] + spin[rows] * across)
         work[rows] = np.sum(part * net.cells[BOUND] * slip, axis=(1, 2))
-    return given["mu"] * np.maximum(given["load"], 0.0) * work
+    return columns["mu"] * np.maximum(columns["load"], 0.0) * work

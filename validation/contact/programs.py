@@ -54,17 +54,17 @@ def _normal(case: Case, pressed: NormalContact) -> dict[str, float]:
     return {name: getattr(pressed, name) / value - 1 for name, value in exact.items()}
 
 
-def table(found: dict[str, Any]) -> Table:
+def table(comparison: dict[str, Any]) -> Table:
     """The paper's comparison with figures in it."""
     error = {
         name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
-        for name, e in found["errors"].items()
+        for name, e in comparison["errors"].items()
     }
     normal = {}
     for key in ("approach", "area", "peak"):
-        values = [100 * errors[key] for errors in found["normal"]]
+        values = [100 * errors[key] for errors in comparison["normal"]]
         normal[key] = f"{min(values):+.1f} to {max(values):+.1f} %"
-    t = {name: np.array(own) for name, own in found["seconds"].items()}
+    t = {name: np.array(own) for name, own in comparison["seconds"].items()}
     both = t["1983"] + t["press"]
     rows = (
         ("goes in", "semi-axes, load, creepages, linear coefficients", "undeformed distance, load, creepages"),

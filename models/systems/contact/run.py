@@ -195,11 +195,13 @@ def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
 
 def built_of(scene: ContactScene) -> Built:
     """What touches and how, with the scene's effects."""
-    own = scene.contact
-    assert own is not None
+    table = scene.contact
+    assert table is not None
     kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
     profiles: dict[str, Profile] = {kind: _profile(scene, kind) for kind in kinds}
-    return extended(Built(scene.pair, own.friction, own.load, own.approach, scene.falling_friction, profiles), scene)
+    return extended(
+        Built(scene.pair, table.friction, table.load, table.approach, scene.falling_friction, profiles), scene
+    )
 
 
 def contact(scene: ContactScene) -> Contact:
