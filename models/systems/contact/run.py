@@ -2,9 +2,10 @@
 
 import json
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, field
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,25 +38,22 @@ from models.systems.contact.cases_table import answer, compile_first, kept_rows,
 from models.systems.contact.scene import ContactScene
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
-CREEPAGES = {
+FORCES = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+CHANNELS = {
     "xi_x": ("-", "longitudinal creepage"),
     "xi_y": ("-", "lateral creepage"),
     "spin": ("1/m", "spin by the rolling speed"),
-}
-FORCES = {
     "fx": ("N", "force on the wheel in the direction of rolling"),
     "fy": ("N", "force on the wheel to the right"),
     "mz": ("N m", "moment on the wheel about the normal"),
     "stick": ("-", "share of the area that sticks"),
     "dissipation": ("N", "power lost by the rolling speed"),
+    "error_of_cells": ("N", "error of the force that the cells leave"),
+    "error_of_theory": ("N", "error of the force that the theory has"),
+    "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
+    "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
 }
-ERRORS = {
-    "error_of_cells": ("N", "cells"),
-    "error_of_theory": ("N", "theory"),
-    "moment_error_of_cells": ("N m", "moment_cells"),
-    "moment_error_of_theory": ("N m", "moment_theory"),
-}
-"""Channels of the errors with their units and names in ``Error``: of the force, and of the moment."""
+"""Units and meanings of a motion, of its forces (``FORCES``) and of their errors (``Error``), in this order."""
 FIELDS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 POWERS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
@@ -88,8 +86,8 @@ class Rolls:
 
     contact: Contact
     motions: list[Motion]
-    rolled: list[Rolled]
-    errors: list[Error]
+    rolled: Sequence[Rolled]
+    errors: Sequence[Error]
     pressing: float
     rolling: np.ndarray
 
@@ -119,31 +117,24 @@ def run(
     shown = rolled(contact(scene), motions[-1], cells, fields=True) if fields else None
     begun, start = time.process_time(), time.perf_counter()
     body = contact(scene)
-    forces, off, marks = list[Rolled](), list[Error](), [time.perf_counter()]
+    steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
-        if errors:
-            force, error = rolled(body, motion, cells)
-            off.append(error)
-        else:
-            force = body.roll(motion, cells)
-        forces.append(force)
+        steps.append(rolled(body, motion, cells) if errors else (body.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
     if shown is not None:
-        forces[-1], off[-1:] = shown[0], [shown[1]] if errors else []
-    rolls = Rolls(body, motions, forces, off, marks[0] - start, np.diff(marks))
+        steps[-1] = shown
+    forces, off = zip(*steps, strict=True)
+    rolls = Rolls(body, motions, forces, off if errors else (), marks[0] - start, np.diff(marks))
     return _result(scene, rolls, seconds)
 
 
 def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
     body, count, power = rolls.contact, len(rolls.motions), POWERS[scene.method.name]
-    columns = dict(zip(CREEPAGES, np.array(rolls.motions).T, strict=True))
-    columns |= {name: np.array([getattr(force, name) for force in rolls.rolled]) for name in FORCES}
-    meanings = CREEPAGES | FORCES
-    if rolls.errors:
-        columns |= {name: np.array([getattr(e, key) for e in rolls.errors]) for name, (_, key) in ERRORS.items()}
-        meanings = meanings | {name: (unit, name.replace("_", " ")) for name, (unit, _) in ERRORS.items()}
+    errors = [astuple(error) for error in rolls.errors] or [()] * count
+    rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
+    columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
     doubt = ""
     if isinstance(body, Linear):
         with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
@@ -151,7 +142,7 @@ def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
             doubt = beyond_friction(used / (body.friction * body.pressing.load))
     return result(
         scene,
-        {name: Channel("motion", values, *meanings[name]) for name, values in columns.items()},
+        {name: Channel("motion", values, *CHANNELS[name]) for name, values in zip(CHANNELS, columns, strict=False)},
         {},
         counts={
             "steps": count,
