@@ -224,7 +224,9 @@ def _touch(side: Side, pose: Pose, points: Array, gap: Array, at: tuple[int, int
     lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))
-    low, high = _reach(gap, at, angle)
+    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5  # where the surroundings end, if not at a ridge
+    below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
+    low, high = first + int(below[-1]) if below.size else first, k + int(above[0]) if above.size else last
     cut = (False, False, low == first and first > 0, high == last and last < gap.size - 1)
     ends = (points[low, 1] - y) / np.cos(angle), (points[high, 1] - y) / np.cos(angle)
     distance = distance_over(side, pose, np.array([x, y, side.rail.curve(y)]), angle, ends)
@@ -247,14 +249,6 @@ def distance_over(side: Side, pose: Pose, place: Array, angle: float, ends: tupl
     x = np.linspace(-half, half, NODES)
     s = np.linspace(max(ends[0], rail_s[0]), min(ends[1], rail_s[-1]), NODES)
     return Distance(x, s, CubicSpline(rail_s, rail_n)(s)[:, None] - _wheel_heights(side, pose, place, angle, x, s))
-
-
-def _reach(gap: Array, at: tuple[int, int, int], angle: float) -> tuple[int, int]:
-    """Indices to both sides of a minimum where its surroundings end: beyond DEEP along the normal, or at a ridge."""
-    first, k, last = at
-    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5
-    below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
-    return (first + int(below[-1]) if below.size else first), (k + int(above[0]) if above.size else last)
 
 
 def _rail_heights(rail: Profile, place: Array, angle: float) -> tuple[Array, Array]:

@@ -67,22 +67,18 @@ def _on_grid(ratio: float, nu: float, cells: int) -> Array:
     body = Material(E=2e11, nu=nu)
     operator = SlipOperator(columns, rows, dx, dy, Pair(body, body))
     system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
-    found = []
+    sums = []
     for motion in np.eye(3):
-        p = _sticking(system, rigid_slip(x, y, *motion)) * (dx * dy)
-        found.append([*p.sum(axis=(0, 1)), (x * p[..., 1] - y[:, None] * p[..., 0]).sum()])
-    (fx, _, _), (_, fy, turn), (_, side, moment) = found
+        rigid = rigid_slip(x, y, *motion)
+        traction = -system.solve(rigid, INNER)  # leaves no free cell any slip
+        left = np.abs(system.free @ (rigid + operator(traction))[..., None]).max()
+        if left > RESIDUAL * np.abs(rigid).max():
+            raise RunFailed("exact linear theory", f"slip of {left:.2g} left")
+        p = traction * (dx * dy)
+        sums.append([*p.sum(axis=(0, 1)), (x * p[..., 1] - y[:, None] * p[..., 0]).sum()])
+    (fx, _, _), (_, fy, turn), (_, side, moment) = sums
     area = np.count_nonzero(inside) * dx * dy / np.pi
     return np.array([-fx / area, -fy / area, (turn - side) / 2.0 / area**1.5, -moment / area**2])
-
-
-def _sticking(system: FreeSystem, rigid: Array) -> Array:
-    """Traction (ny, nx, 2) by G that leaves no free cell any slip, to RESIDUAL of the largest rigid slip."""
-    traction = -system.solve(rigid, INNER)
-    left = np.abs(system.free @ (rigid + system.operator(traction))[..., None]).max()
-    if left > RESIDUAL * np.abs(rigid).max():
-        raise RunFailed("exact linear theory", f"slip of {left:.2g} left")
-    return traction
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -92,7 +88,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data: dict[str, Any] = {"nodes": nodes}
     rows = [*_node_rows(np.array(nodes)), _misprint(np.array(nodes))]
     if not quick:
-        data["between"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in _between()]
+        middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
+        middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
+        data["between"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in middle]
         data["beyond"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in SLENDER]
         rows += _between_rows(np.array(data["between"]), np.array(nodes)) + _beyond_rows(np.array(data["beyond"]))
     return rows, data
@@ -144,12 +142,6 @@ def _misprint(nodes: Array) -> Row:
         "a table that no one computes again keeps its misprints",
         "native",
     )
-
-
-def _between() -> list[tuple[float, float]]:
-    """The geometric middle of every two ratios at the tabulated nu, and some ratios at nu between."""
-    middle = np.sqrt(RATIOS[1:] * RATIOS[:-1])
-    return [(float(r), 0.25) for r in middle] + [(r, nu) for r in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
 
 
 def _between_rows(between: Array, nodes: Array) -> list[Row]:

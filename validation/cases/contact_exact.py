@@ -45,7 +45,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for both problems against closed forms, their refinement, symmetries, and the sample where there is one;
     quick: two cases up to 32 cells instead of all up to 80, every fourth contact of the sample by half the cells.
     """
-    refined = _refined((8, 16, 32) if quick else (10, 20, 40, 80), ("x", "spin") if quick else tuple(CASES))
+    grids, names = ((8, 16, 32), ("x", "spin")) if quick else ((10, 20, 40, 80), tuple(CASES))
+    refined = {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
     rows = [
         *_hertz_rows(),
         *_strip_rows(20 if quick else 80),
@@ -210,11 +211,6 @@ def _symmetry_rows() -> list[Row]:
             "no side is preferred",
         ),
     ]
-
-
-def _refined(grids: tuple[int, ...], names: tuple[str, ...]) -> dict[str, list[list[float]]]:
-    """Name of a case -> for every grid its cells and forces."""
-    return {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
 
 
 def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import BEST, left, rolled
-from models.contact.hertz import by_axes
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import answer
@@ -121,7 +120,7 @@ def _total_rows(cases: list[Case]) -> list[Row]:
     """What is stated of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
-        contact = _fastsim(case, {})
+        contact = case.contact(Fastsim, **BEST)
         answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
         off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
@@ -202,16 +201,11 @@ def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[floa
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
     answers = []
     for case in cases:
-        contact = _fastsim(case, choices)
+        contact = case.contact(Fastsim, **{**BEST, **choices})
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
         answers.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
     return [float(value) for value in np.mean(answers, axis=0)]
-
-
-def _fastsim(case: Case, choices: dict[str, str]) -> Fastsim:
-    hertz = by_axes(case.a, case.b, case.pair, load=case.load)
-    return Fastsim(hertz, case.friction, case.pair, **{**BEST, **choices})
 
 
 def _program_rows(answers: dict[str, Any]) -> list[Row]:

@@ -58,7 +58,7 @@ ABOUT = "the theory has one W for the whole contact: nothing is claimed, the fig
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity; in the full run on all shapes, ways, nets and the time."""
     hertz = {f"{ratio:g}": _hertz(ratio, PLAIN) | {"paper": _hertz(ratio, PAPER)["approach"]} for ratio in HERTZ}
-    jump = _largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
+    jump = largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
     rows = [*_hertz_rows(hertz), _jump_row(jump)]
     if quick:
@@ -83,7 +83,7 @@ def _errors(found: NormalContact, approach: float, area: float, peak: float) -> 
     return {key: getattr(found, key) / value - 1.0 for key, value in exact.items()}
 
 
-def _largest_jump(patch: Patch, steps: int) -> float:
+def largest_jump(patch: Patch, steps: int) -> float:
     """Largest jump (N) of N(a_3): every step of a sweep is halved, towards the larger change, down to rounding."""
 
     def load(depth: float) -> float:

@@ -271,18 +271,17 @@ def _derivatives() -> list[Row]:
     """Analytic derivatives against central differences of the forces."""
     columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
-    own = derivatives(**columns, pair=PAIR)
-    off = []
+    known, off = derivatives(**columns, pair=PAIR), []
+    units = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
     for k, (name, unit) in enumerate(scale.items()):
-        h = 1e-6 * unit
-        ends = [_forces(_moved(columns, name, sign * h)) for sign in (1.0, -1.0)]
-        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - own.slopes[..., k] * unit) / _units())
+        ends = [_moved(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
+        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / units)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
         at_most(
             "fastsim.derivatives",
             SYSTEM,
-            f"derivatives to creepages, spin and load against differences, 98 % of {len(own.forces)} cases",
+            f"derivatives to creepages, spin and load against differences, 98 % of {len(known.forces)} cases",
             float(share),
             "mu N, mu N c",
             1e-7,
@@ -292,22 +291,14 @@ def _derivatives() -> list[Row]:
     ]
 
 
-def _moved(columns: Contacts, name: str, step: float) -> Contacts:
-    """The contacts with one value changed; a load that grows takes the ellipse with it."""
+def _moved(columns: Contacts, name: str, step: float) -> Array:
+    """Forces and moments (n, 3) with one value changed; a load that grows takes the ellipse with it."""
     moved = {**columns, name: columns[name] + step}
     if name == "load":
         grown = np.cbrt(moved["load"] / columns["load"])
         moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
-    return moved
-
-
-def _forces(columns: Contacts) -> Array:
-    answers = fastsim(**columns, pair=PAIR)
-    return np.stack([answers.fx, answers.fy, answers.mz], axis=1)
-
-
-def _units() -> Array:
-    return FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+    creep = fastsim(**moved, pair=PAIR)
+    return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 
 def _drawn() -> list[Row]:

@@ -18,7 +18,7 @@ from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.material import Pair
-from models.contact.theories import Contact, ExactOnEllipse, Linear, Motion, Simplified
+from models.contact.theories import ExactOnEllipse, Linear, Motion, OnEllipse, Simplified
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
@@ -82,9 +82,9 @@ class Case:
         """Exact force by mu N, (2,)."""
         return np.array([self.fx, self.fy])
 
-    def contact(self, theory: type[ExactOnEllipse] | type[Linear]) -> Contact:
+    def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
         """The contact by a theory of the ellipse."""
-        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair)
+        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
 def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
@@ -143,7 +143,7 @@ def _simplified(case: Case, cells: int) -> Roll:
     return lambda motion: contact.roll(motion, cells)
 
 
-def _of(theory: type[ExactOnEllipse] | type[Linear]) -> Callable[[Case, int], Roll]:
+def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
     def rolled(case: Case, cells: int) -> Roll:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
