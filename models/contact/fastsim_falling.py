@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
+from models.contact.fastsim_kernels import CENTRE, MIDDLE, SECOND_ORDER
 from models.contact.fastsim_many import (
     HALF,
     LOAD,
@@ -16,13 +16,13 @@ from models.contact.fastsim_many import (
     PART,
     PER_SLIP,
     SPIN,
-    SPREAD,
     XI_X,
     XI_Y,
     A,
     B,
     Y,
     rigid_slip,
+    strip_tractions,
     touches,
 )
 from models.machine.compiled import compiled
@@ -32,7 +32,7 @@ from models.machine.compiled import compiled
 def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
-    slip, tractions = np.empty(PER_SLIP), np.empty((3, n))
+    slip, left, tractions = np.empty(PER_SLIP), np.empty((2, n)), np.empty((3, n))
     area = 0.0
     for s in range(m):
         area += strips[HALF, s]
@@ -44,7 +44,8 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers)
         rigid_slip(contact, n, middle, kind, slip)
         limit = contact[MU] * contact[LOAD]
         for s in range(m):
-            strip_falling(contact, strips[:, s], cells, slip, floor, decay, tractions)
+            friction_left(contact, strips[:, s], cells, floor, decay, left)
+            strip_tractions(contact, strips[:, s], cells, slip, SECOND_ORDER, left, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
@@ -59,30 +60,13 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers)
 
 
 @compiled
-def strip_falling(contact, strip, cells, slip, floor, decay, answers):
-    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells)."""
-    y, half, spread = strip[Y], strip[HALF], strip[SPREAD]
-    u, v0 = spread * (slip[0] - slip[2] * contact[B] * y), spread * slip[1]
-    v1 = spread * slip[2] * contact[A] * half
-    along, across, turn = (
-        contact[XI_X] - contact[SPIN] * contact[B] * y,
-        contact[XI_Y],
-        contact[SPIN] * contact[A] * half,
-    )
-    change, last = -2.0 / cells.shape[1], 0.0
-    px = py = slips = 0.0
+def friction_left(contact, strip, cells, floor, decay, left):
+    """Fill ``left`` (2, cells) as ``strip_tractions`` reads it: at the rigid slip of the points."""
+    along = contact[XI_X] - contact[SPIN] * contact[B] * strip[Y]
+    across, turn = contact[XI_Y], contact[SPIN] * contact[A] * strip[HALF]
     for i in range(cells.shape[1]):
-        v = v0 + v1 * cells[MIDDLE, i]
-        here = _left(along, across + turn * cells[CENTRE, i], floor, decay)
-        middle = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
-        g = here * cells[BOUND, i]
-        if i == 0:
-            px, py, slips = cut(-0.5 * u, -0.5 * v, g)
-        else:
-            rate = cells[RATE, i] / middle
-            px, py, slips = advance(px, py, slips, u, v, v1 * change, g, last * cells[BEFORE, i], rate)
-        last = here
-        answers[0, i], answers[1, i], answers[2, i] = px, py, slips
+        left[0, i] = _left(along, across + turn * cells[CENTRE, i], floor, decay)
+        left[1, i] = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
 
 
 @compiled

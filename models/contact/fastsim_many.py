@@ -8,7 +8,13 @@ import math
 import numpy as np
 
 from models.contact.fastsim_kernels import (
+    BEFORE,
+    BOUND,
+    CENTRE,
     LANES,
+    MIDDLE,
+    PLAIN,
+    RATE,
     ROWS,
     SECOND_ORDER,
     SLID,
@@ -18,6 +24,8 @@ from models.contact.fastsim_kernels import (
     V0,
     V1,
     U,
+    advance,
+    cut,
     march_plain,
     march_second_order,
 )
@@ -191,6 +199,28 @@ def _collect(lanes, first, count, contacts, strips, slips, answers):
         s += 1
         if s == strips.shape[1]:
             c, s = c + 1, 0
+
+
+@compiled
+def strip_tractions(contact, strip, cells, slip, march, left, answers):
+    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells).
+
+    left : (2, cells), share of the friction that is left in the cells' centres and in the middles of the steps there.
+    """
+    u, v0 = strip[SPREAD] * (slip[0] - slip[2] * contact[B] * strip[Y]), strip[SPREAD] * slip[1]
+    v1, change, before = strip[SPREAD] * slip[2] * contact[A] * strip[HALF], -2.0 / cells.shape[1], 0.0
+    x = y = slips = 0.0
+    for i in range(cells.shape[1]):
+        v, g = v0 + v1 * cells[MIDDLE, i], left[0, i] * cells[BOUND, i]
+        if march == PLAIN:
+            x, y, slips = cut(x - u, y - v0 - v1 * cells[CENTRE, i], g)
+        elif i == 0:
+            x, y, slips = cut(-0.5 * u, -0.5 * v, g)
+        else:
+            rate = cells[RATE, i] / left[1, i]
+            x, y, slips = advance(x, y, slips, u, v, v1 * change, g, before * cells[BEFORE, i], rate)
+        before = left[0, i]
+        answers[0, i], answers[1, i], answers[2, i] = x, y, slips
 
 
 @compiled
