@@ -116,13 +116,9 @@ def no_bottom() -> InputError:
     )
 
 
-def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:
-    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``ridge`` (m)."""
-    return [
-        Patch(part, (*along_x, *along_y))
-        for row, along_y in _cut(distance, 1, ridge)
-        for part, along_x in _cut(row, 0, ridge)
-    ]
+def separate(distance: Distance) -> list[Patch]:
+    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``RIDGE``."""
+    return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
 
 
 def whole(distance: Distance) -> list[Patch]:
@@ -130,36 +126,32 @@ def whole(distance: Distance) -> list[Patch]:
     return [Patch(distance)]
 
 
-def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
     """Parts of the distance along an axis (0: x, 1: y), each with whether its two ends are cuts."""
     lines, least, _ = distance.valley_y if axis else distance.valley_x
-    nodes = distance.y if axis else distance.x
-    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least, ridge)]
-    ends = [0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]
-    everything = slice(None)
-    return [
-        (
-            distance.part(*((everything, slice(a, b + 1)) if axis else (slice(a, b + 1), everything))),
-            (a > 0, b < nodes.size - 1),
-        )
-        for a, b in pairwise(ends)
-        if b - a >= 3
-    ]
+    nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
+    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
+    for a, b in pairwise([0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]):
+        if b - a >= 3:
+            some = slice(a, b + 1)
+            part = distance.part(everything, some) if axis else distance.part(some, everything)
+            parts.append((part, (a > 0, b < nodes.size - 1)))
+    return parts
 
 
-def ridges(heights: Array, least: float) -> list[int]:
-    """Indices of the maxima of a line that rise more than ``least`` above the valleys on both sides."""
+def ridges(heights: Array) -> list[int]:
+    """Indices of the maxima of a line that rise more than ``RIDGE`` above the valleys on both sides."""
     maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
     for k, height in enumerate(heights):
         if not climbed:
             low = min(low, height)
-            if height > low + least:
+            if height > low + RIDGE:
                 climbed, top, at = True, height, k
         elif height > top:
             top, at = height, k
-        elif height < top - least:
+        elif height < top - RIDGE:
             if at > 0:
                 maxima.append(at)
             climbed, low = False, height

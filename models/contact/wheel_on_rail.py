@@ -24,7 +24,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from models.contact.inputs import Array, quantity
-from models.contact.patches import RIDGE, Patch, ridges
+from models.contact.patches import Patch, ridges
 from models.contact.profiles import Profile
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
@@ -209,7 +209,7 @@ def touches_of(side: Side, pose: Pose) -> list[Touch]:
     """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
     points, gap = side.gaps(pose)
     touches = []
-    for first, last in pairwise([0, *ridges(gap, RIDGE), gap.size - 1]):
+    for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
         if gap[k] < DEEP and 0 < k < gap.size - 1:
             touches.append(_touch(side, pose, points, gap, (first, k, last)))

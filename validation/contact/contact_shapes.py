@@ -174,29 +174,24 @@ UPRIGHT = 0.15
 """Angle (rad) between patch and track up to which several patches are joined to one half-space."""
 
 
-def exact_placed(one: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
-    """The exact contact of profiles: each height counts along the track's vertical."""
-    for margin in MARGINS[:-1]:
-        try:
-            return _exact_placed(one, pressed, cells, margin)
-        except InputError:  # the contact reaches the edge of the grid
-            continue
-    return _exact_placed(one, pressed, cells, MARGINS[-1])
-
-
 MARGINS = (1.4, 2.0, 3.0)
 """Sides of the exact grid by those of the simplified theory's area."""
 
 
-def _exact_placed(one: Placed, pressed: NormalContact, cells: int, margin: float) -> NormalSolution:
-    boxes = [(part.box, part.patch) for part in pressed.patches]
-    x0, x1 = (pick(box[k] for box, _ in boxes) for pick, k in ((min, 0), (max, 1)))
-    y0, y1 = (pick(box[k] + patch.place for box, patch in boxes) for pick, k in ((min, 2), (max, 3)))
-    step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
-    x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
-    heights = np.min([_height(touch.patch, x, y) for touch in one.touches], axis=0)
-    slope = float(np.cos(min(patch.lean for _, patch in boxes)))
-    return solve_normal(heights * slope, step_x, step_y, PAIR, load=one.load / slope)
+def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
+    """The exact contact of profiles: each height counts along the track's vertical."""
+    boxes = np.array([np.add(part.box, (0.0, 0.0, part.patch.place, part.patch.place)) for part in pressed.patches]).T
+    (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
+    slope = float(np.cos(min(part.patch.lean for part in pressed.patches)))
+    for margin in MARGINS:
+        step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
+        x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
+        heights = np.min([_height(touch.patch, x, y) for touch in wheelset.touches], axis=0)
+        try:
+            return solve_normal(heights * slope, step_x, step_y, PAIR, load=wheelset.load / slope)
+        except InputError as error:  # the contact reaches the edge of the grid
+            refused = error
+    raise refused
 
 
 FAR = 1e-3
