@@ -167,7 +167,7 @@ def test_derivatives_are_those_of_the_march(kind, growing):
         moved = {**given, "load": given["load"] * (1 + share), "a": given["a"] * grown, "b": given["b"] * grown}
         found = fastsim(**moved, pair=PAIR, flexibilities=kind)
         ends.append(np.stack([found.fx, found.fy, found.mz], axis=1))
-    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case._units()
+    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case.UNITS
     assert np.quantile(off.max(axis=1), 0.95) < 1e-7
 
 

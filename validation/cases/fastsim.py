@@ -42,6 +42,8 @@ SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
 PAIR = Pair()
+UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+"""Of fx, fy (N) and mz (N m)."""
 Contacts = dict[str, Any]
 """Arrays by the names of the parameters of ``fastsim``."""
 CELLS = (11, 21, 41, 81)
@@ -272,10 +274,9 @@ def _derivatives() -> list[Row]:
     columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
     known, off = derivatives(**columns, pair=PAIR), []
-    units = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_moved(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
-        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / units)
+        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
         at_most(
