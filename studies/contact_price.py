@@ -11,9 +11,9 @@ from models.core.errors import InputError
 from models.core.strict import Strict, read
 from models.core.whole_files import write_whole
 from models.machine.seconds import cost
-from models.systems.contact.of_scene import built_of, hertz_of
+from models.systems.contact.run import built_of
 from models.systems.contact.scene import ContactScene
-from models.systems.contact.work_precision import WAYS, cheapest_lines, ellipse_cases, exact, measure
+from models.systems.contact.work_precision import Point, cheapest_lines, priced
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
@@ -42,51 +42,42 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Exact forces, then every theory on every number of cells; saves ``price.png`` and ``table.txt``."""
+    """Every theory on every number of cells; saves ``price.nc``, ``price.png`` and ``table.txt``."""
     check(scene, engines)
-    options, hertz = read(Options, scene.options, scene.file, "options"), hertz_of(scene)
-    built = built_of(scene)
-    cases = ellipse_cases(
-        float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, tuple(options.levels)
-    )
-    known = []
-    for i, case in enumerate(cases):
-        progress("exact theory", 0.5 * i / len(cases))
-        known.append(exact(case))
-    points = []
-    for i, way in enumerate(WAYS):
-        progress(way.name, 0.5 + 0.5 * i / len(WAYS))
-        points += [measure(way, cells, known) for cells in way.cells]
-    table = _table(points, len(known), max(case.error for case in known))
+    price = priced(scene, tuple(read(Options, scene.options, scene.file, "options").levels), progress)
+    price.save(folder / "price.nc")
+    points, uncertain = price.detail, price["uncertainty"]
+    table = _table(points, uncertain.size, uncertain.max())
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     from models.drawing.figures import save
     from studies.contact_figures import price_figure
 
-    title = f"What accuracy costs: a = {1e3 * hertz.a:.2f} mm, b = {1e3 * hertz.b:.2f} mm, {len(known)} contacts"
+    a, b = (1e3 * price.data.attrs[axis] for axis in "ab")
+    title = f"What accuracy costs: a = {a:.2f} mm, b = {b:.2f} mm, {uncertain.size} contacts"
     save(price_figure(points, title), folder / "price.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "points": [asdict(one) for one in points],
+        "points": [asdict(point) for point in points],
         "table": table,
     }
 
 
-def _table(points: list[Any], count: int, uncertain: float) -> list[str]:
+def _table(points: list[Point], count: int, uncertain: float) -> list[str]:
     """All points, then the cheapest for each target."""
-    lines = [
+    return [
         f"  error of the tangential force in % of mu N over {count} contacts (exact ones known to "
         f"{100 * uncertain:.2g} %)",
         f"    {'':<28}{'cells':>6}{'mean':>8}{'95 of 100':>11}{'largest':>9}   time of contacts",
+        *(
+            f"    {point.name:<28}{point.cells:>6}{100 * point.mean:>8.2f}{100 * point.most:>11.2f}"
+            f"{100 * max(point.errors):>9.2f}   {cost((point.seconds, *point.range))}"
+            for point in points
+        ),
+        "  cheapest that meets      in the mean; in 95 of 100 contacts",
+        *(f"    {target:>6}  {mean};  {most}" for target, mean, most in cheapest_lines(points)),
     ]
-    lines += [
-        f"    {one.name:<28}{one.cells:>6}{100 * one.mean:>8.2f}{100 * one.most:>11.2f}"
-        f"{100 * max(one.errors):>9.2f}   {cost((one.seconds, *one.range))}"
-        for one in points
-    ]
-    lines.append("  cheapest that meets      in the mean; in 95 of 100 contacts")
-    return lines + [f"    {target:>6}  {mean};  {most}" for target, mean, most in cheapest_lines(points)]
 
 
 if __name__ == "__main__":

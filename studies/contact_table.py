@@ -1,26 +1,17 @@
 """Forces for a table of contacts: from a CSV with a contact in every row to a CSV with forces, errors and a status."""
 
-import csv
-import time
+import json
 from collections.abc import Callable
-from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from models.core.errors import InputError
-from models.core.scene_effects import extended
 from models.machine.seconds import duration
-from models.systems.contact.cases_table import answer, compile_first
+from models.systems import run as run_scene
 from models.systems.contact.scene import ContactScene
 
 SYSTEM = "contact"
 Progress = Callable[[str, float], None]
-ANSWER = "forces.csv"
-BLOCK = 10_000
-"""Rows of an answer that are read at once."""
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -32,40 +23,19 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Answer every row; saves ``forces.csv``."""
+    """Answer every row into ``forces.csv``; saves the first ones and sizes of all as ``forces.nc``."""
     check(scene, engines)
-    path = scene.cases_file()
-    extend = partial(extended, scene=scene)
-    compile_first(scene.pair, scene.method, extend)  # no part of the time below
-    start = time.perf_counter()
-    rows = answer(path, folder / ANSWER, scene.pair, scene.method, lambda done: progress(f"{done:,} rows", 0.0), extend)
-    seconds = time.perf_counter() - start
-    table = told(rows["rows"], rows["wrong"], path.name, seconds)
+    rows = run_scene(scene, answers=folder / "forces.csv", progress=progress)
+    rows.save(folder / "forces.nc")
+    counts = rows.counts()
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "rows": rows,
-        "answer": sizes(folder / ANSWER),
-        "seconds": seconds,
-        "table": table,
-    }
-
-
-def sizes(path: Path) -> dict[str, dict[str, Any]]:
-    """Largest magnitude and rms of every column of an answer, over its sound rows; read block by block."""
-    with path.open(newline="") as file:
-        rows = csv.reader(file)
-        heads = [head.rstrip("]").split(" [") for head in next(rows)[1:-1]]
-        largest, squares, count = np.zeros(len(heads)), np.zeros(len(heads)), 0
-        while block := list(islice(rows, BLOCK)):
-            sound = np.array([row[1:-1] for row in block if row[-1] == "ok"], float).reshape(-1, len(heads))
-            largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
-            squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
-    return {
-        name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
-        for (name, unit), most, square in zip(heads, largest, squares, strict=True)
-        if count
+        "rows": counts,
+        "answer": json.loads(rows.data.attrs["sizes"]),
+        "seconds": rows.seconds,
+        "table": told(counts["rows"], counts["wrong"], scene.cases_file().name, rows.seconds),
     }
 
 

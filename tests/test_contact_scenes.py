@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.systems.contact.of_scene import contact, hertz_of
+from models.systems.contact.run import contact, hertz_of
 from models.systems.contact.scene import build
 
 ELLIPSE = """

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,16 @@ import pytest
 from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
 from models.contact.fastsim import fastsim
-from models.contact.fastsim_fields import fastsim_fields
+from models.contact.fields import fastsim_fields
 from models.contact.material import Pair
 from models.core.errors import InputError
 from models.core.table_stream import blocks
 from models.core.tables import NEWTONS, SHARES, read_table
+from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, HEADER, answer
-from models.systems.contact.of_scene import contact
+from models.systems.contact.run import Built, contact
 from models.systems.contact.scene import Method, build
 from models.systems.contact.work_precision import Point, cheapest, exact
-from studies import contact_table
 from studies.contact_table import told
 from validation.cases import contact_price
 from validation.contact.contact_set import FRICTION, JUDGED, LOAD, read, read_drawn
@@ -39,7 +40,7 @@ pytestmark = pytest.mark.usefixtures("empty_folder")
 def answered(text, name="cases.csv", **method):
     """Counts and rows that a table is answered with."""
     Path(name).write_text(text, encoding="utf-8", errors="surrogateescape")
-    counts = answer(Path(name), Path("out.csv"), Pair(), Method(**method))
+    counts = answer(Path(name), Path("out.csv"), partial(Built, Pair()), Method(**method))
     with open("out.csv", newline="") as file:
         return counts, list(csv.DictReader(file))
 
@@ -47,7 +48,11 @@ def answered(text, name="cases.csv", **method):
 def test_one_contact_saves_forces_fields_and_a_picture(twinrig, capsys):
     assert twinrig("run", "contact_ellipse", "--set", "method.cells=11", "--out", "out", "--json") == 0
     found = json.loads(capsys.readouterr().out)["answer"]
-    assert {path.name for path in Path("out").iterdir()} == {"command.txt", "forces.csv", "fields.csv", "contact.png"}
+    assert {path.name for path in Path("out").iterdir()} == {
+        "command.txt",
+        "contact.png",
+        *(f"{name}.{kind}" for name in ("forces", "fields") for kind in ("csv", "nc")),
+    }
     force = found["forces"][0]
     fields = np.genfromtxt("out/fields.csv", delimiter=",", skip_header=1)
     assert Path("out/fields.csv").read_text().startswith("x [m],y [m],dx [m],dy [m],pressure [Pa],px [Pa],py [Pa]")
@@ -219,15 +224,15 @@ def test_wrong_rows_get_a_status_and_stop_no_other():
 
 def test_sizes_of_an_answer_are_those_of_its_sound_rows(monkeypatch):
     """They are what a sweep of a table draws."""
-    monkeypatch.setattr(contact_table, "BLOCK", 2)
+    monkeypatch.setattr(cases_table, "BLOCK", 2)
     rows = ["3,3,1,ok", "4,,,wrong", "5,,,wrong", "6,,,wrong", "7,-4,1,ok"]
     Path("forces.csv").write_text("\n".join(["line [-],fx [N],stick [-],status", *rows]) + "\n")
-    assert contact_table.sizes(Path("forces.csv")) == {
+    assert cases_table.sizes(Path("forces.csv")) == {
         "fx": {"unit": "N", "largest": 4.0, "rms": pytest.approx(12.5**0.5)},
         "stick": {"unit": "-", "largest": 1.0, "rms": 1.0},
     }
     Path("none.csv").write_text("line [-],fx [N],status\n3,,wrong\n")
-    assert contact_table.sizes(Path("none.csv")) == {}
+    assert cases_table.sizes(Path("none.csv")) == {}
 
 
 def test_a_table_that_was_cut_off_says_so():
@@ -250,7 +255,7 @@ def test_a_table_that_was_cut_off_says_so():
 def test_a_header_that_cannot_be_used_is_refused_before_anything_is_written(header, words):
     Path("cases.csv").write_text(header + ROW if header else "")
     with pytest.raises(InputError) as found:
-        answer(Path("cases.csv"), Path("out.csv"), Pair(), Method())
+        answer(Path("cases.csv"), Path("out.csv"), partial(Built, Pair()), Method())
     assert words in str(found.value) and not Path("out.csv").exists()
 
 

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from models.contact import hertz
-from models.contact.falling_friction import Falling
 from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
-from models.contact.fastsim_fields import fastsim_fields
 from models.contact.fastsim_grid import POWERS, grid, strips_of
+from models.contact.fields import fastsim_fields
 from models.contact.linear_theory import coefficients, flexibilities
-from models.contact.material import Pair
+from models.contact.material import Falling, Pair
 from models.core.errors import InputError
 from validation.cases import fastsim as case
-from validation.contact.friction_limit import most_moment
-from validation.contact.fuzzed_creepage import OPTIONS, contacts, worst
+from validation.contact.fuzzed_creepage import OPTIONS, contacts, most_moment, worst
 
 PAIR = Pair()
 AT = {"a": 6e-3, "b": 4e-3, "load": 80e3, "mu": 0.3, "xi_x": 1e-3, "xi_y": -5e-4, "spin": 0.3}
@@ -169,7 +167,7 @@ def test_derivatives_are_those_of_the_march(kind, growing):
         moved = {**given, "load": given["load"] * (1 + share), "a": given["a"] * grown, "b": given["b"] * grown}
         found = fastsim(**moved, pair=PAIR, flexibilities=kind)
         ends.append(np.stack([found.fx, found.fy, found.mz], axis=1))
-    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case._units()
+    off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case.UNITS
     assert np.quantile(off.max(axis=1), 0.95) < 1e-7
 
 

@@ -8,7 +8,7 @@ from models.contact.material import STEEL, Material, Pair
 from models.contact.simplified_theory import roll
 from models.core.errors import InputError
 from models.core.strict import read
-from models.systems.contact.of_scene import interpenetrating
+from models.systems.contact.run import interpenetrating
 from validation.cases.contact_hertz import ellipse, measure
 
 PAIR = Pair()

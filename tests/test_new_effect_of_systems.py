@@ -12,12 +12,13 @@ from models.advice.price import effects, effects_of_ride, effects_text
 from models.advice.price.effects import Changed, price_list
 from models.advice.ride_choice.reduced import Whole
 from models.core.errors import InputError
-from models.core.scene_effects import beside, extended, listing, own_table, rebuilt, without
+from models.core.scene_effects import beside, listing, own_table, rebuilt, without
 from models.core.systems import SYSTEMS, load
 from models.multibody.numbers import Handling, Push
 from models.ride.road_path import road_path
 from models.systems.contact.cases_table import answer
-from models.systems.contact.of_scene import contact
+from models.systems.contact.run import Built, contact
+from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
 from models.systems.handling.in_engines import driven, unaccounted
 from models.systems.ride.in_engines import ridden
@@ -296,10 +297,11 @@ def test_a_new_law_of_friction_holds_for_every_row_of_a_table(new_file, tmp_path
         rows = (f"5e-3,4e-3,8e4,{mu},5e-3,1e-3,0.1\n" for mu in friction)
         (tmp_path / f"{name}.csv").write_text(head + "".join(rows))
     scene = build_contact(
-        {"title": "t", "system": "contact", "cases": {"file": "wet.csv"}, "effects": {"rain": {"share": 0.5}}}
+        {"title": "t", "system": "contact", "cases": {"file": "wet.csv"}, "effects": {"rain": {"share": 0.5}}},
+        folder=tmp_path,
     )
-    answer(tmp_path / "wet.csv", tmp_path / "a.csv", scene.pair, scene.method, extend=partial(extended, scene=scene))
-    answer(tmp_path / "dry.csv", tmp_path / "b.csv", scene.pair, scene.method)
+    run_contact(scene, answers=tmp_path / "a.csv")
+    answer(tmp_path / "dry.csv", tmp_path / "b.csv", partial(Built, scene.pair), scene.method)
     assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
 
 
@@ -333,7 +335,7 @@ def test_a_new_profile_and_a_law_that_no_theory_of_the_scene_knows(new_file):
             0.4,
             "{}",
             """
-    from models.contact.falling_friction import Falling
+    from models.contact.material import Falling
 
     return replace(built, falling=Falling(floor=p.floor, decay=0.6, speed=20.0))
 """,

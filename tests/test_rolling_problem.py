@@ -5,10 +5,9 @@ import pytest
 
 from models.contact import rolling_problem
 from models.contact.half_space import influence
-from models.contact.hertz_cells import hertzian
 from models.contact.linear_theory import coefficients
 from models.contact.material import STEEL, Material, Pair
-from models.contact.normal_problem import Pressed, centres, solve_normal
+from models.contact.normal_problem import Pressed, centres, hertzian, solve_normal
 from models.contact.rolling_operator import SlipOperator
 from models.contact.rolling_problem import TOLERANCE, rigid_slip, solve_rolling, solve_shift
 from models.core.errors import InputError, RunFailed

@@ -58,10 +58,10 @@ def value_and_slopes(padded, u, v):
 @njit(cache=True)
 def values(padded, u, v):
     """Values at the points (u[k], v[k])."""
-    found = np.empty(u.size)
+    heights = np.empty(u.size)
     for k in range(u.size):
-        found[k] = value_and_slopes(padded, u[k], v[k])[0]
-    return found
+        heights[k] = value_and_slopes(padded, u[k], v[k])[0]
+    return heights
 
 
 @njit(cache=True)

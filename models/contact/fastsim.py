@@ -28,14 +28,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.contact.falling_friction import Falling
-from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, strips_of
+from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_of
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
-from models.contact.fastsim_many import BLENDED, ONE, THREE, forces, point
+from models.contact.fastsim_many import BLENDED, ONE, THREE, point
+from models.contact.fastsim_many import forces as march_all
 from models.contact.hertz import LEAST_AXIS
 from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
 from models.contact.linear_theory import flexibilities as linear_flexibilities
-from models.contact.material import Pair
+from models.contact.material import Falling, Pair
 from models.core.errors import InputError
 
 Flexibilities = Literal["blended", "one", "three"]
@@ -96,22 +96,23 @@ def fastsim(
     ------
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
-    check_choices(cells, bound, flexibilities, march)
-    if falling is not None:
-        require_second_order(march)
-        from models.contact.fastsim_falling import forces_falling
-    columns, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
-    found = np.zeros((len(columns), 4))
-    strips = strips_of(columns[:, 0] / columns[:, 1], cells)
-    for count in np.unique(strips):
-        rows = strips == count
-        net, some = grid(cells, int(count), bound), np.zeros((int(rows.sum()), 4))
+    check_choices(cells, bound, flexibilities, march, falling)
+    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
+    forces = np.zeros((len(contacts), 4))
+    for rows, net in nets(contacts, cells, bound):
+        some, marched = np.zeros((rows.size, 4)), (contacts[rows], net.strips, net.cells, net.middle)
         if falling is None:
-            forces(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], MARCHES[march], some)
+            march_all(*marched, KINDS[flexibilities], MARCHES[march], some)
         else:
-            forces_falling(columns[rows], net.strips, net.cells, net.middle, KINDS[flexibilities], *falling.law, some)
-        found[rows] = some
-    return _creep(found, columns, shape)
+            from models.contact.fastsim_falling import forces_falling
+
+            forces_falling(*marched, KINDS[flexibilities], *falling.law, some)
+        forces[rows] = some
+    fx, fy, mz, stick = forces.T
+    along, across = fx * contacts[:, 4], fy * contacts[:, 5]
+    lost = 0.0 - (along + across + mz * contacts[:, 6])
+    values = fx, fy, mz, stick, lost, np.abs(along) + np.abs(across)
+    return Creep(*(value.reshape(shape)[()] for value in values))
 
 
 class Ellipse:
@@ -163,8 +164,8 @@ class Ellipse:
         return found
 
 
-def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> None:
-    """Raise InputError for an option that is not one."""
+def check_choices(cells: int, bound: str, flexibilities: str, march: str, falling: Falling | None = None) -> None:
+    """Raise InputError for an option that is not one, and for a march that knows no falling friction."""
     whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     for name, value, known in (
         ("bound", bound, tuple(POWERS)),
@@ -173,11 +174,7 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str) -> Non
     ):
         if value not in known:
             raise InputError("", name, value, "is not known", known)
-
-
-def require_second_order(march: str) -> None:
-    """Raise InputError for a march that knows no falling friction."""
-    if march != "second-order":
+    if falling is not None and march != "second-order":
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
@@ -185,26 +182,16 @@ def contacts_of(
     a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
 ) -> tuple[Array, tuple[int, ...]]:
     """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 0.1 m."""
-    axes = {name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))}
     given = together(
-        **axes,
+        **{name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))},
         load=quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
         mu=quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
         **creepages(xi_x, xi_y, spin),
     )
     columns = np.array([values.ravel() for values in given]).T.reshape(-1, 7)
     loaded = columns[:, 2] > NOTHING
-    quantity("a", columns[loaded, 0], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
-    quantity("b", columns[loaded, 1], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
+    for name, axis in zip("ab", columns[loaded, :2].T, strict=True):
+        quantity(name, axis, "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
     columns[~loaded, :2] = 0.1
     flexible = linear_flexibilities(columns[:, 0], columns[:, 1], pair)
     return np.ascontiguousarray(np.column_stack([columns, *flexible])), given[0].shape
-
-
-def _creep(found: Array, columns: Array, shape: tuple[int, ...]) -> Creep:
-    """Rows (n, 4) of the kernels with the powers that follow from them."""
-    fx, fy, mz, stick = found.T
-    along, across = fx * columns[:, 4], fy * columns[:, 5]
-    lost = 0.0 - (along + across + mz * columns[:, 6])
-    named = (fx, fy, mz, stick, lost, np.abs(along) + np.abs(across))
-    return Creep(*(values.reshape(shape)[()] for values in named))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
-from models.contact.fastsim_grid import Bound, grid, strips_of
+from models.contact.fastsim_grid import Bound, nets
 from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness
 from models.contact.fastsim_many import (
     HALF,
@@ -41,7 +41,7 @@ from models.contact.fastsim_many import (
 )
 from models.contact.inputs import Array
 from models.contact.material import Pair
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -80,41 +80,34 @@ def derivatives(
     check_choices(cells, bound, flexibilities, "second-order")
     contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
     found, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
-    strips = strips_of(contacts[:, A] / contacts[:, B], cells)
-    for count in np.unique(strips):
-        rows, net = np.flatnonzero(strips == count), grid(cells, int(count), bound)
+    for rows, net in nets(contacts, cells, bound):
         _slopes(contacts, rows, net.strips, net.cells, net.middle, KINDS[flexibilities], found, slopes)
-    _to_load(contacts, found, slopes, growing)
-    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
-
-
-def _to_load(contacts: Array, found: Array, slopes: Array, growing: bool) -> None:
-    """Fill in the derivatives to the load from those to the creepages."""
     touching = (contacts[:, LOAD] > 0.0) & (contacts[:, MU] > 0.0)
-    own, moving = contacts[touching], slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
+    moving = slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
     if growing:  # fx / N is a function of xi N^(-1/3) and spin, mz / N^(4/3) as well
         change = found[touching] * np.array([1.0, 1.0, 4.0 / 3.0]) - moving[:, :, :2].sum(axis=2) / 3.0
     else:
         change = found[touching] - moving.sum(axis=2)
-    slopes[touching, :, 3] = change / own[:, LOAD, None]
+    slopes[touching, :, 3] = change / contacts[touching, LOAD, None]
+    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
     """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
     slip, sums, moved, total = np.empty(PER_SLIP), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     scale = np.empty((3, 3))
     for c in rows:
-        own = contacts[c]
-        if not touches(own):
+        contact = contacts[c]
+        if not touches(contact):
             continue
-        rigid_slip(own, cells.shape[1], middle, kind, slip)
-        _scale_slopes(own, cells.shape[1], middle, kind, scale)
+        rigid_slip(contact, cells.shape[1], middle, kind, slip)
+        _scale_slopes(contact, cells.shape[1], middle, kind, scale)
         total[:] = 0.0
         for s in range(strips.shape[1]):
-            _strip(own, strips[:, s], cells, slip, sums, moved)
-            part = own[MU] * own[LOAD] * strips[PART, s]
-            arm, off = own[A] * strips[HALF, s], own[B] * strips[Y, s]
+            _strip(contact, strips[:, s], cells, slip, sums, moved)
+            part = contact[MU] * contact[LOAD] * strips[PART, s]
+            arm, off = contact[A] * strips[HALF, s], contact[B] * strips[Y, s]
             found[c, 0] += part * sums[0]
             found[c, 1] += part * sums[1]
             found[c, 2] += part * (arm * sums[2] - off * sums[0])
@@ -127,35 +120,35 @@ def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
                 slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
 
 
-@njit(cache=True, error_model="numpy")
-def _scale_slopes(own, cells, middle, kind, scale):
+@compiled
+def _scale_slopes(contact, cells, middle, kind, scale):
     """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
-    a, c = own[A], math.sqrt(own[A] * own[B])
-    bound = own[MU] * middle * own[LOAD] / (a * own[B])
-    step, creep = 2.0 * a / (cells * bound), (own[XI_X], own[XI_Y], own[SPIN] * c)
-    k, change = stiffness(own, bound, kind), np.zeros(3)
-    blended = blend(own, bound, kind)
+    a, c = contact[A], math.sqrt(contact[A] * contact[B])
+    bound = contact[MU] * middle * contact[LOAD] / (a * contact[B])
+    step, creep = 2.0 * a / (cells * bound), (contact[XI_X], contact[XI_Y], contact[SPIN] * c)
+    k, change = stiffness(contact, bound, kind), np.zeros(3)
+    blended = blend(contact, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
-    mean = mean_flexibility(own, creep[2], kind)
+    mean = mean_flexibility(contact, creep[2], kind)
     for j in range(3):
         unit = c if j == 2 else 1.0
         if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
             if kind == ONE:
-                d_mean = (sign * own[L1 + j] - mean * creep[j] / size) / size
+                d_mean = (sign * contact[L1 + j] - mean * creep[j] / size) / size
             else:
-                d_mean = 2.0 * creep[j] * (own[L1 + j] - mean) / (size * size)
+                d_mean = 2.0 * creep[j] * (contact[L1 + j] - mean) / (size * size)
             d_one = -d_mean / (mean * mean)
             for i in range(3):
-                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / own[L1 + i]) + blended[0] * d_one)
+                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / contact[L1 + i]) + blended[0] * d_one)
         for i in range(3):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
 
 
-@njit(cache=True, error_model="numpy")
-def _strip(own, strip, cells, slip, sums, moved):
+@compiled
+def _strip(contact, strip, cells, slip, sums, moved):
     """Sums of q_x, q_y, t q_y along one strip, and their derivatives (3, 3) to the three numbers of rigid slip."""
-    spread, off, arm = strip[SPREAD], own[B] * strip[Y], own[A] * strip[HALF]
+    spread, off, arm = strip[SPREAD], contact[B] * strip[Y], contact[A] * strip[HALF]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
     dx, dy = np.zeros(3), np.zeros(3)
@@ -171,7 +164,8 @@ def _strip(own, strip, cells, slip, sums, moved):
         else:
             x, y, now = advance(px, py, slips, u, v, v1 * change, g, cells[BEFORE, i], cells[RATE, i])
         turns = slips * (u * u + v * v) > STILL
-        late, steep = _lateness_slope((abs(u) + abs(v)) * cells[RATE, i]) if turns else (0.0, 0.0)
+        reach = (abs(u) + abs(v)) * cells[RATE, i] if turns else 0.0
+        late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
             kept, pull, size = _turning(px, py, u, w, cells[BEFORE, i], cells[RATE, i])
@@ -199,13 +193,7 @@ def _strip(own, strip, cells, slip, sums, moved):
             moved[2, k] += t * dy[k]
 
 
-@njit(cache=True, error_model="numpy")
-def _lateness_slope(z):
-    """``lateness`` and its derivative."""
-    return lateness(z), (0.5 if z < 0.4 else 0.2 if z < 1.75 else 0.0)
-
-
-@njit(cache=True, error_model="numpy")
+@compiled
 def _turning(px, py, u, v, before, rate):
     """What ``advance`` does to a slipping traction: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
     size = math.sqrt(u * u + v * v)

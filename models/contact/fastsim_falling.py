@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, MIDDLE, RATE, advance, cut
+from models.contact.fastsim_kernels import CENTRE, MIDDLE, SECOND_ORDER
 from models.contact.fastsim_many import (
     HALF,
     LOAD,
@@ -16,35 +16,36 @@ from models.contact.fastsim_many import (
     PART,
     PER_SLIP,
     SPIN,
-    SPREAD,
     XI_X,
     XI_Y,
     A,
     B,
     Y,
     rigid_slip,
+    strip_tractions,
     touches,
 )
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 
-@njit(cache=True, error_model="numpy")
-def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
+@compiled
+def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers):
     """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
     n, m = cells.shape[1], strips.shape[1]
-    slip, tractions = np.empty(PER_SLIP), np.empty((3, n))
+    slip, left, tractions = np.empty(PER_SLIP), np.empty((2, n)), np.empty((3, n))
     area = 0.0
     for s in range(m):
         area += strips[HALF, s]
     for c in range(len(contacts)):
-        own = contacts[c]
-        found[c] = 0.0
-        if not touches(own):
+        contact = contacts[c]
+        answers[c] = 0.0
+        if not touches(contact):
             continue
-        rigid_slip(own, n, middle, kind, slip)
-        limit = own[MU] * own[LOAD]
+        rigid_slip(contact, n, middle, kind, slip)
+        limit = contact[MU] * contact[LOAD]
         for s in range(m):
-            strip_falling(own, strips[:, s], cells, slip, floor, decay, tractions)
+            friction_left(contact, strips[:, s], cells, floor, decay, left)
+            strip_tractions(contact, strips[:, s], cells, slip, SECOND_ORDER, left, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
@@ -52,36 +53,23 @@ def forces_falling(contacts, strips, cells, middle, kind, floor, decay, found):
                 turn += cells[CENTRE, i] * tractions[1, i]
                 stuck += 1.0 - tractions[2, i]
             part, half = limit * strips[PART, s], strips[HALF, s]
-            found[c, 0] += part * x
-            found[c, 1] += part * y
-            found[c, 2] += part * (own[A] * half * turn - own[B] * strips[Y, s] * x)
-            found[c, 3] += half * stuck / (n * area)
+            answers[c, 0] += part * x
+            answers[c, 1] += part * y
+            answers[c, 2] += part * (contact[A] * half * turn - contact[B] * strips[Y, s] * x)
+            answers[c, 3] += half * stuck / (n * area)
 
 
-@njit(cache=True, error_model="numpy")
-def strip_falling(own, strip, cells, slip, floor, decay, found):
-    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``found`` (3, cells)."""
-    y, half, spread = strip[Y], strip[HALF], strip[SPREAD]
-    u, v0 = spread * (slip[0] - slip[2] * own[B] * y), spread * slip[1]
-    v1 = spread * slip[2] * own[A] * half
-    along, across, turn = own[XI_X] - own[SPIN] * own[B] * y, own[XI_Y], own[SPIN] * own[A] * half
-    change, last = -2.0 / cells.shape[1], 0.0
-    px = py = slips = 0.0
+@compiled
+def friction_left(contact, strip, cells, floor, decay, left):
+    """Fill ``left`` (2, cells) as ``strip_tractions`` reads it: at the rigid slip of the points."""
+    along = contact[XI_X] - contact[SPIN] * contact[B] * strip[Y]
+    across, turn = contact[XI_Y], contact[SPIN] * contact[A] * strip[HALF]
     for i in range(cells.shape[1]):
-        v = v0 + v1 * cells[MIDDLE, i]
-        here = _left(along, across + turn * cells[CENTRE, i], floor, decay)
-        middle = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
-        g = here * cells[BOUND, i]
-        if i == 0:
-            px, py, slips = cut(-0.5 * u, -0.5 * v, g)
-        else:
-            rate = cells[RATE, i] / middle
-            px, py, slips = advance(px, py, slips, u, v, v1 * change, g, last * cells[BEFORE, i], rate)
-        last = here
-        found[0, i], found[1, i], found[2, i] = px, py, slips
+        left[0, i] = _left(along, across + turn * cells[CENTRE, i], floor, decay)
+        left[1, i] = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _left(along, across, floor, decay):
     """Share of the friction that is left at a slip."""
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

@@ -1,5 +1,6 @@
 """The cells of FASTSIM on an ellipse of semi-axes 1: strips with exact ends, and the bound normalised to the load."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -42,6 +43,13 @@ def strips_of(ratio: Array, cells: int) -> Array:
     return 2 * np.ceil(wanted / 2.0 - 1e-9).astype(int)
 
 
+def nets(contacts: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
+    """Numbers of the contacts (n, 2 or more), of semi-axes a and b, that have the same net, and that net."""
+    strips = strips_of(contacts[:, 0] / contacts[:, 1], cells)
+    for count in np.unique(strips):
+        yield np.flatnonzero(strips == count), grid(cells, int(count), bound)
+
+
 @lru_cache(maxsize=256)
 def grid(cells: int, strips: int, bound: Bound) -> Grid:
     """Net of ``strips`` strips of one width with ``cells`` cells each, of one length within a strip.
@@ -50,20 +58,15 @@ def grid(cells: int, strips: int, bound: Bound) -> Grid:
     """
     y = (strips - 1.0 - 2.0 * np.arange(strips)) / strips  # mirrored in y to the last digit
     half = np.sqrt((1.0 - y) * (1.0 + y))
-    along, height = _along(cells, bound), _pressure(y, bound)
-    share = height * half
-    whole = share.sum() * along[1].sum()
-    return Grid(np.array([y, half, half / height, share / whole]), along, cells * strips / (4.0 * whole))
-
-
-def _along(cells: int, bound: Bound) -> Array:
-    """What is the same for every strip: rows CENTRE, BOUND, MIDDLE, BEFORE, RATE of the kernels."""
     edges = np.linspace(1.0, -1.0, cells + 1)
     centre = (edges[:-1] + edges[1:]) / 2.0
     middle = np.append((1.0 + centre[0]) / 2.0, edges[1:-1])
-    height = _pressure(centre, bound)
+    across, height = _pressure(y, bound), _pressure(centre, bound)
     before = np.append(0.0, height[:-1]) * ROUNDED
-    return np.array([centre, height, middle, before, 0.125 / _pressure(middle, bound)])
+    along = np.array([centre, height, middle, before, 0.125 / _pressure(middle, bound)])
+    share = across * half
+    carried = share.sum() * height.sum()
+    return Grid(np.array([y, half, half / across, share / carried]), along, cells * strips / (4.0 * carried))
 
 
 def _pressure(t: Array, bound: Bound) -> Array:

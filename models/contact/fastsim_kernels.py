@@ -12,7 +12,7 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
-from models.machine.compiled import njit
+from models.machine.compiled import compiled, njit
 
 LANES = 24
 """Strips that are marched at once; the last ones may be empty."""
@@ -127,7 +127,7 @@ def _keep(lanes, j, t, x, y, slips):
     lanes[SLID * LANES + j] += slips
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _clear(lanes):
     """Sums and states of all lanes to zero."""
     for j in range(SUM_X * LANES, ROWS * LANES):

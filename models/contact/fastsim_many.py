@@ -8,7 +8,13 @@ import math
 import numpy as np
 
 from models.contact.fastsim_kernels import (
+    BEFORE,
+    BOUND,
+    CENTRE,
     LANES,
+    MIDDLE,
+    PLAIN,
+    RATE,
     ROWS,
     SECOND_ORDER,
     SLID,
@@ -18,11 +24,13 @@ from models.contact.fastsim_kernels import (
     V0,
     V1,
     U,
+    advance,
+    cut,
     march_plain,
     march_second_order,
 )
 from models.contact.inputs import NOTHING
-from models.machine.compiled import lean, njit
+from models.machine.compiled import compiled, lean
 
 A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
 """Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
@@ -41,23 +49,23 @@ SLIDING, MOST = 8.0, 100.0
 """Square of the reach at which creepage without spin slides all over; exponents beyond which nothing changes."""
 
 
-@njit(cache=True, error_model="numpy")
-def forces(contacts, strips, cells, middle, kind, march, found):
-    """Fill ``found`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
+@compiled
+def forces(contacts, strips, cells, middle, kind, march, answers):
+    """Fill ``answers`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
 
     contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
     march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
     """
     slips, lanes = np.empty((len(contacts), PER_SLIP)), np.empty(ROOM)
-    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found)
+    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers)
 
 
 @lean
-def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, found):
+def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers):
     """``forces`` that makes no array: slips (n, PER_SLIP) and lanes (ROOM,) are room to work in."""
     for c in range(len(contacts)):
         rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
-        found[c, 0] = found[c, 1] = found[c, 2] = found[c, 3] = 0.0
+        answers[c, 0] = answers[c, 1] = answers[c, 2] = answers[c, 3] = 0.0
     m = strips.shape[1]
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
@@ -66,13 +74,13 @@ def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, fo
             march_second_order(lanes, cells)
         else:
             march_plain(lanes, cells)
-        _collect(lanes, first, count, contacts, strips, slips, found)
+        _collect(lanes, first, count, contacts, strips, slips, answers)
     area = 0.0
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
         area += strips[HALF, s] * cells.shape[1]
     for c in range(len(contacts)):
         if touches(contacts[c]):
-            found[c, 3] = 1.0 - found[c, 3] / area
+            answers[c, 3] = 1.0 - answers[c, 3] / area
 
 
 @lean
@@ -105,8 +113,8 @@ def stiffness(contact, bound, kind):
     part = blend(contact, bound, kind)[0]
     if part == 0.0:
         return k1, k2, k3
-    one = 1.0 / mean_flexibility(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]), kind)
-    return k1 + part * (one - k1), k2 + part * (one - k2), k3 + part * (one - k3)
+    mean = 1.0 / mean_flexibility(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]), kind)
+    return k1 + part * (mean - k1), k2 + part * (mean - k2), k3 + part * (mean - k3)
 
 
 @lean
@@ -176,33 +184,55 @@ def _fill(lanes, first, count, contacts, strips, slips):
 
 
 @lean
-def _collect(lanes, first, count, contacts, strips, slips, found):
+def _collect(lanes, first, count, contacts, strips, slips, answers):
     """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
     c, s = first // strips.shape[1], first % strips.shape[1]
     for j in range(count):
         if touches(contacts[c]):
             part, half = contacts[c, MU] * contacts[c, LOAD] * strips[PART, s], strips[HALF, s]
             x = lanes[SUM_X * LANES + j]
-            found[c, 0] += part * x
-            found[c, 1] += part * lanes[SUM_Y * LANES + j]
+            answers[c, 0] += part * x
+            answers[c, 1] += part * lanes[SUM_Y * LANES + j]
             arm, off = contacts[c, A] * half, contacts[c, B] * strips[Y, s]
-            found[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
-            found[c, 3] += half * lanes[SLID * LANES + j]
+            answers[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
+            answers[c, 3] += half * lanes[SLID * LANES + j]
         s += 1
         if s == strips.shape[1]:
             c, s = c + 1, 0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
+def strip_tractions(contact, strip, cells, slip, march, left, answers):
+    """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells).
+
+    left : (2, cells), share of the friction that is left in the cells' centres and in the middles of the steps there.
+    """
+    u, v0 = strip[SPREAD] * (slip[0] - slip[2] * contact[B] * strip[Y]), strip[SPREAD] * slip[1]
+    v1, change, before = strip[SPREAD] * slip[2] * contact[A] * strip[HALF], -2.0 / cells.shape[1], 0.0
+    x = y = slips = 0.0
+    for i in range(cells.shape[1]):
+        v, g = v0 + v1 * cells[MIDDLE, i], left[0, i] * cells[BOUND, i]
+        if march == PLAIN:
+            x, y, slips = cut(x - u, y - v0 - v1 * cells[CENTRE, i], g)
+        elif i == 0:
+            x, y, slips = cut(-0.5 * u, -0.5 * v, g)
+        else:
+            rate = cells[RATE, i] / left[1, i]
+            x, y, slips = advance(x, y, slips, u, v, v1 * change, g, before * cells[BEFORE, i], rate)
+        before = left[0, i]
+        answers[0, i], answers[1, i], answers[2, i] = x, y, slips
+
+
+@compiled
 def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, middle, kind, march):
     """fx, fy, mz of one ellipse of semi-axes a and a ``by_ratio``, flexibilities a (l1, l2, l3); NaN for bad input."""
-    contacts, found = np.empty((1, 10)), np.empty((1, 4))
+    contacts, answers = np.empty((1, 10)), np.empty((1, 4))
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
     own = contacts[0]
     own[A], own[B], own[LOAD], own[MU] = a, a * by_ratio, load, mu
     own[XI_X], own[XI_Y], own[SPIN] = xi_x, xi_y, spin
     own[L1], own[L2], own[L3] = a * l1, a * l2, a * l3
-    forces(contacts, strips, cells, middle, kind, march, found)
+    forces(contacts, strips, cells, middle, kind, march, answers)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
-    return found[0, 0] + bad, found[0, 1] + bad, found[0, 2] + bad
+    return answers[0, 0] + bad, answers[0, 1] + bad, answers[0, 2] + bad

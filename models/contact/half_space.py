@@ -9,19 +9,17 @@ with A in closed form below. Far from its cell an influence number falls as 1/di
 convolution, done by the fast Fourier transform on a grid padded with zeros to twice its size: exact but for rounding.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import fft
 
-if TYPE_CHECKING:
-    from models.contact.material import Pair
+from models.contact.inputs import Array
+from models.contact.material import Pair
 
 X, Y, Z = 0, 1, 2
 """Indices of the axes in ``influence``."""
 
 
-def influence(x: np.ndarray, y: np.ndarray, dx: float, dy: float, pair: "Pair") -> np.ndarray:
+def influence(x: Array, y: Array, dx: float, dy: float, pair: Pair) -> Array:
     """Displacement difference (m) at a point by a unit traction (1 Pa) on a rectangle dx by dy (m).
 
     x, y : (...) coordinates of the point from the rectangle's centre (m), broadcast against each other.
@@ -46,7 +44,7 @@ def influence(x: np.ndarray, y: np.ndarray, dx: float, dy: float, pair: "Pair") 
     return np.moveaxis(numbers, (0, 1), (-2, -1))
 
 
-def _primitives(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _primitives(x: Array, y: Array) -> Array:
     """Integrals from the origin to (x, y) of y^2/r^3, x^2/r^3, xy/r^3, x/r^2 and y/r^2, (..., 5).
 
     Terms that depend on x alone or on y alone are left out: they cancel between the corners.
@@ -61,7 +59,7 @@ def _primitives(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.stack([along, across, -r, y * logarithm + angle_x, x * logarithm + angle_y], axis=-1)
 
 
-def _angle(opposite: np.ndarray, adjacent: np.ndarray) -> np.ndarray:
+def _angle(opposite: Array, adjacent: Array) -> Array:
     """atan(opposite / adjacent), pi/2 where adjacent is zero."""
     return np.arctan2(opposite * np.sign(adjacent), np.abs(adjacent))
 
@@ -72,7 +70,7 @@ class Convolution:
     kernel : (2 ny - 1, 2 nx - 1, out, in), offset zero in its centre.
     """
 
-    def __init__(self, kernel: np.ndarray) -> None:
+    def __init__(self, kernel: Array) -> None:
         self.cells = ((kernel.shape[0] + 1) // 2, (kernel.shape[1] + 1) // 2)
         self._size = tuple(fft.next_fast_len(n, real=True) for n in kernel.shape[:2])
         rolled = np.zeros((*self._size, *kernel.shape[2:]))
@@ -80,13 +78,13 @@ class Convolution:
         rolled = np.roll(rolled, (1 - self.cells[0], 1 - self.cells[1]), axis=(0, 1))
         self._spectrum = fft.rfft2(np.moveaxis(rolled, (0, 1), (-2, -1)), workers=1)
 
-    def __call__(self, values: np.ndarray) -> np.ndarray:
+    def __call__(self, values: Array) -> Array:
         """Values (ny, nx, in) to their sums (ny, nx, out)."""
         spectrum = fft.rfft2(np.moveaxis(values, -1, 0), self._size, workers=1)
         sums = fft.irfft2(np.einsum("ijyx,jyx->iyx", self._spectrum, spectrum), self._size, workers=1)
         return np.moveaxis(sums[:, : self.cells[0], : self.cells[1]], 0, -1)
 
 
-def offsets(cells: int, step: float) -> np.ndarray:
+def offsets(cells: int, step: float) -> Array:
     """Distances (m) between the centres of two of ``cells`` cells: (2 cells - 1,), ascending."""
     return np.arange(1 - cells, cells) * step

@@ -102,11 +102,11 @@ def by_axes(a: float, b: float, pair: Pair, *, load: float | None = None, approa
 
 def _curvatures(A: Any, B: Any) -> dict[str, Array]:
     """Both curvatures as arrays; raises InputError where they are none of a Hertzian contact."""
-    found = {
+    answer = {
         name: quantity(name, value, "a curvature in 1/m, at most 1e12", most=1e12)
         for name, value in (("A", A), ("B", B))
     }
-    for name, value in found.items():
+    for name, value in answer.items():
         if (value <= 0.0).any():
             raise InputError(
                 "",
@@ -116,13 +116,13 @@ def _curvatures(A: Any, B: Any) -> dict[str, Array]:
                 "direction, conform or interpenetrate do not touch on an ellipse; compute them as "
                 "non-Hertzian contact",
             )
-    A, B = together(**found)
+    A, B = together(**answer)
     flattest = float(np.maximum(A, B).min(initial=np.inf))
     if flattest < FLATTEST:
         raise InputError(
             "", "A, B", flattest, f"the larger of both must be {FLATTEST:g} 1/m or more; radii are in m, not in mm"
         )
-    return found
+    return answer
 
 
 def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, whole: Array, pair: Pair) -> Hertz:
@@ -138,16 +138,16 @@ def _contact(A: Array, B: Array, load: Array, short: Array, ratio: Array, whole:
 
 def aspects(curvatures: Array) -> tuple[Array, Array, Array]:
     """``aspect`` of each ratio of curvatures, of any shape: three arrays of that shape."""
-    found = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
-    return found[0], found[1], found[2]
+    answer = _aspects(np.ascontiguousarray(curvatures).ravel()).reshape(3, *curvatures.shape)
+    return answer[0], answer[1], answer[2]
 
 
 @njit(cache=True)
 def _aspects(curvatures: Array) -> Array:
-    found = np.empty((3, curvatures.size))
+    answer = np.empty((3, curvatures.size))
     for i in range(curvatures.size):
-        found[0, i], found[1, i], found[2, i] = aspect(curvatures[i])
-    return found
+        answer[0, i], answer[1, i], answer[2, i] = aspect(curvatures[i])
+    return answer
 
 
 @njit(cache=True)

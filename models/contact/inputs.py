@@ -7,7 +7,8 @@ import numpy as np
 
 from models.core.errors import InputError
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+Array = np.ndarray
+"""Of numbers or flags, of any shape."""
 LARGEST_LOAD = 1e10
 """N"""
 LARGEST_APPROACH = 0.05
@@ -26,26 +27,26 @@ def quantity(name: str, value: Any, allowed: str, least: float = -np.inf, most: 
     numbers and masked elements are none, and nothing is guessed in their place.
     """
     try:
-        given = np.asanyarray(value)
-        if given.dtype.kind not in "fiuO" or np.ma.is_masked(given):
+        raw = np.asanyarray(value)
+        if raw.dtype.kind not in "fiuO" or np.ma.is_masked(raw):
             raise TypeError
-        found = np.asarray(given, dtype=float)
+        numbers = np.asarray(raw, dtype=float)
     except (TypeError, ValueError):
         raise InputError("", name, value, f"must be a number or an array of numbers: {allowed}") from None
-    good = (found >= least) & (found <= most) & np.isfinite(found)
+    good = (numbers >= least) & (numbers <= most) & np.isfinite(numbers)
     if not good.all():
-        first = np.unravel_index(int(np.argmin(good)), found.shape)
+        first = np.unravel_index(int(np.argmin(good)), numbers.shape)
         place = f"{name}[{', '.join(map(str, first))}]" if first else name
-        raise InputError("", place, float(found[first]), f"must be {allowed}")
-    return found
+        raise InputError("", place, float(numbers[first]), f"must be {allowed}")
+    return numbers
 
 
 def number(name: str, value: Any, allowed: str, least: float = -np.inf, most: float = np.inf) -> float:
     """``quantity`` of a function that takes one number and no array."""
-    found = quantity(name, value, allowed, least, most)
-    if found.ndim:
+    numbers = quantity(name, value, allowed, least, most)
+    if numbers.ndim:
         raise InputError("", name, value, f"must be one number, not an array: {allowed}")
-    return float(found)
+    return float(numbers)
 
 
 def whole_number(name: str, value: Any, least: int, most: int) -> int:

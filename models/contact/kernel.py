@@ -19,30 +19,28 @@ from numba import carray
 
 from models.contact.fastsim import LEAST_CELLS, MOST_CELLS
 from models.contact.fastsim_grid import MOST_STRIPS, grid, strips_of
-from models.contact.fastsim_kernels import LANES, ROWS, march_second_order
+from models.contact.fastsim_kernels import SECOND_ORDER
 from models.contact.fastsim_many import (
     BLENDED,
-    HALF,
     L1,
     L2,
     L3,
     LOAD,
     MU,
     PER_SLIP,
+    ROOM,
     SPIN,
     XI_X,
     XI_Y,
     A,
     B,
-    _collect,
-    _fill,
-    rigid_slip,
+    forces_within,
 )
 from models.contact.hertz import FLATTEST, LARGEST_AXIS, LEAST_AXIS, aspect, integrals
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN, NOTHING, Array
 from models.contact.linear_theory import LARGEST_PATCH, coefficient_at, flexibilities_at
 from models.core.errors import InputError
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.stack import ask, beyond, doubles
 
 (SHAPE_X, SHAPE_Y, PRESSING, FRICTION, CREEP_X, CREEP_Y, TURNING, MODULUS, POISSON) = range(9)
@@ -60,7 +58,8 @@ _CELLS, _FIRST, _COUNT, _ALONG = range(4)
 """Places in the net: cells per strip, strips of the first net, how many nets, where the rows of the cells begin."""
 _LAW = 1
 """Place of the law's address where the first number is below zero."""
-_LANES, _CONTACT, _SLIPS, _FOUND = ROWS * LANES, 10, PER_SLIP, 4
+_CONTACT, _FORCES = 10, 4
+"""Columns of a contact and of its forces, as ``forces_within`` has them."""
 
 
 @lru_cache(maxsize=64)
@@ -77,70 +76,70 @@ def net(cells: int) -> Array:
     if cells:
         counts = range(int(strips_of(np.array(1.0), cells)), int(strips_of(np.array(1e-9), cells)) + 2, 2)
         nets = [grid(cells, count, "intermediate") for count in counts]
-        parts = [nets[0].cells.ravel(), *(np.append(one.middle, one.strips) for one in nets)]
+        parts = [nets[0].cells.ravel(), *(np.append(row.middle, row.strips) for row in nets)]
     table = np.concatenate(([cells, counts.start, len(counts)], *parts), dtype=float)
     table.setflags(write=False)
     return table
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def contact(given, inputs, table, outputs):
     """Status of one contact, FINE or another; fills ``outputs``.
 
     given : BY_LOAD or another; inputs : pointer to INPUTS doubles; table : pointer to a ``net`` or to the table of
     a distance; outputs : pointer to OUTPUTS doubles. A load or an approach of zero or less has zeros all over.
     """
-    own, out = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,))
+    values, out = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,))
     any_shape = carray(table, (1,))[_CELLS] < 0.0
-    status = _status(given, own, any_shape)
+    status = _status(given, values, any_shape)
     out[:] = 0.0 if status == FINE else math.nan
-    if status != FINE or (own[PRESSING] <= 0.0 and not any_shape):
+    if status != FINE or (values[PRESSING] <= 0.0 and not any_shape):
         return status
     if any_shape:
         return ask(int(carray(table, (2,))[_LAW]), inputs, table, outputs)
-    if not _press(given, own, out):
+    if not _press(given, values, out):
         out[:] = math.nan
         return NOT_PLAUSIBLE
     if carray(table, (1,))[_CELLS] == 0.0:
-        _linear(own, out)
-    elif own[FRICTION] * out[NORMAL] > NOTHING:
-        _creep(own, table, out)
+        _linear(values, out)
+    elif values[FRICTION] * out[NORMAL] > NOTHING:
+        _creep(values, table, out)
     return FINE
 
 
-@njit(cache=True, error_model="numpy")
-def _status(given, own, any_shape):
+@compiled
+def _status(given, values, any_shape):
     """Whether the inputs are numbers, and numbers in SI."""
     if not BY_LOAD <= given <= AXES_BY_APPROACH or (any_shape and given != BY_APPROACH):
         return NOT_KNOWN
-    for value in own:
+    for value in values:
         if not math.isfinite(value):
             return NOT_FINITE
     most = LARGEST_LOAD if given in (BY_LOAD, AXES_BY_LOAD) else LARGEST_APPROACH
-    small, large = min(own[SHAPE_X], own[SHAPE_Y]), max(own[SHAPE_X], own[SHAPE_Y])
+    small, large = min(values[SHAPE_X], values[SHAPE_Y]), max(values[SHAPE_X], values[SHAPE_Y])
     if any_shape:
         shaped = True
     elif given in (BY_LOAD, BY_APPROACH):
         shaped = small > 0.0 and FLATTEST <= large <= LARGEST_CURVATURE
     else:  # without a load the axes may be none
-        shaped = (small >= LEAST_AXIS or own[PRESSING] <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
+        shaped = (small >= LEAST_AXIS or values[PRESSING] <= 0.0) and small >= 0.0 and large <= LARGEST_AXIS
     plausible = (
         shaped
-        and own[PRESSING] <= most
-        and 0.0 <= own[FRICTION] <= LARGEST_FRICTION
-        and abs(own[CREEP_X]) <= LARGEST_CREEPAGE
-        and abs(own[CREEP_Y]) <= LARGEST_CREEPAGE
-        and abs(own[TURNING]) <= LARGEST_SPIN
-        and own[MODULUS] > 0.0
-        and 0.0 <= own[POISSON] <= 0.5
+        and values[PRESSING] <= most
+        and 0.0 <= values[FRICTION] <= LARGEST_FRICTION
+        and abs(values[CREEP_X]) <= LARGEST_CREEPAGE
+        and abs(values[CREEP_Y]) <= LARGEST_CREEPAGE
+        and abs(values[TURNING]) <= LARGEST_SPIN
+        and values[MODULUS] > 0.0
+        and 0.0 <= values[POISSON] <= 0.5
     )
     return FINE if plausible else NOT_PLAUSIBLE
 
 
-@njit(cache=True, error_model="numpy")
-def _press(given, own, out):
+@compiled
+def _press(given, values, out):
     """Axes, approach and load by Hertz; whether the ellipse is one that the theories of rolling take."""
-    x, y, elastic = own[SHAPE_X], own[SHAPE_Y], own[MODULUS] / (1.0 - own[POISSON])
+    x, y, elastic = values[SHAPE_X], values[SHAPE_Y], values[MODULUS] / (1.0 - values[POISSON])
     small, large = min(x, y), max(x, y)
     if given in (BY_LOAD, BY_APPROACH):
         if large > SLENDEREST**1.6 * small:  # beyond it a/b, about the power 2/3 of this, is so in any case
@@ -148,18 +147,20 @@ def _press(given, own, out):
         ratio, cosine, sine = aspect(small / large)
         whole = cosine + sine
         if given == BY_LOAD:
-            load = own[PRESSING]
+            load = values[PRESSING]
             short = np.cbrt(1.5 * load * cosine / (math.pi * elastic * large) * ratio)
         else:
-            short = np.sqrt(own[PRESSING] * cosine / (large * whole))
-            load = 2.0 / 3.0 * math.pi * elastic * own[PRESSING] * short / (ratio * whole)
+            short = np.sqrt(values[PRESSING] * cosine / (large * whole))
+            load = 2.0 / 3.0 * math.pi * elastic * values[PRESSING] * short / (ratio * whole)
         long = short / ratio
         out[AXIS_A], out[AXIS_B] = (long, short) if x <= y else (short, long)
     else:
         cosine, sine = integrals(small / large) if small * SLENDEREST >= large else (1.0, 1.0)
         whole, short, long = cosine + sine, small, large
         by_load = given == AXES_BY_LOAD
-        load = own[PRESSING] if by_load else 2.0 / 3.0 * math.pi * x * y * own[PRESSING] * elastic / (small * whole)
+        load = (
+            values[PRESSING] if by_load else 2.0 / 3.0 * math.pi * x * y * values[PRESSING] * elastic / (small * whole)
+        )
         out[AXIS_A], out[AXIS_B] = x, y
     out[NORMAL] = load
     out[APPROACH] = 1.5 * load / (math.pi * short * long) * short * whole / elastic
@@ -167,30 +168,22 @@ def _press(given, own, out):
     return rolls and load <= LARGEST_LOAD
 
 
-@njit(cache=True, error_model="numpy")
-def _linear(own, out):
+@compiled
+def _linear(values, out):
     """Forces as long as nothing slips."""
-    a, b, shear = out[AXIS_A], out[AXIS_B], own[MODULUS]
-    area, ratio, nu = a * b, a / b, own[POISSON]
-    along = across = mixed = turn = 0.0
+    a, b, shear = out[AXIS_A], out[AXIS_B], values[MODULUS]
+    area, ratio, nu = a * b, a / b, values[POISSON]
+    c = carray(doubles(4), (4,))
     for kind in range(4):  # a loop, as numba compiles one function for each number that is written out
-        c = coefficient_at(kind, ratio, nu)
-        if kind == 0:
-            along = c
-        elif kind == 1:
-            across = c
-        elif kind == 2:
-            mixed = c
-        else:
-            turn = c
-    out[FX] = -shear * area * along * own[CREEP_X]
-    out[FY] = -shear * (area * across * own[CREEP_Y] + area**1.5 * mixed * own[TURNING])
-    out[MZ] = shear * (area**1.5 * mixed * own[CREEP_Y] - area**2 * turn * own[TURNING])
+        c[kind] = coefficient_at(kind, ratio, nu)
+    out[FX] = -shear * area * c[0] * values[CREEP_X]
+    out[FY] = -shear * (area * c[1] * values[CREEP_Y] + area**1.5 * c[2] * values[TURNING])
+    out[MZ] = shear * (area**1.5 * c[2] * values[CREEP_Y] - area**2 * c[3] * values[TURNING])
     out[STICK] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
-def _creep(own, table, out):
+@compiled
+def _creep(values, table, out):
     """FASTSIM on one ellipse: as ``fastsim_many.forces``, all arrays on the stack."""
     head = carray(table, (_ALONG,))
     n, first = int(head[_CELLS]), int(head[_FIRST])
@@ -199,20 +192,12 @@ def _creep(own, table, out):
     k = (m - first) // 2
     at = _ALONG + 5 * n + k * (1 + 4 * first) + 4 * k * (k - 1)
     cells, strips = carray(beyond(table, _ALONG), (5, n)), carray(beyond(table, at + 1), (4, m))
-    contacts, slips = carray(doubles(_CONTACT), (1, _CONTACT)), carray(doubles(_SLIPS), (1, _SLIPS))
-    found, lanes = carray(doubles(_FOUND), (1, _FOUND)), carray(doubles(_LANES), (_LANES,))
-    one = contacts[0]
-    one[A], one[B], one[LOAD], one[MU] = out[AXIS_A], out[AXIS_B], out[NORMAL], own[FRICTION]
-    one[XI_X], one[XI_Y], one[SPIN] = own[CREEP_X], own[CREEP_Y], own[TURNING]
-    one[L1], one[L2], one[L3] = flexibilities_at(one[A], one[B], own[MODULUS], own[POISSON])
-    rigid_slip(one, n, carray(beyond(table, at), (1,))[0], BLENDED, slips[0])
-    found[0] = 0.0
-    area = 0.0
-    for start in range(0, m, LANES):
-        count = min(LANES, m - start)
-        _fill(lanes, start, count, contacts, strips, slips)
-        march_second_order(lanes, cells)
-        _collect(lanes, start, count, contacts, strips, slips, found)
-    for s in range(m):
-        area += strips[HALF, s] * n
-    out[FX], out[FY], out[MZ], out[STICK] = found[0, 0], found[0, 1], found[0, 2], 1.0 - found[0, 3] / area
+    contacts, slips = carray(doubles(_CONTACT), (1, _CONTACT)), carray(doubles(PER_SLIP), (1, PER_SLIP))
+    forces, lanes = carray(doubles(_FORCES), (1, _FORCES)), carray(doubles(ROOM), (ROOM,))
+    row = contacts[0]
+    row[A], row[B], row[LOAD], row[MU] = out[AXIS_A], out[AXIS_B], out[NORMAL], values[FRICTION]
+    row[XI_X], row[XI_Y], row[SPIN] = values[CREEP_X], values[CREEP_Y], values[TURNING]
+    row[L1], row[L2], row[L3] = flexibilities_at(row[A], row[B], values[MODULUS], values[POISSON])
+    middle = carray(beyond(table, at), (1,))[0]
+    forces_within(contacts, strips, cells, middle, BLENDED, SECOND_ORDER, slips, lanes, forces)
+    out[FX], out[FY], out[MZ], out[STICK] = forces[0]

@@ -49,7 +49,7 @@ from models.contact.simplified_kernels import (
 from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SHAPES, Options
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.stack import DOUBLES, beyond
 
 _CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
@@ -96,39 +96,28 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
     return made
 
 
-@njit(cache=True, error_model="numpy")
-def box_at(numbers, head, depth):
-    """Rectangle x0, x1, y0, y1 (m) about {h < depth}, as ``Patch.box`` has it."""
+@compiled
+def surface_at(numbers, depth):
+    """What compiled functions read of the patch at a depth (m), as ``Patch.surface`` has it."""
+    head = carray(numbers, (_HEAD,))
     m, n = int(head[_LINES_X]), int(head[_LINES_Y])
-    x = carray(beyond(numbers, _HEAD), (2, m))
-    y = carray(beyond(numbers, _HEAD + 2 * m), (2, n))
+    x, y = carray(beyond(numbers, _HEAD), (2, m)), carray(beyond(numbers, _HEAD + 2 * m), (2, n))
+    shape = int(head[_ROWS]), int(head[_COLUMNS])
+    padded = carray(beyond(numbers, _HEAD + 2 * (m + n)), shape)
     root = math.sqrt(max(depth - head[_LOW], 0.0))
     x0, x1 = sides(x[0], x[1], head[_BOTTOM_X], root)
     y0, y1 = sides(y[0], y[1], head[_BOTTOM_Y], root)
-    return x0, x1, y0, y1
+    return padded, (head[_X], head[_Y]), (head[_DX], head[_DY]), (x0, x1, y0, y1), depth, head[_LOW]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def fit_at(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
     head = carray(numbers, (_HEAD,))
-    after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
-    padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
-    return crude_fit(
-        padded,
-        (head[_X], head[_Y]),
-        (head[_DX], head[_DY]),
-        box_at(numbers, head, depth),
-        depth,
-        head[_LOW],
-        int(head[_NET]),
-        int(head[_SHAPE]),
-        int(head[_FIT]),
-        modulus,
-    )
+    return crude_fit(*surface_at(numbers, depth), int(head[_NET]), int(head[_SHAPE]), int(head[_FIT]), modulus)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def settle(numbers, approach, modulus):
     """Depth (m), stiffness and sum of W p dA that belong to an approach (m); not a number beyond the table's edge.
 
@@ -164,34 +153,32 @@ def settle(numbers, approach, modulus):
     return math.nan, math.nan, math.nan
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def simplified(inputs, numbers, outputs):
     """Status of the patch, FINE or NOT_PLAUSIBLE; fills ``outputs``, of ``inputs`` that ``kernel`` has found fine.
 
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
     """
-    own, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
+    values, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
     out[:] = 0.0
-    if own[PRESSING] <= head[_LOW]:
+    if values[PRESSING] <= head[_LOW]:
         return FINE
-    depth, stiffness, volume = settle(numbers, own[PRESSING], own[MODULUS] / (1.0 - own[POISSON]))
+    depth, stiffness, volume = settle(numbers, values[PRESSING], values[MODULUS] / (1.0 - values[POISSON]))
     if stiffness * volume > 0.0:
-        _roll(own, numbers, head, depth, stiffness, stiffness * volume, out)
+        _roll(values, numbers, head, depth, stiffness, stiffness * volume, out)
     if math.isfinite(stiffness * volume + out[FX] + out[FY] + out[MZ]):
         return FINE
     out[:] = math.nan
     return NOT_PLAUSIBLE
 
 
-@njit(cache=True, error_model="numpy")
-def _roll(own, numbers, head, depth, stiffness, load, out):
+@compiled
+def _roll(values, numbers, head, depth, stiffness, load, out):
     """Fill ``out`` of the patch at a depth: as ``simplified_theory.roll``."""
-    after = _HEAD + 2 * int(head[_LINES_X] + head[_LINES_Y])
-    padded = carray(beyond(numbers, after), (int(head[_ROWS]), int(head[_COLUMNS])))
-    origin, step, box = (head[_X], head[_Y]), (head[_DX], head[_DY]), box_at(numbers, head, depth)
-    cells, net, shear = -int(head[_CELLS]), int(head[_NET]), own[MODULUS]
-    y, low_x, high_x, pressure = strips(padded, origin, step, box, depth, head[_LOW], cells, cells, int(head[_SHAPE]))
+    surface = surface_at(numbers, depth)
+    box, cells, net, shear = surface[3], -int(head[_CELLS]), int(head[_NET]), values[MODULUS]
+    y, low_x, high_x, pressure = strips(*surface, cells, cells, int(head[_SHAPE]))
     width = (box[3] - box[2]) / cells
     normalise(pressure, low_x, high_x, width, load)
     traction, flexibility = np.empty((y.size, cells, 2)), 1.0 / stiffness
@@ -200,29 +187,20 @@ def _roll(own, numbers, head, depth, stiffness, load, out):
         if again:
             crude = gather(y, low_x, high_x, width, traction, box, net)
             dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
-            cover = crude_net(padded, origin, step, box, depth, head[_LOW], net, PARABOLIC)[2]
-            u = tangential(crude, dx, dy, own[POISSON]) / (math.pi * shear)
+            cover = crude_net(*surface, net, PARABOLIC)[2]
+            u = tangential(crude, dx, dy, values[POISSON]) / (math.pi * shear)
             fitted = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
             flexibility = fitted if fitted > 0.0 else flexibility
+        motion = values[CREEP_X], values[CREEP_Y], values[TURNING]
         fx, fy, mz, stuck, area = march(
-            y,
-            low_x,
-            high_x,
-            width,
-            pressure,
-            own[FRICTION],
-            flexibility,
-            own[CREEP_X],
-            own[CREEP_Y],
-            own[TURNING],
-            traction,
+            y, low_x, high_x, width, pressure, values[FRICTION], flexibility, *motion, traction
         )
     out[FX], out[FY], out[MZ], out[STICK] = fx, fy, mz, stuck / area
     out[AXIS_A], out[AXIS_B] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
-    out[NORMAL], out[APPROACH] = load, own[PRESSING]
+    out[NORMAL], out[APPROACH] = load, values[PRESSING]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def normalise(pressure, low_x, high_x, width, load):
     """Scale the pressure of strips (s, n) to carry the load (N), so that full sliding gives mu N exactly."""
     carried = 0.0

@@ -9,6 +9,7 @@ small creepages with the same forces (Kalker, Vehicle System Dynamics 11 (1982) 
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,32 +18,11 @@ from models.contact.inputs import Array, quantity, together
 from models.contact.material import Pair
 from models.machine.compiled import njit
 
-STEPS = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
+STEPS = np.arange(1.0, 11.0) / 10.0
 RATIOS = np.concatenate((STEPS, 1.0 / STEPS[-2::-1]))
 """Ratios a/b of the table."""
-TABLE = np.array(
-    [
-        [[2.51, 3.31, 4.85], [2.51, 2.52, 2.53], [0.334, 0.473, 0.731], [6.42, 8.28, 11.7]],
-        [[2.59, 3.37, 4.81], [2.59, 2.63, 2.66], [0.483, 0.603, 0.809], [3.46, 4.27, 5.66]],
-        [[2.68, 3.44, 4.8], [2.68, 2.75, 2.81], [0.607, 0.715, 0.889], [2.49, 2.96, 3.72]],
-        [[2.78, 3.53, 4.82], [2.78, 2.88, 2.98], [0.72, 0.823, 0.977], [2.02, 2.32, 2.77]],
-        [[2.88, 3.62, 4.83], [2.88, 3.01, 3.14], [0.827, 0.929, 1.07], [1.74, 1.93, 2.22]],
-        [[2.98, 3.72, 4.91], [2.98, 3.14, 3.31], [0.93, 1.03, 1.18], [1.56, 1.68, 1.86]],
-        [[3.09, 3.81, 4.97], [3.09, 3.28, 3.48], [1.03, 1.14, 1.29], [1.43, 1.5, 1.6]],
-        [[3.19, 3.91, 5.05], [3.19, 3.41, 3.65], [1.13, 1.25, 1.4], [1.34, 1.37, 1.42]],
-        [[3.29, 4.01, 5.12], [3.29, 3.54, 3.82], [1.23, 1.36, 1.51], [1.27, 1.27, 1.27]],
-        [[3.4, 4.12, 5.2], [3.4, 3.67, 3.98], [1.33, 1.47, 1.63], [1.21, 1.19, 1.16]],
-        [[3.51, 4.22, 5.3], [3.51, 3.81, 4.16], [1.44, 1.59, 1.77], [1.16, 1.11, 1.06]],
-        [[3.65, 4.36, 5.42], [3.65, 3.99, 4.39], [1.58, 1.75, 1.94], [1.1, 1.04, 0.954]],
-        [[3.82, 4.54, 5.58], [3.82, 4.21, 4.67], [1.76, 1.95, 2.18], [1.05, 0.965, 0.852]],
-        [[4.06, 4.78, 5.8], [4.06, 4.5, 5.04], [2.01, 2.23, 2.5], [1.01, 0.892, 0.751]],
-        [[4.37, 5.1, 6.11], [4.37, 4.9, 5.56], [2.35, 2.62, 2.96], [0.958, 0.819, 0.65]],
-        [[4.84, 5.57, 6.57], [4.84, 5.48, 6.31], [2.88, 3.24, 3.7], [0.912, 0.747, 0.549]],
-        [[5.57, 6.34, 7.34], [5.57, 6.4, 7.51], [3.79, 4.32, 5.01], [0.868, 0.674, 0.446]],
-        [[6.96, 7.78, 8.82], [6.96, 8.14, 9.79], [5.72, 6.63, 7.89], [0.828, 0.601, 0.341]],
-        [[10.7, 11.7, 12.9], [10.7, 12.8, 16.0], [12.2, 14.6, 18.0], [0.795, 0.526, 0.228]],
-    ]
-)
+FILE = Path(__file__).with_name("kalker_coefficients.csv")
+TABLE = np.loadtxt(FILE, delimiter=",", skiprows=1, usecols=range(1, 13)).reshape(RATIOS.size, 4, 3)
 """[ratio, C11 C22 C23 C33, nu = 0, 1/4, 1/2]: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), table
 E.3; C33 as recalled, and confirmed by the exact theory of ``rolling_problem`` as the others are."""
 LOGARITHMS = np.log(TABLE)
@@ -90,8 +70,8 @@ def coefficients(ratio: Any, nu: Any) -> Coefficients:
     """
     ratio = quantity("ratio", ratio, "a ratio a/b of semi-axes from 1e-9 to 1e9", 1e-9, 1e9)
     ratio, nu = together(ratio=ratio, nu=quantity("nu", nu, "a Poisson's ratio from 0 to 0.5", 0.0, 0.5))
-    found = _each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
-    return Coefficients(*(values[()] for values in found))
+    answer = _each(ratio.flatten(), nu.flatten()).reshape(4, *ratio.shape)
+    return Coefficients(*(values[()] for values in answer))
 
 
 def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple[Array, Array, Array]:
@@ -105,7 +85,8 @@ def forces(a: Any, b: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair) -> tuple
     spin = quantity("spin", spin, "a spin in 1/m")
     xi_x, xi_y = (quantity(name, value, "a creepage") for name, value in (("xi_x", xi_x), ("xi_y", xi_y)))
     a, b, xi_x, xi_y, spin = together(a=a, b=b, xi_x=xi_x, xi_y=xi_y, spin=spin)
-    c, area = coefficients(_ratio(a, b), pair.nu), a * b
+    ratio = np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))  # 1 where nothing touches
+    c, area = coefficients(ratio, pair.nu), a * b
     fy = -pair.G * (area * c.c22 * xi_y + area**1.5 * c.c23 * spin)
     mz = pair.G * (area**1.5 * c.c23 * xi_y - area**2 * c.c33 * spin)
     return -pair.G * area * c.c11 * xi_x, fy, mz
@@ -121,8 +102,8 @@ def flexibilities(a: Any, b: Any, pair: Pair) -> tuple[Array, Array, Array]:
     """
     pair.require_likeness()
     a, b = _axes(a, b)
-    found = _flexible(a.flatten(), b.flatten(), pair.G, pair.nu).reshape(3, *a.shape)
-    return found[0][()], found[1][()], found[2][()]
+    answer = _flexible(a.flatten(), b.flatten(), pair.G, pair.nu).reshape(3, *a.shape)
+    return answer[0][()], answer[1][()], answer[2][()]
 
 
 def _axes(a: Any, b: Any) -> tuple[Array, ...]:
@@ -132,26 +113,21 @@ def _axes(a: Any, b: Any) -> tuple[Array, ...]:
     return a, b
 
 
-def _ratio(a: Array, b: Array) -> Array:
-    """a/b, and 1 where nothing touches."""
-    return np.divide(a, b, out=np.ones_like(a), where=(a > 0.0) & (b > 0.0))
-
-
 @njit(cache=True)
 def _each(ratio: Array, nu: Array) -> Array:
-    found = np.empty((4, ratio.size))
+    answer = np.empty((4, ratio.size))
     for i in range(ratio.size):
         for kind in range(4):
-            found[kind, i] = coefficient_at(kind, ratio[i], nu[i])
-    return found
+            answer[kind, i] = coefficient_at(kind, ratio[i], nu[i])
+    return answer
 
 
 @njit(cache=True)
 def _flexible(a: Array, b: Array, modulus: float, nu: float) -> Array:
-    found = np.empty((3, a.size))
+    answer = np.empty((3, a.size))
     for i in range(a.size):
-        found[0, i], found[1, i], found[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
-    return found
+        answer[0, i], answer[1, i], answer[2, i] = flexibilities_at(a[i], b[i], modulus, nu)
+    return answer
 
 
 @njit(cache=True)
@@ -176,13 +152,13 @@ def flexibilities_at(a: float, b: float, modulus: float, nu: float) -> tuple[flo
 def coefficient_at(kind: int, ratio: float, nu: float) -> float:
     """One of C11, C22, C23, C33 (kind 0 to 3) of one patch; for compiled callers, nothing is checked."""
     inner = min(max(ratio, RATIOS[0]), RATIOS[-1])
-    found = _tabulated(kind, inner, nu)
+    answer = _tabulated(kind, inner, nu)
     if inner == ratio:
-        return found
+        return answer
     if ratio < 1.0:
-        excess = found / _narrow(kind, inner, nu) - 1.0
+        excess = answer / _narrow(kind, inner, nu) - 1.0
         return _narrow(kind, ratio, nu) * (1.0 + excess * (ratio / inner) ** NARROW_FADING)
-    excess = found / _long(kind, inner, nu) - 1.0
+    excess = answer / _long(kind, inner, nu) - 1.0
     return _long(kind, ratio, nu) * (1.0 + excess * (inner / ratio) ** LONG_FADING)
 
 
@@ -195,12 +171,19 @@ def _tabulated(kind: int, ratio: float, nu: float) -> float:
     width = math.log(RATIOS[i + 1] / RATIOS[i])
     t = math.log(ratio / RATIOS[i]) / width
     rise, low, high = t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2 * width, t * t * (t - 1.0) * width
-    s, power, found = 4.0 * nu, POWERS[kind], 0.0
-    for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
+    power, answer = POWERS[kind], 0.0
+    for k, weight in enumerate(_parabola(nu)):
         logarithm = (1.0 - rise) * LOGARITHMS[i, kind, k] + rise * LOGARITHMS[i + 1, kind, k]
         logarithm += low * SLOPES[i, kind, k] + high * SLOPES[i + 1, kind, k]
-        found += weight * math.exp(power * logarithm)
-    return found ** (1.0 / power)
+        answer += weight * math.exp(power * logarithm)
+    return answer ** (1.0 / power)
+
+
+@njit(cache=True)
+def _parabola(nu: float) -> tuple[float, float, float]:
+    """Weights of the values at nu = 0, 1/4 and 1/2."""
+    s = 4.0 * nu
+    return (1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0
 
 
 @njit(cache=True)
@@ -226,15 +209,9 @@ def _long(kind: int, ratio: float, nu: float) -> float:
         return 2.0 * math.pi * ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
     if kind == 2:
         return 2.0 * math.pi * ratio**1.5 / (3.0 * three)
-    return _long_c33(ratio, nu)
-
-
-@njit(cache=True)
-def _long_c33(ratio: float, nu: float) -> float:
-    """C33 of a long patch: ln C33 linear in ln(a/b) between its nodes and on beyond, its power a parabola of nu."""
     i = min(max(int(np.searchsorted(LONG_RATIOS, ratio)) - 1, 0), LONG_RATIOS.size - 2)
     t = math.log(ratio / LONG_RATIOS[i]) / math.log(LONG_RATIOS[i + 1] / LONG_RATIOS[i])
-    s, power, found = 4.0 * nu, POWERS[3], 0.0
-    for k, weight in enumerate(((1.0 - s) * (1.0 - s / 2.0), s * (2.0 - s), s * (s - 1.0) / 2.0)):
-        found += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
-    return found ** (1.0 / power)
+    power, answer = POWERS[3], 0.0  # ln C33 is linear in ln(a/b) between its nodes and on beyond
+    for k, weight in enumerate(_parabola(nu)):
+        answer += weight * (LONG_C33[i, k] ** (1.0 - t) * LONG_C33[i + 1, k] ** t) ** power
+    return answer ** (1.0 / power)

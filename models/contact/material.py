@@ -1,4 +1,4 @@
-"""Elastic constants of the two bodies, and what a pair of them is to the theory of contact.
+"""Elastic constants of the two bodies, what a pair of them is to the theory of contact, and how their friction falls.
 
 A pair is treated as two bodies of one material with combined constants (Kalker, Three-Dimensional Elastic Bodies in
 Rolling Contact, 1990, section 1.7). That is exact for frictionless pressure. With friction it is exact for
@@ -96,3 +96,22 @@ class Pair:
                 f"Kalker's K = {self.mismatch:.3g} must be within +-{LARGEST_MISMATCH:g}, or the pressure "
                 "makes slip of its own",
             )
+
+
+class Falling(Strict):
+    """[falling_friction]: ``Falling(floor=0.4, decay=0.6, speed=20.0)``, friction that falls with the speed of slip.
+
+    mu(s) = mu (floor + (1 - floor) exp(-decay s)), s in m/s: Polach's law (Wear 258 (2005) 992), taken point by point.
+    ``fastsim_falling`` computes with it, and is not imported where friction is constant.
+    """
+
+    floor: float = Field(
+        gt=0.0, le=1.0, description="friction at endless slip by that at none", json_schema_extra={"unit": ""}
+    )
+    decay: float = Field(ge=0.0, le=1e6, description="of the exponential", json_schema_extra={"unit": "s/m"})
+    speed: float = Field(ge=0.0, le=1e4, description="rolling speed", json_schema_extra={"unit": "m/s"})
+
+    @property
+    def law(self) -> tuple[float, float]:
+        """Floor, and decay per unit of slip by the rolling speed."""
+        return self.floor, self.decay * self.speed

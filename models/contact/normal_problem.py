@@ -10,16 +10,13 @@ is off by 0.003 %, the greatest pressure by 0.02 %, both of order 2, the area by
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.contact.half_space import Convolution, Z, influence, offsets
-from models.contact.inputs import number, quantity
+from models.contact.inputs import Array, number, quantity
+from models.contact.material import Pair
 from models.core.errors import InputError, RunFailed
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
 
 TOLERANCE = 1e-9
 """Largest violation of a contact condition, as a part of the greatest elastic displacement."""
@@ -37,9 +34,9 @@ class Pressed:
     pressure : (ny, nx) in Pa, zero outside the contact. x, y : (nx,), (ny,) centres of the cells (m), evenly spaced.
     """
 
-    pressure: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    pressure: Array
+    x: Array
+    y: Array
 
     def __post_init__(self) -> None:
         shape = (np.size(self.y), np.size(self.x))
@@ -67,7 +64,7 @@ class Pressed:
         return float(self.y[1] - self.y[0])
 
     @property
-    def contact(self) -> np.ndarray:
+    def contact(self) -> Array:
         """Cells in contact, (ny, nx) bool."""
         return self.pressure > 0
 
@@ -93,24 +90,32 @@ class NormalSolution(Pressed):
     """
 
     approach: float
-    gap: np.ndarray
+    gap: Array
     residual: float
     iterations: int
 
 
-def centres(cells: int, step: float) -> np.ndarray:
+def centres(cells: int, step: float) -> Array:
     """Centres (m) of ``cells`` cells about zero."""
     return (np.arange(cells) - (cells - 1) / 2) * step
 
 
+PARTS = 8
+"""Points along each axis of a cell over which Hertz' pressure is averaged."""
+
+
+def hertzian(a: float, b: float, load: float, cells: int) -> Pressed:
+    """Pressure of an ellipse with semi-axes a, b (m), the mean of each of ``cells`` x ``cells`` cells, scaled to the
+    load (N).
+    """
+    inner = (np.arange(cells * PARTS) + 0.5) / (cells * PARTS) * 2 - 1
+    height = np.sqrt(np.maximum(1 - inner[:, None] ** 2 - inner**2, 0)).reshape(cells, PARTS, cells, PARTS)
+    pressure, dx, dy = height.mean((1, 3)), 2 * a / cells, 2 * b / cells
+    return Pressed(pressure * load / (pressure.sum() * dx * dy), centres(cells, dx), centres(cells, dy))
+
+
 def solve_normal(
-    distance: np.ndarray,
-    dx: float,
-    dy: float,
-    pair: "Pair",
-    *,
-    load: float | None = None,
-    approach: float | None = None,
+    distance: Array, dx: float, dy: float, pair: Pair, *, load: float | None = None, approach: float | None = None
 ) -> NormalSolution:
     """Pressure and contact area of two bodies pressed together.
 
@@ -132,14 +137,22 @@ def solve_normal(
     rows, columns = distance.shape
     x, y = centres(columns, dx), centres(rows, dy)
     if (load is not None and load <= 0) or (approach is not None and not np.any(distance < approach)):
-        return _apart(distance, x, y, approach)
+        least = float(distance.min()) if approach is None else approach
+        return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
     kernel = influence(offsets(columns, dx), offsets(rows, dy)[:, None], dx, dy, pair)[..., Z, Z]
     displace = Convolution(kernel[..., None, None])
     pressure, iterations = _conjugate_gradients(distance, displace, load, approach, dx * dy)
-    return _proved(pressure, distance, displace, approach, x, y, iterations)
+    contact = pressure > 0
+    if contact[[0, -1]].any() or contact[:, [0, -1]].any():
+        raise InputError("", "distance", None, "the contact reaches the edge of the grid: give a larger one")
+    displacement = displace(pressure[..., None])[..., 0]  # the conditions are evaluated afresh
+    gap = distance + displacement
+    reached = float(gap[contact].mean()) if approach is None else approach
+    gap -= reached
+    return NormalSolution(pressure, x, y, reached, gap, _violation(gap, contact, displacement), iterations)
 
 
-def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, approach: float | None) -> np.ndarray:
+def _checked(distance: Array, dx: float, dy: float, load: float | None, approach: float | None) -> Array:
     """The distance as an array of numbers; raises InputError."""
     distance = quantity("distance", distance, "finite everywhere (m); use a large distance outside the bodies")
     if distance.ndim != 2 or min(distance.shape) < 2:
@@ -153,17 +166,15 @@ def _checked(distance: np.ndarray, dx: float, dy: float, load: float | None, app
     return distance
 
 
-def _apart(distance: np.ndarray, x: np.ndarray, y: np.ndarray, approach: float | None) -> NormalSolution:
-    """Bodies that do not press on each other: at the given approach, or at first touch."""
-    least = float(distance.min()) if approach is None else approach
-    return NormalSolution(np.zeros(distance.shape), x, y, least, distance - least, 0.0, 0)
-
-
 def _conjugate_gradients(
-    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
-) -> tuple[np.ndarray, int]:
+    distance: Array, displace: Convolution, load: float | None, approach: float | None, cell: float
+) -> tuple[Array, int]:
     """Pressure (ny, nx) that meets the contact conditions, and the iterations taken."""
-    pressure = _start(distance, displace, load, approach, cell)
+    if load is not None:  # even over the grid
+        pressure = np.full(distance.shape, load / (distance.size * cell))
+    else:  # in proportion to the overlap
+        overlap = np.maximum(float(approach or 0.0) - distance, 0.0)
+        pressure = overlap * (overlap.max() / displace(overlap[..., None]).max())
     direction, square, restart = np.zeros_like(pressure), 1.0, True
     for iteration in range(1, MOST_ITERATIONS + 1):
         contact = pressure > 0
@@ -187,37 +198,7 @@ def _conjugate_gradients(
     raise RunFailed("normal problem", f"contact conditions not met in {MOST_ITERATIONS} iterations")
 
 
-def _start(
-    distance: np.ndarray, displace: Convolution, load: float | None, approach: float | None, cell: float
-) -> np.ndarray:
-    """A first pressure: even over the grid for a load, proportional to the overlap for an approach."""
-    if load is not None:
-        return np.full(distance.shape, load / (distance.size * cell))
-    overlap = np.maximum(float(approach or 0.0) - distance, 0.0)
-    return overlap * (overlap.max() / displace(overlap[..., None]).max())
-
-
-def _violation(gap: np.ndarray, contact: np.ndarray, displacement: np.ndarray) -> float:
+def _violation(gap: Array, contact: Array, displacement: Array) -> float:
     """Largest violated condition as a part of the greatest displacement."""
     inside, outside = np.abs(gap[contact]).max(), -gap[~contact].min(initial=0.0)
     return float(max(inside, outside) / displacement.max())
-
-
-def _proved(
-    pressure: np.ndarray,
-    distance: np.ndarray,
-    displace: Convolution,
-    approach: float | None,
-    x: np.ndarray,
-    y: np.ndarray,
-    iterations: int,
-) -> NormalSolution:
-    """The solution with its conditions evaluated afresh."""
-    contact = pressure > 0
-    if contact[[0, -1]].any() or contact[:, [0, -1]].any():
-        raise InputError("", "distance", None, "the contact reaches the edge of the grid: give a larger one")
-    displacement = displace(pressure[..., None])[..., 0]
-    gap = distance + displacement
-    found = float(gap[contact].mean()) if approach is None else approach
-    gap -= found
-    return NormalSolution(pressure, x, y, found, gap, _violation(gap, contact, displacement), iterations)

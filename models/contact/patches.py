@@ -8,10 +8,12 @@ with the load, so nothing jumps when two areas of contact grow together.
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from models.contact.distance_kernels import sides
+from models.contact.inputs import Array
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
@@ -19,7 +21,7 @@ RIDGE = 1e-6
 """Height (m) of a ridge between two valleys that parts them; lower ones are roughness of one valley."""
 NO_DEPTH = 1e-12
 """m: a valley that is no deeper within its sides is none."""
-Table = tuple[np.ndarray, np.ndarray]
+Table = tuple[Array, Array]
 Box = tuple[float, float, float, float]
 
 
@@ -42,7 +44,11 @@ class Patch:
         """Position x, y of the least distance (m), and that distance (m)."""
         lines, least, where = self.distance.valley_y
         k = int(np.argmin(least))
-        return _lowest(self.distance, float(where[k]), float(lines[k]))
+        x, y = float(where[k]), float(lines[k])
+        for _ in range(3):  # the parabola through three lines, in turn
+            x = _vertex(self.distance, x, y, 0)
+            y = _vertex(self.distance, x, y, 1)
+        return x, y, float(self.distance.at(np.array(x), np.array(y)))
 
     @property
     def low(self) -> float:
@@ -58,11 +64,25 @@ class Patch:
 
     @cached_property
     def lines(self) -> tuple[Table, Table]:
-        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola."""
-        return tuple(
-            _rooted(valley[0], valley[1], at, self.low)
-            for valley, at in ((self.distance.valley_x, self.bottom[0]), (self.distance.valley_y, self.bottom[1]))
-        )  # type: ignore[return-value]
+        """Lines along x and along y with the root of the least height above the bottom, linear for a parabola.
+
+        The bottom itself is one more line.
+        """
+        tables = []
+        for (lines, least, _), bottom in zip(
+            (self.distance.valley_x, self.distance.valley_y), self.bottom, strict=False
+        ):
+            k, roots = int(np.searchsorted(lines, bottom)), np.sqrt(np.maximum(least - self.low, 0.0))
+            tables.append((np.insert(lines, k, bottom), np.insert(roots, k, 0.0)))
+        return tables[0], tables[1]
+
+    def surface(self, depth: float) -> tuple[Any, ...]:
+        """What compiled functions read of the patch at a depth (m): padded heights, first node and spacing along x and
+        y, box, depth and least distance.
+        """
+        known = self.distance
+        origin = float(known.x[0]), float(known.y[0])
+        return known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low
 
     def box(self, depth: float) -> Box:
         """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.
@@ -96,13 +116,9 @@ def no_bottom() -> InputError:
     )
 
 
-def separate(distance: Distance, ridge: float = RIDGE) -> list[Patch]:
-    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``ridge`` (m)."""
-    return [
-        Patch(part, (*along_x, *along_y))
-        for row, along_y in _cut(distance, 1, ridge)
-        for part, along_x in _cut(row, 0, ridge)
-    ]
+def separate(distance: Distance) -> list[Patch]:
+    """The valleys of a distance, from low to high y (then x), parted by every ridge higher than ``RIDGE``."""
+    return [Patch(part, (*along_x, *along_y)) for row, along_y in _cut(distance, 1) for part, along_x in _cut(row, 0)]
 
 
 def whole(distance: Distance) -> list[Patch]:
@@ -110,53 +126,41 @@ def whole(distance: Distance) -> list[Patch]:
     return [Patch(distance)]
 
 
-def _cut(distance: Distance, axis: int, ridge: float) -> list[tuple[Distance, tuple[bool, bool]]]:
+def _cut(distance: Distance, axis: int) -> list[tuple[Distance, tuple[bool, bool]]]:
     """Parts of the distance along an axis (0: x, 1: y), each with whether its two ends are cuts."""
     lines, least, _ = distance.valley_y if axis else distance.valley_x
-    nodes = distance.y if axis else distance.x
-    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least, ridge)]
-    ends = [0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]
-    everything = slice(None)
-    return [
-        (
-            distance.part(*((everything, slice(a, b + 1)) if axis else (slice(a, b + 1), everything))),
-            (a > 0, b < nodes.size - 1),
-        )
-        for a, b in pairwise(ends)
-        if b - a >= 3
-    ]
+    nodes, parts, everything = distance.y if axis else distance.x, [], slice(None)
+    inner = [int(np.argmin(np.abs(nodes - lines[k]))) for k in ridges(least)]
+    for a, b in pairwise([0, *(k for k in inner if 3 <= k < nodes.size - 3), nodes.size - 1]):
+        if b - a >= 3:
+            some = slice(a, b + 1)
+            part = distance.part(everything, some) if axis else distance.part(some, everything)
+            parts.append((part, (a > 0, b < nodes.size - 1)))
+    return parts
 
 
-def ridges(heights: np.ndarray, least: float) -> list[int]:
-    """Indices of the maxima of a line that rise more than ``least`` above the valleys on both sides."""
-    found: list[int] = []
+def ridges(heights: Array) -> list[int]:
+    """Indices of the maxima of a line that rise more than ``RIDGE`` above the valleys on both sides."""
+    maxima: list[int] = []
     low, top, at = heights[0], heights[0], 0
     climbed = False
     for k, height in enumerate(heights):
         if not climbed:
             low = min(low, height)
-            if height > low + least:
+            if height > low + RIDGE:
                 climbed, top, at = True, height, k
         elif height > top:
             top, at = height, k
-        elif height < top - least:
+        elif height < top - RIDGE:
             if at > 0:
-                found.append(at)
+                maxima.append(at)
             climbed, low = False, height
-    return found
+    return maxima
 
 
-def _lowest(distance: Distance, x: float, y: float) -> tuple[float, float, float]:
-    """Position and value of the minimum near x, y: the parabola through three lines, in turn, a few times."""
-    for _ in range(3):
-        x, y = (_vertex(distance, x, y, distance.dx, 0), y)
-        x, y = (x, _vertex(distance, x, y, distance.dy, 1))
-    return x, y, float(distance.at(np.array(x), np.array(y)))
-
-
-def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> float:
+def _vertex(distance: Distance, x: float, y: float, axis: int) -> float:
     """Minimum along an axis of the parabola through three points near by; the place itself if there is none."""
-    nodes, here = (distance.y, y) if axis else (distance.x, x)
+    nodes, here, step = (distance.y, y, distance.dy) if axis else (distance.x, x, distance.dx)
     middle = min(max(here, nodes[0] + step / 4), nodes[-1] - step / 4)
     points = middle + np.array([-0.25, 0.0, 0.25]) * step
     left, centre, right = distance.at(points if not axis else np.full(3, x), np.full(3, y) if not axis else points)
@@ -165,10 +169,3 @@ def _vertex(distance: Distance, x: float, y: float, step: float, axis: int) -> f
         return here
     moved = middle - 0.125 * step * (right - left) / curvature
     return float(min(max(moved, points[0]), points[2]))
-
-
-def _rooted(lines: np.ndarray, least: np.ndarray, bottom: float, low: float) -> Table:
-    """Lines and the root of their height above the bottom, with the bottom itself as one more line."""
-    k = int(np.searchsorted(lines, bottom))
-    roots = np.sqrt(np.maximum(least - low, 0.0))
-    return np.insert(lines, k, bottom), np.insert(roots, k, 0.0)

@@ -17,12 +17,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.profiles import Profile, profile
 from models.core.errors import InputError, similar_file
 
 MM = 1e-3
 Kind = Literal["wheel", "rail"]
-Points = tuple[np.ndarray, np.ndarray]
+Points = tuple[Array, Array]
 SIMPACK, MINIPROF = (".prw", ".prr"), (".whl", ".ban")
 OF_KIND = {".prw": "wheel", ".prr": "rail", ".whl": "wheel", ".ban": "rail"}
 COMMENTS = re.compile(r"[#!%].*")
@@ -53,10 +54,10 @@ def read_profile(path: str | Path, kind: Kind, *, smoothing: float = 0.0, mirror
     if y.size < 10:
         raise InputError(path, "", int(y.size), "points found; a profile needs ten or more, two numbers a line")
     y, z = _laid(y, z, kind)
-    found = profile(-y if mirror else y, z, smoothing, path)
+    read = profile(-y if mirror else y, z, smoothing, path)
     if kind == "wheel":
-        _check_taping(found, path)
-    return found
+        _check_taping(read, path)
+    return read
 
 
 def _check_taping(wheel: Profile, path: Path) -> None:
@@ -85,12 +86,12 @@ def _numbers(text: str, number: int, path: Path, least: int = 2) -> list[float]:
     if DECIMAL_COMMA.search(text.strip()):
         raise InputError(path, f"line {number}", text.strip()[:SHOWN], "has decimal commas: write decimal points")
     try:
-        found = [float(part) for part in APART.split(text.strip(" \t,;"))]
+        numbers = [float(part) for part in APART.split(text.strip(" \t,;"))]
     except ValueError:
-        found = []
-    if len(found) < least or not all(math.isfinite(value) for value in found):
+        numbers = []
+    if len(numbers) < least or not all(math.isfinite(value) for value in numbers):
         raise InputError(path, f"line {number}", text.strip()[:SHOWN], f"must hold {least} or more finite numbers")
-    return found
+    return numbers
 
 
 def _points(rows: list[list[float]], first: int = 0, second: int = 1) -> Points:
@@ -194,7 +195,7 @@ def _transformed(points: Points, key: dict[str, float]) -> Points:
     return y[order] / key["units.len.f"], z[order] / key["units.len.f"]
 
 
-def _laid(y: np.ndarray, z: np.ndarray, kind: Kind) -> Points:
+def _laid(y: Array, z: Array, kind: Kind) -> Points:
     """The points with the rail's top up, or the wheel's flange down and at negative y."""
     if kind == "rail":
         ends = 0.5 * (z[0] + z[-1])

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
+from models.contact.inputs import Array
 from models.core.errors import InputError
 
 SPACING = 1e-4
@@ -33,8 +34,8 @@ class Profile:
     none; longer waves pass, shorter ones are damped by 1 / (1 + (smoothing / wavelength)^4).
     """
 
-    y: np.ndarray
-    z: np.ndarray
+    y: Array
+    z: Array
     smoothing: float = 0.0
 
     @cached_property
@@ -53,7 +54,7 @@ class Profile:
         return Profile(y[keep], z[keep] - z[keep].min(), self.smoothing)
 
 
-def profile(y: np.ndarray, z: np.ndarray, smoothing: float = 0.0, file: object = "") -> Profile:
+def profile(y: Array, z: Array, smoothing: float = 0.0, file: object = "") -> Profile:
     """A profile from measured points y, z (n,) in m, in order along the contour, smoothed and evenly spaced again.
 
     smoothing : wavelength (m) of which half is left (see ``Profile``). Raises InputError for wrong shapes, values that
@@ -73,7 +74,7 @@ def profile(y: np.ndarray, z: np.ndarray, smoothing: float = 0.0, file: object =
     return Profile(y[keep], z[keep], smoothing)
 
 
-def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None:
+def _check(y: Array, z: Array, smoothing: float, file: object) -> None:
     if y.ndim != 1 or y.shape != z.shape or y.size < 10:
         raise InputError(file, "profile", [list(y.shape), list(z.shape)], "must be two columns of ten points or more")
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
@@ -97,7 +98,7 @@ def _check(y: np.ndarray, z: np.ndarray, smoothing: float, file: object) -> None
         raise InputError(file, "smoothing", smoothing, "must be a wavelength from 0 to 0.05 m")
 
 
-def _check_spikes(points: np.ndarray, file: object) -> None:
+def _check_spikes(points: Array, file: object) -> None:
     """A point far off the way from its neighbour to the next is no part of a contour, which never turns back."""
     way, straight = np.linalg.norm(np.diff(points, axis=0), axis=1), np.linalg.norm(points[2:] - points[:-2], axis=1)
     spikes = np.minimum(way[:-1], way[1:]) > np.maximum(2.0 * straight, SPIKE)
@@ -111,7 +112,7 @@ def _check_spikes(points: np.ndarray, file: object) -> None:
         )
 
 
-def _check_rough(y: np.ndarray, keep: slice, file: object) -> None:
+def _check_rough(y: Array, keep: slice, file: object) -> None:
     """Refuse a contour that turns back for a moment, as rough or coarsely rounded points do: the rest would be lost."""
     for beyond, last in ((y[keep.stop :], y[keep.stop - 1]), (-y[: keep.start][::-1], -y[keep.start])):
         highest = np.maximum.accumulate(np.append(last, beyond))[1:]
@@ -128,16 +129,16 @@ def _check_rough(y: np.ndarray, keep: slice, file: object) -> None:
             )
 
 
-def _smoothed(length: np.ndarray, values: np.ndarray, even: np.ndarray, smoothing: float) -> np.ndarray:
+def _smoothed(length: Array, values: Array, even: Array, smoothing: float) -> Array:
     """Coordinate at even lengths: interpolated, then the curve that minimises error^2 + (L / 2 pi)^4 curvature^2."""
-    found = CubicSpline(length, values)(even)
+    interpolated = CubicSpline(length, values)(even)
     if smoothing == 0.0:
-        return found
+        return interpolated
     penalty = (smoothing / (2.0 * np.pi)) ** 4 / (even[1] - even[0])
-    return make_smoothing_spline(even, found, lam=penalty)(even)
+    return make_smoothing_spline(even, interpolated, lam=penalty)(even)
 
 
-def _ascending(y: np.ndarray) -> slice:
+def _ascending(y: Array) -> slice:
     """The longest run of points along which y ascends."""
     breaks = np.flatnonzero(np.diff(y) <= 0.0)
     starts, ends = np.concatenate([[0], breaks + 1]), np.concatenate([breaks + 1, [y.size]])

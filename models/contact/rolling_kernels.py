@@ -1,4 +1,4 @@
-"""Compiled loops over the cells of a rolling contact: sweeps, and the coupling within its strips."""
+"""Compiled loops over the cells of a rolling contact: sweeps, the coupling within its strips, steps of GMRES."""
 
 import numpy as np
 
@@ -20,10 +20,10 @@ def sweep(traction, rigid, kernel, bound, relaxation):
                 continue
             slip_x, slip_y = rigid[0, row, column], rigid[1, row, column]
             first = columns - 1 - column
-            for other in range(rows):
-                k = rows - 1 - row + other
+            for line in range(rows):
+                k = rows - 1 - row + line
                 for i in range(columns):
-                    p_x, p_y = traction[0, other, i], traction[1, other, i]
+                    p_x, p_y = traction[0, line, i], traction[1, line, i]
                     cross = kernel[1, k, first + i]
                     slip_x += kernel[0, k, first + i] * p_x + cross * p_y
                     slip_y += cross * p_x + kernel[2, k, first + i] * p_y
@@ -88,3 +88,45 @@ def substitute(factors, spans, values):
                 part += factors[which, row, column] * solution[which, column]
             solution[which, row] = (solution[which, row] - part) / factors[which, row, row]
     return solution
+
+
+@njit(cache=True, nogil=True)
+def turned(column, turns, left):
+    """The image's components (count + 1,) by Givens' rotations that leave a triangle, (count,).
+
+    turns (most, 2) : cosine and sine of the rotations, of which the last is added; left (most + 1,) : what the residual
+    was turned to, its last component the residual's size.
+    """
+    count = len(column) - 1
+    for i in range(count - 1):
+        low, high = column[i], column[i + 1]
+        column[i], column[i + 1] = turns[i, 0] * low + turns[i, 1] * high, turns[i, 0] * high - turns[i, 1] * low
+    size = np.hypot(column[count - 1], column[count])
+    turns[count - 1, 0], turns[count - 1, 1] = column[count - 1] / size, column[count] / size
+    column[count - 1] = size
+    left[count], left[count - 1] = -turns[count - 1, 1] * left[count - 1], turns[count - 1, 0] * left[count - 1]
+    return column[:count]
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def orthogonalise(basis, count, vector):
+    """Write the part of ``vector`` orthogonal to the first rows of ``basis``, of length 1, as its next row.
+
+    Returns the components along these ``count`` rows and the new one, by modified Gram-Schmidt.
+    """
+    components = np.zeros(count + 1)
+    left = vector.copy()
+    for row in range(count):
+        part = 0.0
+        for i in range(len(left)):
+            part += basis[row, i] * left[i]
+        for i in range(len(left)):
+            left[i] -= part * basis[row, i]
+        components[row] = part
+    square = 0.0
+    for i in range(len(left)):
+        square += left[i] * left[i]
+    components[count] = np.sqrt(square)
+    for i in range(len(left)):
+        basis[count, i] = left[i] / max(components[count], 1e-300)
+    return components

@@ -1,16 +1,15 @@
 """Slip of a rolling contact as a linear function of its tractions, and Newton's step for cells that stick or slip."""
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.contact import krylov
 from models.contact.half_space import Convolution, Y, influence, offsets
-from models.contact.rolling_kernels import factor, substitute
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
+from models.contact.inputs import Array
+from models.contact.material import Pair
+from models.contact.rolling_kernels import factor, orthogonalise, substitute, turned
+from models.core.errors import RunFailed
 
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of u at a cell's centre and at the next two upstream in -dx du/dx: of second order, and dissipative."""
@@ -30,7 +29,7 @@ class SlipOperator:
     """
 
     def __init__(
-        self, columns: int, rows: int, dx: float, dy: float, pair: "Pair", weights: tuple[float, ...] = UPSTREAM
+        self, columns: int, rows: int, dx: float, dy: float, pair: Pair, weights: tuple[float, ...] = UPSTREAM
     ) -> None:
         x, y = offsets(columns, dx), offsets(rows, dy)[:, None]
         ahead = np.append(x, x[-1] + dx * np.arange(1, len(weights)))
@@ -40,26 +39,50 @@ class SlipOperator:
         self.rows, self.columns = rows, columns
         self._convolution = Convolution(self.kernel)
 
-    def __call__(self, traction: np.ndarray) -> np.ndarray:
+    def __call__(self, traction: Array) -> Array:
         """Slip (ny, nx, 2) by tractions (ny, nx, 2)."""
         return self._convolution(traction)
 
     @cached_property
-    def reversed(self) -> np.ndarray:
+    def reversed(self) -> Array:
         """Kernel as ``rolling_kernels.sweep`` reads it, (3, 2 ny - 1, 2 nx - 1)."""
         kernel = self.kernel[::-1, ::-1]
         return np.ascontiguousarray(np.stack([kernel[..., 0, 0], kernel[..., 0, 1], kernel[..., 1, 1]]))
 
     @cached_property
-    def own(self) -> np.ndarray:
+    def own(self) -> Array:
         """Slip of a cell by its own traction, (2,)."""
         return np.diag(self.kernel[self.rows - 1, self.columns - 1]).copy()
 
     @cached_property
-    def strip(self) -> np.ndarray:
+    def strip(self) -> Array:
         """Coupling within one strip, (nx, 2, nx, 2)."""
         index = np.arange(self.columns)
         return self.kernel[self.rows - 1][index[:, None] - index + self.columns - 1].transpose(0, 2, 1, 3)
+
+
+Map = Callable[[Array], Array]
+
+
+def gmres(apply: Map, precondition: Map, wanted: Array, tolerance: float, most: int) -> Array:
+    """x with |apply(x) - wanted| <= tolerance |wanted|, vectors (n,); raises RunFailed after ``most`` products.
+
+    GMRES (Saad and Schultz, 1986), preconditioned from the right. Its own loops instead of a library's, whose calls of
+    threaded linear algebra on short vectors stall on busy cores.
+    """
+    size = float(np.linalg.norm(wanted))
+    if size == 0.0:
+        return np.zeros_like(wanted)
+    basis, triangle, turns = np.empty((most + 1, wanted.size)), np.zeros((most, most)), np.empty((most, 2))
+    left = np.append(size, np.zeros(most))
+    basis[0] = wanted / size
+    for count in range(1, most + 1):
+        triangle[:count, count - 1] = turned(
+            orthogonalise(basis, count, apply(precondition(basis[count - 1]))), turns, left
+        )
+        if abs(left[count]) <= tolerance * size:
+            return precondition(np.linalg.solve(triangle[:count, :count], left[:count]) @ basis[:count])
+    raise RunFailed("linear solver", f"residual {abs(left[most]) / size:.2g} after {most} products")
 
 
 class FreeSystem:
@@ -68,46 +91,43 @@ class FreeSystem:
     GMRES, preconditioned by the exact inverse of every strip by itself, whose factors serve any number of right sides.
     """
 
-    def __init__(self, operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) -> None:
+    def __init__(self, operator: SlipOperator, free: Array, stiff: Array) -> None:
         """free : (ny, nx, 2, 2) projection of each cell's traction onto its free directions. stiff : (ny, nx)."""
         self.operator, self.free, self.stiff = operator, free, stiff[..., None]
         self.scale = 1.0 / (operator.own.max() + self.stiff)  # a cell near the edge is many times stiffer than others
-        self.factors, self.spans = _strip_systems(operator, free, stiff), _spans(np.any(free, axis=(2, 3)))
+        self.factors = self._strips()
+        inside = np.any(free, axis=(2, 3))
+        first, last = inside.argmax(axis=1), inside.shape[1] - inside[:, ::-1].argmax(axis=1)
+        self.spans = 2 * np.stack([first, np.where(inside.any(axis=1), last, first)], axis=1)
         factor(self.factors, self.spans)
 
-    def solve(self, wanted: np.ndarray, tolerance: float = INNER_TOLERANCE) -> np.ndarray:
+    def _strips(self) -> Array:
+        """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
+
+        On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
+        """
+        free, stiff = self.free, self.stiff[..., None]
+        rows, columns = free.shape[:2]
+        system = np.einsum("riab,ibjc,rjcd->riajd", free, self.operator.strip, free, optimize=True)
+        index = np.arange(columns)
+        system[:, index, :, index, :] += np.moveaxis((1.0 + stiff) * np.eye(2) - free, 1, 0)
+        return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
+
+    def solve(self, wanted: Array, tolerance: float = INNER_TOLERANCE) -> Array:
         """Change of traction (ny, nx, 2) for a change of slip (ny, nx, 2), to a relative residual."""
         # twice: of a large slip all but normal to a free direction, the first projection leaves rounding aside of it
         right = (self.scale * _times(self.free, _times(self.free, wanted))).ravel()
-        return krylov.solve(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
+        return gmres(self._apply, self._precondition, right, tolerance, MOST_PRODUCTS).reshape(wanted.shape)
 
-    def _apply(self, flat: np.ndarray) -> np.ndarray:
+    def _apply(self, flat: Array) -> Array:
         change = flat.reshape(*self.scale.shape[:2], 2)
         return (self.scale * _times(self.free, self.operator(change) + self.stiff * change)).ravel()
 
-    def _precondition(self, flat: np.ndarray) -> np.ndarray:
+    def _precondition(self, flat: Array) -> Array:
         scaled = flat.reshape(*self.scale.shape[:2], 2) / self.scale
         return substitute(self.factors, self.spans, scaled.reshape(len(scaled), -1)).ravel()
 
 
-def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def _times(matrices: Array, vectors: Array) -> Array:
     """Product of each cell's matrix (..., 2, 2) with its vector (..., 2)."""
     return matrices[..., 0] * vectors[..., :1] + matrices[..., 1] * vectors[..., 1:]
-
-
-def _strip_systems(operator: SlipOperator, free: np.ndarray, stiff: np.ndarray) -> np.ndarray:
-    """Matrix of the system within every strip, (ny, 2 nx, 2 nx).
-
-    On the directions that are not free it is 1 + stiff: a one would be lost in the rounding of a large stiffness.
-    """
-    rows, columns = stiff.shape
-    system = np.einsum("riab,ibjc,rjcd->riajd", free, operator.strip, free, optimize=True)
-    index = np.arange(columns)
-    system[:, index, :, index, :] += np.moveaxis((1.0 + stiff[..., None, None]) * np.eye(2) - free, 1, 0)
-    return np.ascontiguousarray(system.reshape(rows, 2 * columns, 2 * columns))
-
-
-def _spans(free: np.ndarray) -> np.ndarray:
-    """Component of every strip's first free cell, and one beyond that of its last, (ny, 2), of cells (ny, nx)."""
-    first, last = free.argmax(axis=1), free.shape[1] - free[:, ::-1].argmax(axis=1)
-    return 2 * np.stack([first, np.where(free.any(axis=1), last, first)], axis=1)

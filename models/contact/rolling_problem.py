@@ -25,18 +25,15 @@ met to 0.2 % with 80 cells, Cattaneo and Mindlin's shift to 0.04 % with 40. Full
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.contact.inputs import NOTHING, creepages, number
+from models.contact.inputs import NOTHING, Array, creepages, number
+from models.contact.material import Pair
 from models.contact.normal_problem import Pressed
 from models.contact.rolling_kernels import sweep
 from models.contact.rolling_operator import IN_PLACE, UPSTREAM, FreeSystem, SlipOperator
 from models.core.errors import RunFailed
-
-if TYPE_CHECKING:
-    from models.contact.material import Pair
 
 TOLERANCE = 1e-8
 """Largest residual of a solution."""
@@ -51,7 +48,7 @@ SWEEPS = 3
 """In each round."""
 MOST_ROUNDS = 60
 """Rounds of sweeps and Newton steps before the problem is given up."""
-RigidSlip = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+RigidSlip = Callable[[Array, Array, float], Array]
 """Rigid slip (ny, nx, 2) at x (nx,) and y (ny,) of cells of a length."""
 
 
@@ -69,15 +66,15 @@ class RollingSolution:
     fx: float
     fy: float
     mz: float
-    traction: np.ndarray
-    slip: np.ndarray
-    stick: np.ndarray
+    traction: Array
+    slip: Array
+    stick: Array
     power: float
     residual: float
     rounds: int
 
 
-def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: "Pair") -> RollingSolution:
+def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: float, pair: Pair) -> RollingSolution:
     """Tractions of steady rolling.
 
     Parameters
@@ -97,7 +94,7 @@ def solve_rolling(pressed: Pressed, mu: float, xi_x: float, xi_y: float, spin: f
     return _rubbed(pressed, mu, lambda x, y, length: rigid_slip(x, y, *motion), pair, UPSTREAM)
 
 
-def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: "Pair") -> RollingSolution:
+def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pair: Pair) -> RollingSolution:
     """Tractions after the wheel has been shifted over the rail, without rolling, from a rest without tractions.
 
     The problem of Cattaneo (1938) and Mindlin (1949): s = shift + u. Arguments and errors as of ``solve_rolling``, with
@@ -111,63 +108,67 @@ def solve_shift(pressed: Pressed, mu: float, shift_x: float, shift_y: float, pai
     return replace(by_cell, slip=by_cell.slip * pressed.dx, power=by_cell.power * pressed.dx)
 
 
-def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> RollingSolution:
+def _rubbed(pressed: Pressed, mu: float, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> RollingSolution:
     """Solution for a rigid slip, on the cells in contact."""
     mu = number("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0)
     pair.require_likeness()
+    shape = pressed.pressure.shape
+    traction, slip = np.zeros((2, *shape, 2))
+    stick = np.zeros(shape, bool)
     if mu * pressed.load <= NOTHING:
-        return _frictionless(pressed)
-    box = _box(pressed.contact)
-    cells = _Cells(pressed.x[box[1]], pressed.y[box[0]], pressed.dx, pressed.dy, mu * pressed.pressure[box] / pair.G)
+        return RollingSolution(0.0, 0.0, 0.0, traction, slip, stick, 0.0, 0.0, 0)
+    contact = pressed.contact
+    spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
+    rows, columns = box = tuple(slice(span[0], span[-1] + 1) for span in spans)
+    bound = mu * pressed.pressure[box] / pair.G
+    cells = _Cells(pressed.x[columns], pressed.y[rows], pressed.dx, pressed.dy, bound)
     state, rounds = _solve(cells, rigid, pair, weights)
-    return _assembled(state, rounds, pressed, box, pair.G)
+    slips = ~state.stick & (state.bound > 0)
+    traction[box], stick[box], slip[box] = pair.G * state.traction, state.stick, state.slip * slips[..., None]
+    cell = pressed.dx * pressed.dy
+    fx, fy = (float(force) for force in traction.sum(axis=(0, 1)) * cell)
+    mz = float(np.sum(pressed.x * traction[..., 1] - pressed.y[:, None] * traction[..., 0]) * cell)
+    power = float(-np.sum(traction * slip) * cell)
+    return RollingSolution(fx, fy, mz, traction, slip, stick, power, state.residual, rounds)
 
 
-def rigid_slip(x: np.ndarray, y: np.ndarray, xi_x: float, xi_y: float, spin: float) -> np.ndarray:
+def rigid_slip(x: Array, y: Array, xi_x: float, xi_y: float, spin: float) -> Array:
     """Slip (ny, nx, 2) of rigid bodies, by the rolling speed, at x (nx,) and y (ny,)."""
     along, across = np.broadcast_arrays(xi_x - spin * y[:, None], xi_y + spin * x)
     return np.stack([along, across], axis=-1)
 
 
-def _box(contact: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns that hold the contact; nothing where there is none."""
-    spans = (np.flatnonzero(contact.any(axis=axis)) for axis in (1, 0))
-    rows, columns = (slice(span[0], span[-1] + 1) if span.size else slice(0) for span in spans)
-    return rows, columns
-
-
 class _State:
-    """Tractions, by G, with their slip and how far they are from meeting every cell's condition."""
+    """Tractions (ny, nx, 2), by G, with their slip and how far they are from meeting every cell's condition."""
 
-    def __init__(self, operator: SlipOperator, rigid: np.ndarray, bound: np.ndarray, traction: np.ndarray) -> None:
-        self.traction, self.bound = traction, bound
+    def __init__(self, operator: SlipOperator, rigid: Array, bound: Array, traction: Array) -> None:
+        self.operator, self.rigid, self.bound, self.traction = operator, rigid, bound, traction
         self.slip = rigid + operator(traction)
         self.trial = traction - self.slip / operator.own.max()
         self.size = np.linalg.norm(self.trial, axis=-1)
-        needed = _limited(self.trial, bound) - traction
+        cut = np.where(self.size > bound, bound / np.where(self.size > 0, self.size, 1.0), 1.0)
+        needed = self.trial * cut[..., None] - traction
         self.residual = float(np.linalg.norm(needed, axis=-1)[bound > 0].max() / bound.max())
 
+    def moved(self, traction: Array) -> "_State":
+        """The state of other tractions."""
+        return _State(self.operator, self.rigid, self.bound, traction)
+
     @property
-    def stick(self) -> np.ndarray:
+    def stick(self) -> Array:
         """Cells whose traction need not be cut to the bound."""
         return (self.size <= self.bound) & (self.bound > 0)
-
-
-def _limited(traction: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """Tractions (..., 2) cut to their bounds, along their own directions."""
-    size = np.linalg.norm(traction, axis=-1)
-    return traction * np.where(size > bound, bound / np.where(size > 0, size, 1.0), 1.0)[..., None]
 
 
 @dataclass(frozen=True)
 class _Cells:
     """Centres x (nx,) and y (ny,) of cells (m), their sides dx and dy (m), bounds of their tractions by G (ny, nx)."""
 
-    x: np.ndarray
-    y: np.ndarray
+    x: Array
+    y: Array
     dx: float
     dy: float
-    bound: np.ndarray
+    bound: Array
 
     def coarser(self) -> "_Cells":
         """Cells twice as long and wide, whose bounds are the means over the old ones; a last one may reach beyond."""
@@ -183,25 +184,29 @@ class _Cells:
         )
 
 
-def _solve(cells: _Cells, rigid: RigidSlip, pair: "Pair", weights: tuple[float, ...]) -> tuple[_State, int]:
+def _solve(cells: _Cells, rigid: RigidSlip, pair: Pair, weights: tuple[float, ...]) -> tuple[_State, int]:
     """Tractions that meet all conditions, and the rounds taken on these cells."""
     bound, motion = cells.bound, rigid(cells.x, cells.y, cells.dx)
     operator = SlipOperator(bound.shape[1], bound.shape[0], cells.dx, cells.dy, pair, weights)
     nothing = _State(operator, motion, bound, np.zeros_like(motion))
     if min(bound.shape) < COARSEST:
-        return _settled(operator, motion, nothing)
+        return _settled(nothing)
     coarse = cells.coarser()
     known = _solve(coarse, rigid, pair, weights)[0].traction
-    relative = known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None]
-    state = _State(operator, motion, bound, _between(relative)[: bound.shape[0], : bound.shape[1]] * bound[..., None])
+    relative = _between(known / np.where(coarse.bound > 0, coarse.bound, 1.0)[..., None])
+    state = nothing.moved(relative[: bound.shape[0], : bound.shape[1]] * bound[..., None])
     for step in range(MOST_STEPS):
         if state.residual <= TOLERANCE:
             return state, step
-        state = _turned(operator, motion, state)
-    return _settled(operator, motion, min(state, nothing, key=_residual))
+        state = _turned(state)
+    return _settled(_nearest(state, nothing))
 
 
-def _between(values: np.ndarray) -> np.ndarray:
+def _nearest(*states: _State) -> _State:
+    return min(states, key=lambda state: state.residual)
+
+
+def _between(values: Array) -> Array:
     """Values (2 ny, 2 nx, 2) in the quarters of cells, linear between the cells' centres, from values (ny, nx, 2)."""
     for axis in (0, 1):
         ends = np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(3)], mode="edge")
@@ -211,7 +216,7 @@ def _between(values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _settled(operator: SlipOperator, rigid: np.ndarray, state: _State) -> tuple[_State, int]:
+def _settled(state: _State) -> tuple[_State, int]:
     """Tractions that meet all conditions, by sweeps and Newton's steps in turn, and the rounds taken."""
     relaxation, done = RELAXATION, 0
     while state.residual > TOLERANCE:
@@ -220,35 +225,25 @@ def _settled(operator: SlipOperator, rigid: np.ndarray, state: _State) -> tuple[
                 "rolling problem",
                 f"conditions of stick and slip met to {state.residual:.2g} only after {MOST_ROUNDS} rounds",
             )
-        swept = _swept(operator, rigid, state, relaxation)
-        nearest = swept if swept.residual <= TOLERANCE else min(swept, _turned(operator, rigid, swept), key=_residual)
+        traction, motion = (np.ascontiguousarray(np.moveaxis(v, -1, 0)) for v in (state.traction, state.rigid))
+        for _ in range(SWEEPS):
+            sweep(traction, motion, state.operator.reversed, state.bound, relaxation)
+        swept = state.moved(np.moveaxis(traction, 0, -1))
+        nearest = swept if swept.residual <= TOLERANCE else _nearest(swept, _turned(swept))
         relaxation *= 1.0 if nearest.residual < state.residual else SLOWER
         state, done = nearest, done + 1
     return state, done
 
 
-def _swept(operator: SlipOperator, rigid: np.ndarray, state: _State, relaxation: float) -> _State:
-    """The state after a few sweeps."""
-    traction = np.ascontiguousarray(np.moveaxis(state.traction, -1, 0))
-    motion = np.ascontiguousarray(np.moveaxis(rigid, -1, 0))
-    for _ in range(SWEEPS):
-        sweep(traction, motion, operator.reversed, state.bound, relaxation)
-    return _State(operator, rigid, state.bound, np.moveaxis(traction, 0, -1))
-
-
-def _residual(state: _State) -> float:
-    return state.residual
-
-
-def _turned(operator: SlipOperator, rigid: np.ndarray, state: _State) -> _State:
+def _turned(state: _State) -> _State:
     """The state after Newton's step; the same where the step is lost in rounding."""
     try:
-        return _State(operator, rigid, state.bound, _newton(operator, rigid, state))
+        return state.moved(_newton(state))
     except RunFailed:
         return state
 
 
-def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndarray:
+def _newton(state: _State) -> Array:
     """Tractions after Newton's step for the cells that stick and slip in ``state``.
 
     A sticking cell is free to change; a slipping one is put on its bound and turns there, until its traction is
@@ -257,32 +252,13 @@ def _newton(operator: SlipOperator, rigid: np.ndarray, state: _State) -> np.ndar
     bound, slips = state.bound, (state.size > state.bound) & (state.bound > 0)
     opposite = state.trial / np.where(state.size > 0, state.size, 1.0)[..., None]
     traction = np.where(slips[..., None], bound[..., None] * opposite, state.traction)
-    slip = rigid + operator(traction)
+    slip = state.rigid + state.operator(traction)
     tangent = np.stack([-opposite[..., 1], opposite[..., 0]], axis=-1)
     free = np.where(slips[..., None, None], tangent[..., :, None] * tangent[..., None, :], np.eye(2))
     free = free * (bound > 0)[..., None, None]
     against = np.maximum(-np.sum(slip * opposite, axis=-1), 0.0)
     stiff = np.where(slips, against / np.where(slips, bound, 1.0), 0.0)
-    moved = traction + FreeSystem(operator, free, stiff).solve(-slip)
+    moved = traction + FreeSystem(state.operator, free, stiff).solve(-slip)
     size = np.linalg.norm(moved, axis=-1)
     onto = np.where(slips | (size > bound), bound / np.where(size > 0, size, 1.0), 1.0)
     return moved * onto[..., None]
-
-
-def _frictionless(pressed: Pressed) -> RollingSolution:
-    """No friction, or no contact."""
-    none = np.zeros((*pressed.pressure.shape, 2))
-    return RollingSolution(0.0, 0.0, 0.0, none, none, np.zeros(pressed.pressure.shape, bool), 0.0, 0.0, 0)
-
-
-def _assembled(state: _State, rounds: int, pressed: Pressed, box: tuple[slice, slice], G: float) -> RollingSolution:
-    """Resultants, and the fields on the grid of the pressure."""
-    cell = pressed.dx * pressed.dy
-    traction, slip = np.zeros((2, *pressed.pressure.shape, 2))
-    stick = np.zeros(pressed.pressure.shape, bool)
-    slips = ~state.stick & (state.bound > 0)
-    traction[box], stick[box], slip[box] = G * state.traction, state.stick, state.slip * slips[..., None]
-    fx, fy = (float(force) for force in traction.sum(axis=(0, 1)) * cell)
-    mz = float(np.sum(pressed.x * traction[..., 1] - pressed.y[:, None] * traction[..., 0]) * cell)
-    power = float(-np.sum(traction * slip) * cell)
-    return RollingSolution(fx, fy, mz, traction, slip, stick, power, state.residual, rounds)

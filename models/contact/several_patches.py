@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root
 
+from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.patches import Patch
 from models.contact.simplified_kernels import (
@@ -48,16 +49,16 @@ class Net:
     dx, dy of a mesh (m). volume : W times the load (m^3).
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    height: np.ndarray
-    pressure: np.ndarray
-    cover: np.ndarray
+    x: Array
+    y: Array
+    height: Array
+    pressure: Array
+    cover: Array
     step: tuple[float, float]
     volume: float
 
     @property
-    def forces(self) -> np.ndarray:
+    def forces(self) -> Array:
         """W times the load of every mesh, flat (m^3)."""
         return (self.pressure * (self.volume / self.pressure.sum())).ravel()
 
@@ -69,10 +70,9 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     empty = Net(nothing + x, nothing + y + patch.place, nothing + low, nothing, nothing, (0.0, 0.0), 0.0)
     if depth <= low:
         return empty
-    known, box = patch.distance, patch.box(depth)
-    net = (known.padded, (float(known.x[0]), float(known.y[0])), (known.dx, known.dy), box, depth, low)
-    height, pressure, cover = crude_net(*net, cells, shape)
-    volume = float(resultant(*net, FINER * cells, shape))
+    surface, box = patch.surface(depth), patch.box(depth)
+    height, pressure, cover = crude_net(*surface, cells, shape)
+    volume = float(resultant(*surface, FINER * cells, shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
     dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
@@ -81,9 +81,7 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     return Net(x, y, height, pressure, cover, (dx, dy), volume)
 
 
-def together(
-    nets: Sequence[Net], pair: Pair, kind: int, lows: np.ndarray, depths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def together(nets: Sequence[Net], pair: Pair, kind: int, lows: Array, depths: Array) -> tuple[Array, Array]:
     """Stiffnesses 1/W (Pa/m), zero where there is no load, and approaches (m) of patches at their depths (m)."""
     loaded = [k for k, net in enumerate(nets) if net.volume > 0.0]
     pushed = {(k, m): _by(nets[m], net, pair) for k, net in enumerate(nets) for m in loaded}
@@ -104,24 +102,24 @@ def together(
     return stiffness, np.array(approach)
 
 
-def _by(source: Net, target: Net, pair: Pair) -> np.ndarray:
+def _by(source: Net, target: Net, pair: Pair) -> Array:
     """Displacement (m) in the meshes of one net by W times the pressure of another, or of its own."""
     if source is target:
         return displacement(source.pressure, *source.step, pair.modulus)
-    found = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
-    return found.reshape(target.x.shape) / (np.pi * pair.modulus)
+    answer = push(source.x.ravel(), source.y.ravel(), source.forces, target.x.ravel(), target.y.ravel())
+    return answer.reshape(target.x.shape) / (np.pi * pair.modulus)
 
 
-def _product(net: Net, one: np.ndarray, other: np.ndarray, kind: int) -> float:
+def _product(net: Net, first: Array, second: Array, kind: int) -> float:
     """What least squares sum up: products of the slopes, or of what differs from the mean."""
     if kind == GRADIENT:
-        return float(slope_products(one, other, net.cover, *net.step, True)[0])
-    return float(covariances(one, other, net.cover)[1])
+        return float(slope_products(first, second, net.cover, *net.step, True)[0])
+    return float(covariances(first, second, net.cover)[1])
 
 
 def settled(
-    patches: Sequence[Patch], start: np.ndarray, load: float | None, pair: Pair, options: tuple[int, int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    patches: Sequence[Patch], start: Array, load: float | None, pair: Pair, options: tuple[int, int, int]
+) -> tuple[Array, Array, Array]:
     """Depths (m) of patches with the rigid approach (m) last, their stiffnesses (Pa/m) and loads (N).
 
     start : depths and approach near the answer, the approach the answer itself if there is no load. load : N along the
@@ -131,13 +129,13 @@ def settled(
     zero, (cells, shape, kind) = np.append(lows, lows.min()), options
     unit = float(start[-1] - lows.min())
 
-    def state(over: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        *depths, approach = found = zero + unit * over
+    def state(over: Array) -> tuple[Array, Array, Array, Array]:
+        *depths, approach = answer = zero + unit * over
         nets = [crude(patch, float(d), cells, shape) for patch, d in zip(patches, depths, strict=True)]
-        stiffness, reached = together(nets, pair, kind, lows, found[:-1])
+        stiffness, reached = together(nets, pair, kind, lows, answer[:-1])
         loads = stiffness * [net.volume for net in nets]
         last = (approach - start[-1]) / unit if load is None else loads @ along / load - 1.0
-        return np.append((reached - approach * along) / unit, last), found, stiffness, loads
+        return np.append((reached - approach * along) / unit, last), answer, stiffness, loads
 
     for method, factor, share in TRIES:
         solved = root(
@@ -146,18 +144,18 @@ def settled(
             method=method,
             options={"xtol": 1e-14, "factor": factor},
         )
-        off, found, stiffness, loads = state(solved.x)
+        off, answer, stiffness, loads = state(solved.x)
         if np.abs(off).max() <= CLOSE:
-            return found, stiffness, loads
-    raise RunFailed("simplified theory", f"patches at an approach near {found[-1]:.4g} m did not settle")
+            return answer, stiffness, loads
+    raise RunFailed("simplified theory", f"patches at an approach near {answer[-1]:.4g} m did not settle")
 
 
-def dragged(nets: Sequence[Net], tractions: Sequence[np.ndarray], k: int, pair: Pair) -> np.ndarray:
+def dragged(nets: Sequence[Net], tractions: Sequence[Array], k: int, pair: Pair) -> Array:
     """Displacement (2, cells, cells) (m) in net k by the tractions (2, cells, cells) (Pa) of all others."""
-    found, target = np.zeros_like(tractions[k]), nets[k]
+    answer, target = np.zeros_like(tractions[k]), nets[k]
     for m, (source, traction) in enumerate(zip(nets, tractions, strict=True)):
         if m != k:
             forces = traction.reshape(2, -1) * (source.step[0] * source.step[1])
             places = source.x.ravel(), source.y.ravel(), target.x.ravel(), target.y.ravel()
-            found += drag(*places[:2], forces, *places[2:], pair.nu).reshape(found.shape) / (np.pi * pair.G)
-    return found
+            answer += drag(*places[:2], forces, *places[2:], pair.nu).reshape(answer.shape) / (np.pi * pair.G)
+    return answer

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from models.contact.distance_kernels import along, row_at, value_and_slopes
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
 """Pressure proportional to the depth d - h, as the theory has it, or to its root, as Hertz' pressure is."""
@@ -18,7 +18,7 @@ LEAST = 0.2
 bottom leaves the fit undefined, and this bound keeps it positive."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def overlap_pressure(depth, height, low, shape):
     """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
     over = depth - height
@@ -27,7 +27,7 @@ def overlap_pressure(depth, height, low, shape):
     return over if shape == PARABOLIC else math.sqrt(over * (depth - low))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crude_net(padded, origin, step, box, depth, low, cells, shape):
     """Height, W p and covered share of every mesh (cells, cells), rows along y.
 
@@ -47,7 +47,7 @@ def crude_net(padded, origin, step, box, depth, low, cells, shape):
     return height, pressure, cover
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def resultant(padded, origin, step, box, depth, low, points, shape):
     """Sum of W p dA over the box from points x points midpoints."""
     total = 0.0
@@ -60,7 +60,7 @@ def resultant(padded, origin, step, box, depth, low, points, shape):
     return total * dx * dy
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def corner(x, y):
     """Integral of 1/r over the rectangle from the origin to (x, y), signed (Boussinesq; Johnson, section 3.3)."""
     along = x * math.asinh(y / abs(x)) if x != 0.0 else 0.0
@@ -68,7 +68,7 @@ def corner(x, y):
     return along + across
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def displacement(pressure, dx, dy, modulus):
     """Normal displacement (m) at the meshes' centres by a pressure (Pa) on each mesh, both bodies together."""
     cells = pressure.shape[0]
@@ -81,7 +81,7 @@ def displacement(pressure, dx, dy, modulus):
         for i in range(2 * cells - 1):
             k = abs(i - cells + 1)
             influence[j, i] = edges[j + 1, k + 1] - edges[j + 1, k] - edges[j, k + 1] + edges[j, k]
-    found = np.zeros((cells, cells))
+    sums = np.zeros((cells, cells))
     for row in range(cells):
         for column in range(cells):
             p = pressure[row, column]
@@ -89,11 +89,11 @@ def displacement(pressure, dx, dy, modulus):
                 for j in range(cells):
                     k, first = abs(j - row), cells - 1 - column
                     for i in range(cells):
-                        found[j, i] += influence[k, first + i] * p
-    return found / (math.pi * modulus)
+                        sums[j, i] += influence[k, first + i] * p
+    return sums / (math.pi * modulus)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def covariances(u, h, cover):
     """Mean of u, covariance of u and h and variance of u, weighted by the covered shares (the last two not divided)."""
     mean_u, mean_h = weighted_mean(u, cover), weighted_mean(h, cover)
@@ -105,7 +105,7 @@ def covariances(u, h, cover):
     return mean_u, both, square
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def weighted_mean(values, weights):
     """Mean of values with weights of the same shape; loops compile in a tenth of an array expression's time."""
     total = weight = 0.0
@@ -115,26 +115,22 @@ def weighted_mean(values, weights):
     return total / weight
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def slope_products(u, h, cover, dx, dy, along_y):
     """Weighted sums of the products of the slopes of u and h and of the squares of those of u, between meshes."""
     product = square = 0.0
-    rows, columns = u.shape
-    for j in range(rows):
-        for i in range(columns - 1):
-            w, du, dh = cover[j, i] * cover[j, i + 1], (u[j, i + 1] - u[j, i]) / dx, (h[j, i + 1] - h[j, i]) / dx
-            product += w * du * dh
-            square += w * du * du
-    if along_y:
-        for j in range(rows - 1):
-            for i in range(columns):
-                w, du, dh = cover[j, i] * cover[j + 1, i], (u[j + 1, i] - u[j, i]) / dy, (h[j + 1, i] - h[j, i]) / dy
+    for down in range(2 if along_y else 1):
+        right, step = 1 - down, dy if down else dx
+        for j in range(u.shape[0] - down):
+            for i in range(u.shape[1] - right):
+                w = cover[j, i] * cover[j + down, i + right]
+                du, dh = (u[j + down, i + right] - u[j, i]) / step, (h[j + down, i + right] - h[j, i]) / step
                 product += w * du * dh
                 square += w * du * du
     return product, square
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
 
@@ -153,7 +149,7 @@ def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus
     return stiffness, approach, total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def tangential(traction, dx, dy, nu):
     """Displacement (2, cells, cells) at the meshes' centres by a traction (2, cells, cells), times pi G (Cerruti)."""
     cells = traction.shape[1]
@@ -172,7 +168,7 @@ def tangential(traction, dx, dy, nu):
             influence[0, j, i] = (1.0 - nu) * whole[0] + whole[1]
             influence[1, j, i] = whole[0] + (1.0 - nu) * whole[1]
             influence[2, j, i] = nu * whole[2] if i >= cells - 1 else -nu * whole[2]
-    found = np.zeros((2, cells, cells))
+    sums = np.zeros((2, cells, cells))
     for row in range(cells):
         for column in range(cells):
             px, py = traction[0, row, column], traction[1, row, column]
@@ -180,12 +176,12 @@ def tangential(traction, dx, dy, nu):
                 k, first, side = abs(j - row), cells - 1 - column, 1.0 if j >= row else -1.0
                 for i in range(cells):
                     across = side * influence[2, k, first + i]
-                    found[0, j, i] += influence[0, k, first + i] * px + across * py
-                    found[1, j, i] += across * px + influence[1, k, first + i] * py
-    return found
+                    sums[0, j, i] += influence[0, k, first + i] * px + across * py
+                    sums[1, j, i] += across * px + influence[1, k, first + i] * py
+    return sums
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def tangential_fit(u, traction, cover, dx, dy, kind):
     """W_1 = W_2 (m/Pa) by least squares of u = W p + a, both (2, cells, cells); 0 where none can be fitted.
 
@@ -202,35 +198,35 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
     return both / square if square > 0.0 and both > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def push(x, y, force, at_x, at_y):
     """Sum of force / r at points: times 1 / (pi E*) the normal displacement by loads (N) of another patch.
 
     All arguments are flat: loads at x, y, points at_x, at_y (m).
     """
-    found = np.zeros(at_x.size)
+    sums = np.zeros(at_x.size)
     for k in range(at_x.size):
         for m in range(x.size):
             if force[m] > 0.0:
-                found[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
-    return found
+                sums[k] += force[m] / math.hypot(x[m] - at_x[k], y[m] - at_y[k])
+    return sums
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def drag(x, y, force, at_x, at_y, nu):
     """The same of tangential loads (2, n), times 1 / (pi G), (2, points) (Cerruti; Johnson, section 3.6)."""
-    found = np.zeros((2, at_x.size))
+    sums = np.zeros((2, at_x.size))
     for k in range(at_x.size):
         for m in range(x.size):
             u, v = at_x[k] - x[m], at_y[k] - y[m]
             r = math.hypot(u, v)
             along = nu * (u * force[0, m] + v * force[1, m]) / r**3
-            found[0, k] += (1.0 - nu) * force[0, m] / r + u * along
-            found[1, k] += (1.0 - nu) * force[1, m] / r + v * along
-    return found
+            sums[0, k] += (1.0 - nu) * force[0, m] / r + u * along
+            sums[1, k] += (1.0 - nu) * force[1, m] / r + v * along
+    return sums
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
 
@@ -268,7 +264,7 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
     return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def crossing(row, depth, inner, outer):
     """Where the row passes the depth between a point below and a point not below it: false position, Illinois' rule."""
     at_inner, at_outer = along(row, inner) - depth, along(row, outer) - depth
@@ -289,7 +285,7 @@ def crossing(row, depth, inner, outer):
     return middle
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
     """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
 
@@ -319,7 +315,7 @@ def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, 
     return fx, fy, mz, stuck, area
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def step_on(px, py, u, v, bound, middle, slips):
     """Traction after a step in which the rigid slip would take (u, v) from it, and whether it slips.
 
@@ -330,9 +326,9 @@ def step_on(px, py, u, v, bound, middle, slips):
     size = math.hypot(x, y)
     if size <= bound:
         return x, y, False
-    slip, held = math.hypot(u, v), math.hypot(px, py)
-    if slips and slip > 0.0 and held > 0.0 and middle > 0.0:
-        cosine, sine = -(px * u + py * v) / (held * slip), (px * v - py * u) / (held * slip)
+    slip, before = math.hypot(u, v), math.hypot(px, py)
+    if slips and slip > 0.0 and before > 0.0 and middle > 0.0:
+        cosine, sine = -(px * u + py * v) / (before * slip), (px * v - py * u) / (before * slip)
         shrunk = math.exp(-slip / middle)
         over, aside = (1.0 + cosine, shrunk * sine) if cosine > 0.0 else (sine, shrunk * (1.0 - cosine))
         square = over * over + aside * aside
@@ -342,10 +338,10 @@ def step_on(px, py, u, v, bound, middle, slips):
     return bound * x / size, bound * y / size, True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gather(y, low_x, high_x, width, traction, box, cells):
     """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
-    found = np.zeros((2, cells, cells))
+    sums = np.zeros((2, cells, cells))
     dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
     steps = traction.shape[1]
     for s in range(y.size):
@@ -358,6 +354,6 @@ def gather(y, low_x, high_x, width, traction, box, cells):
                 left = right - length / dx
                 for k in range(max(int(left), 0), min(int(right) + 1, cells)):
                     share = high * max(min(right, k + 1.0) - max(left, 1.0 * k), 0.0)
-                    found[0, j, k] += share * traction[s, i, 0]
-                    found[1, j, k] += share * traction[s, i, 1]
-    return found
+                    sums[0, j, k] += share * traction[s, i, 0]
+                    sums[1, j, k] += share * traction[s, i, 1]
+    return sums

@@ -37,7 +37,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from models.contact.fields import Fields
-from models.contact.inputs import creepages, number, whole_number
+from models.contact.inputs import Array, creepages, number, whole_number
 from models.contact.material import Pair
 from models.contact.patches import NO_DEPTH, Box, Patch, no_bottom, separate, whole
 from models.contact.several_patches import crude, dragged, settled
@@ -88,6 +88,11 @@ class Options:
         for name, allowed in (("shape", SHAPES), ("fit", FITS)):
             if getattr(self, name) not in allowed:
                 raise InputError("", name, getattr(self, name), "is not known", tuple(allowed))
+
+    @property
+    def numbers(self) -> tuple[int, int, int]:
+        """Meshes, shape and fit as compiled functions read them."""
+        return self.net, SHAPES[self.shape], FITS[self.fit]
 
 
 PLAIN = Options()
@@ -185,28 +190,11 @@ def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLA
     """One patch at a depth d = -a_3 (m): the paper's N(a_3), with W_3 and the approach fitted on the crude net."""
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
-    box, (origin, step) = patch.box(depth), _grid(patch)
-    stiffness, approach, volume = crude_fit(
-        patch.distance.padded,
-        origin,
-        step,
-        box,
-        depth,
-        patch.low,
-        options.net,
-        SHAPES[options.shape],
-        FITS[options.fit],
-        pair.modulus,
-    )
+    box = patch.box(depth)
+    stiffness, approach, volume = crude_fit(*patch.surface(depth), *options.numbers, pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
-
-
-def _grid(patch: Patch) -> tuple[tuple[float, float], tuple[float, float]]:
-    """First node and spacing along x and y."""
-    distance = patch.distance
-    return (float(distance.x[0]), float(distance.y[0])), (distance.dx, distance.dy)
 
 
 def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, options: Options) -> NormalContact:
@@ -218,12 +206,8 @@ def _by_load(patches: list[Patch], lowest: float, load: float, pair: Pair, optio
         return _gathered(alone.approach / along, (alone,), pair, options)
 
     def alone_at(reached: float) -> float:
-        return _total(
-            [
-                load_at_depth(patch, depth, pair, options)
-                for patch, depth in zip(patches, _shallow(patches, reached), strict=True)
-            ]
-        )
+        depths = zip(patches, _shallow(patches, reached), strict=True)
+        return _total([load_at_depth(patch, depth, pair, options) for patch, depth in depths])
 
     return _shared(patches, _found(alone_at, load, lowest, np.inf), load, pair, options)
 
@@ -259,20 +243,12 @@ def _shallow(patches: list[Patch], approach: float) -> list[float]:
 def _shared(patches: list[Patch], approach: float, load: float | None, pair: Pair, options: Options) -> NormalContact:
     """The patches at their common approach (m), or near it where a load (N) is given."""
     start = np.array([*_shallow(patches, approach), approach])
-    ways = (options.net, SHAPES[options.shape], FITS[options.fit])
-    (*depths, reached), stiffnesses, loads = settled(patches, start, load, pair, ways)
-    parts = [
-        PatchPressure(
-            patch,
-            float(depth),
-            float(stiffness),
-            float(reached * np.cos(patch.lean)),
-            float(carried),
-            patch.box(float(depth)),
-        )
-        for patch, depth, stiffness, carried in zip(patches, depths, stiffnesses, loads, strict=True)
-        if carried > 0.0
-    ]
+    (*depths, reached), stiffnesses, loads = settled(patches, start, load, pair, options.numbers)
+    parts = []
+    for patch, depth, stiffness, carried in zip(patches, map(float, depths), stiffnesses, loads, strict=True):
+        if carried > 0.0:
+            along = float(reached * np.cos(patch.lean))
+            parts.append(PatchPressure(patch, depth, float(stiffness), along, float(carried), patch.box(depth)))
     return _gathered(float(reached), tuple(parts), pair, options)
 
 
@@ -285,13 +261,8 @@ def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, opt
 
 def _area(part: PatchPressure, rows: int = 100) -> float:
     """Area (m^2) of one patch."""
-    y, low, high, _ = _strips(part, rows, 1, PARABOLIC)
+    y, low, high, _ = strips(*part.patch.surface(part.depth), rows, 1, PARABOLIC)
     return float((high - low).sum() * (part.box[3] - part.box[2]) / rows) if y.size else 0.0
-
-
-def _strips(part: PatchPressure, rows: int, cells: int, shape: int) -> tuple[np.ndarray, ...]:
-    patch, (origin, step) = part.patch, _grid(part.patch)
-    return strips(patch.distance.padded, origin, step, part.box, part.depth, patch.low, rows, cells, shape)
 
 
 def roll(
@@ -306,44 +277,36 @@ def roll(
     """
     pressed.pair.require_likeness()
     friction = number("friction", friction, "a coefficient of friction from 0 to 10", 0.0, 10.0)
-    xi_x, xi_y, spin = creepages(xi_x, xi_y, spin, number).values()
+    motion = tuple(creepages(xi_x, xi_y, spin, number).values())
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     fine = [_fine(part, pressed.options, cells) for part in pressed.patches]
     tractions = [np.zeros((*strip[-1].shape, 2)) for strip in fine]
-    creepage = (friction, xi_x, xi_y, spin)
+    crude_tractions = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
     for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True):
-        _march(strip, 1.0 / part.stiffness, creepage, traction)
-    crude_tractions = [
-        gather(*strip[:4], traction, part.box, pressed.options.net)
-        for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True)
-    ]
+        march(*strip, friction, 1.0 / part.stiffness, *motion, traction)
+        crude_tractions.append(gather(*strip[:4], traction, part.box, pressed.options.net))
     flexibilities = _refitted(pressed, crude_tractions)
-    rolled = [_march(*one) for one in zip(fine, flexibilities, [creepage] * len(fine), tractions, strict=True)]
-    fx, fy, mz, stuck, area = (float(sum(found[k] for found in rolled)) for k in range(5))
-    power = -(fx * xi_x + fy * xi_y + mz * spin)
+    rolled = [
+        march(*strip, friction, flexibility, *motion, traction)
+        for strip, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
+    ]
+    fx, fy, mz, stuck, area = (float(sum(forces[k] for forces in rolled)) for k in range(5))
+    power = -(fx * motion[0] + fy * motion[1] + mz * motion[2])
     fields = tuple(_fields(strip, traction, friction) for strip, traction in zip(fine, tractions, strict=True))
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
 def _fine(part: PatchPressure, options: Options, cells: int) -> tuple[Any, ...]:
     """Strips of a patch as ``march`` takes them: y, low, high, width and pressure."""
-    y, low, high, pressure = _strips(part, cells, cells, SHAPES[options.shape])
+    y, low, high, pressure = strips(*part.patch.surface(part.depth), cells, cells, SHAPES[options.shape])
     width = (part.box[3] - part.box[2]) / cells
     pressure *= part.load / (pressure.sum(axis=1) @ (high - low) * width / cells)  # full sliding gives mu N exactly
     return y, low, high, width, pressure
 
 
-def _march(
-    fine: tuple[Any, ...], flexibility: float, creepage: tuple[float, ...], traction: np.ndarray
-) -> tuple[float, ...]:
-    """FASTSIM on the strips of a patch, into its tractions; creepage: friction first."""
-    friction, *motion = creepage
-    return march(*fine, friction, flexibility, *motion, traction)
-
-
-def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float]:
+def _refitted(pressed: NormalContact, tractions: list[Array]) -> list[float]:
     """W_1 = W_2 (m/Pa) of each patch by least squares of u = W p + a, u by the tractions of all, on the crude nets.
 
     W_3 where no traction can be fitted.
@@ -358,23 +321,13 @@ def _refitted(pressed: NormalContact, tractions: list[np.ndarray]) -> list[float
     return found
 
 
-def _fields(fine: tuple[Any, ...], traction: np.ndarray, friction: float) -> Fields:
+def _fields(fine: tuple[Any, ...], traction: Array, friction: float) -> Fields:
     """Pressure and tractions by strip and cell."""
     y, low, high, width, pressure = fine
-    cells = pressure.shape[1]
-    length = ((high - low) / cells)[:, None]
-    x = high[:, None] - (np.arange(cells) + 0.5) * length
-    slips = np.hypot(traction[..., 0], traction[..., 1]) >= friction * pressure * (1.0 - 1e-9)
     shape = pressure.shape
+    length = ((high - low) / shape[1])[:, None]
+    x = high[:, None] - (np.arange(shape[1]) + 0.5) * length
+    px, py = traction[..., 0], traction[..., 1]
+    slips = np.hypot(px, py) >= friction * pressure * (1.0 - 1e-9)
     lines, lengths = np.broadcast_to(y[:, None], shape), np.broadcast_to(length, shape)
-    return Fields(
-        x,
-        lines,
-        lengths,
-        np.full(shape, width),
-        pressure,
-        traction[..., 0],
-        traction[..., 1],
-        slips,
-        np.full(shape, True),
-    )
+    return Fields(x, lines, lengths, np.full(shape, width), pressure, px, py, slips, np.full(shape, True))

@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.profiles import SPACING, Profile
 from models.core.errors import InputError
 
@@ -42,7 +43,7 @@ THROAT = (
 )
 WHEEL = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)
 """Ends of the sections H to A (mm)."""
-SECTIONS: tuple[Callable[[np.ndarray], np.ndarray], ...] = (
+SECTIONS: tuple[Callable[[Array], Array], ...] = (
     lambda y: 9.519259302 + np.sqrt(20.5**2 - (y + 49.5) ** 2),
     lambda y: 16.0 + np.sqrt(12.0**2 - (y + 55.0) ** 2),
     lambda y: 8.834924130 + np.sqrt(20.0**2 - (y + 58.558326413) ** 2),
@@ -63,7 +64,7 @@ LOWEST = 37.0
 """Depth of the head's side below its top (mm) down to which it is kept."""
 
 
-def s1002_height(y: np.ndarray) -> np.ndarray:
+def s1002_height(y: Array) -> Array:
     """Growth (mm) of the radius of an S1002 wheel at y (mm) from the taping line, flange at -70 to -38 mm."""
     y = np.asarray(y, float)
     section = np.clip(np.searchsorted(WHEEL, y, side="right") - 1, 0, len(SECTIONS) - 1)
@@ -85,7 +86,7 @@ def uic60() -> Profile:
     return _even(np.concatenate([-y[::-1], y[1:]]), np.concatenate([z[::-1], z[1:]]))
 
 
-def _half_head() -> tuple[np.ndarray, np.ndarray]:
+def _half_head() -> tuple[Array, Array]:
     """Right half of the head (mm) from the axis: arcs that continue one another's tangent, then the side."""
     y, z, angle = [np.zeros(1)], [np.zeros(1)], 0.0
     for radius, end in zip(RADII, (*CHANGES, None), strict=True):
@@ -100,7 +101,7 @@ def _half_head() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(y), np.concatenate([*z, depth])
 
 
-def _even(y: np.ndarray, z: np.ndarray) -> Profile:
+def _even(y: Array, z: Array) -> Profile:
     """Points (mm) at even distances along the contour, in m."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     even = np.linspace(0.0, length[-1], round(length[-1] * MM / SPACING) + 1)

@@ -13,13 +13,11 @@ import numpy as np
 
 from models.contact import linear_theory
 from models.contact.fastsim import fastsim
-from models.contact.fastsim_fields import fastsim_fields
-from models.contact.fields import Fields
+from models.contact.fields import Fields, fastsim_fields
 from models.contact.hertz import Hertz
-from models.contact.hertz_cells import hertzian
 from models.contact.material import Pair
-from models.contact.normal_problem import NormalSolution, Pressed, centres, solve_normal
-from models.contact.rolling_problem import RollingSolution, solve_rolling
+from models.contact.normal_problem import NormalSolution, Pressed, centres, hertzian, solve_normal
+from models.contact.rolling_problem import solve_rolling
 from models.contact.simplified_theory import NormalContact, PatchPressure
 from models.contact.simplified_theory import roll as roll_simplified
 from models.core.errors import InputError
@@ -96,6 +94,17 @@ class Linear(OnEllipse):
         return Rolled(fx, fy, mz, 1.0, -float(np.dot((fx, fy, mz), motion)))
 
 
+def beyond_friction(used: np.ndarray) -> str:
+    """What is said against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    beyond = used[used > 1.0]
+    if not beyond.size:
+        return ""
+    return (
+        f"the linear theory's force is more than friction can carry at {beyond.size} of {used.size} creepages, up "
+        f"to {beyond.max():.3g} mu N: it knows no slip"
+    )
+
+
 class Fastsim(OnEllipse):
     """The simplified theory of 1982; ``choices`` are those of ``fastsim``."""
 
@@ -106,10 +115,11 @@ class Fastsim(OnEllipse):
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` cells in each strip."""
-        given = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
-        found = fastsim(*given, cells=cells, **self.choices)
-        inside = (fastsim_fields(*given, cells=cells, **self.choices),) if fields else ()
-        fx, fy, mz, stick, lost = (float(v) for v in (found.fx, found.fy, found.mz, found.stick, found.dissipation))
+        contact = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
+        creep = fastsim(*contact, cells=cells, **self.choices)
+        inside = (fastsim_fields(*contact, cells=cells, **self.choices),) if fields else ()
+        values = creep.fx, creep.fy, creep.mz, creep.stick, creep.dissipation
+        fx, fy, mz, stick, lost = (float(value) for value in values)
         return Rolled(fx, fy, mz, stick, lost, inside)
 
 
@@ -121,79 +131,69 @@ class ExactOnEllipse(OnEllipse):
         return _exact([hertzian(self.a, self.b, self.pressing.load, cells)], motion, self.friction, self.pair)
 
 
-class Simplified(Contact):
-    """The simplified theory of 1983 for any undeformed distance."""
+class OnPatches(Contact):
+    """Patches of any shape, whose depths and loads are those of the theory of 1983; its load is along the normals."""
 
-    def __init__(self, pressed: NormalContact, friction: float) -> None:
-        pressing = Pressing(_normal_load(pressed), pressed.area, pressed.peak, pressed.approach)
-        super().__init__(pressing, friction, pressed.pair)
+    def __init__(self, pressed: NormalContact, friction: float, area: float, peak: float, approach: float) -> None:
+        load = sum(part.load for part in pressed.patches)
+        super().__init__(Pressing(load, area, peak, approach), friction, pressed.pair)
         self.pressed = pressed
 
     @property
     def lever(self) -> float:
         """Of the patch that reaches farthest (m)."""
-        return _lever(self.pressed.patches)
+        return max((abs(side) for part in self.pressed.patches for side in part.box), default=0.0)
+
+    def placed(self, fields: Sequence[Fields]) -> tuple[Fields, ...]:
+        """Fields with y along the contour of the rail, so that several patches lie beside one another."""
+        pairs = zip(fields, self.pressed.patches, strict=True)
+        return tuple(replace(cells, y=cells.y + part.patch.place) for cells, part in pairs)
+
+
+class Simplified(OnPatches):
+    """The simplified theory of 1983 for any undeformed distance."""
+
+    def __init__(self, pressed: NormalContact, friction: float) -> None:
+        super().__init__(pressed, friction, pressed.area, pressed.peak, pressed.approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` strips and cells in each patch; fields lie where the patches do on the contour."""
-        found = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
-        places = [part.patch.place for part in self.pressed.patches]
-        return Rolled(found.fx, found.fy, found.mz, found.stick_share, found.power, _placed(found.fields, places))
+        forces = roll_simplified(self.pressed, self.friction, *motion, cells=cells)
+        inside = self.placed(forces.fields)
+        return Rolled(forces.fx, forces.fy, forces.mz, forces.stick_share, forces.power, inside)
 
 
-class Exact(Contact):
+class Exact(OnPatches):
     """Half-spaces with Coulomb friction, pressure found too; patches share the load as the theory of 1983 says."""
 
     def __init__(self, pressed: NormalContact, friction: float, cells: int) -> None:
-        self.parts = pressed.patches
-        found = [_solved(part, cells, pressed.pair) for part in self.parts]
-        peak = max(float(one.pressure.max()) for one in found)
-        alone = found[0].approach / float(np.cos(self.parts[0].patch.lean))
-        approach = alone if len(found) == 1 else pressed.approach
-        pressing = Pressing(_normal_load(pressed), sum(one.area for one in found), peak, approach)
-        super().__init__(pressing, friction, pressed.pair)
-
-    @property
-    def lever(self) -> float:
-        """Of the patch that reaches farthest (m)."""
-        return _lever(self.parts)
+        parts = pressed.patches
+        grids = [_solved(part, cells, pressed.pair) for part in parts]
+        alone = grids[0].approach / float(np.cos(parts[0].patch.lean))
+        approach = alone if len(grids) == 1 else pressed.approach
+        peak = max(float(grid.pressure.max()) for grid in grids)
+        super().__init__(pressed, friction, sum(grid.area for grid in grids), peak, approach)
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` x ``cells`` cells about each patch."""
-        found = _exact([_solved(part, cells, self.pair) for part in self.parts], motion, self.friction, self.pair)
-        return replace(found, fields=_placed(found.fields, [part.patch.place for part in self.parts]))
+        grids = [_solved(part, cells, self.pair) for part in self.pressed.patches]
+        forces = _exact(grids, motion, self.friction, self.pair)
+        return replace(forces, fields=self.placed(forces.fields))
 
 
 def _exact(grids: Sequence[Pressed], motion: Motion, friction: float, pair: Pair) -> Rolled:
     """The sum over patches that do not feel each other's tractions."""
-    found = [solve_rolling(grid, friction, *motion, pair) for grid in grids]
-    areas = [grid.area for grid in grids]
-    stuck = sum(
-        np.count_nonzero(one.stick & grid.contact) * grid.dx * grid.dy for one, grid in zip(found, grids, strict=True)
-    )
-    fields = tuple(_fields(one, grid) for one, grid in zip(found, grids, strict=True))
-    fx, fy, mz = (float(sum(getattr(one, name) for one in found)) for name in ("fx", "fy", "mz"))
-    return Rolled(fx, fy, mz, float(stuck / sum(areas)), -float(np.dot((fx, fy, mz), motion)), fields)
-
-
-def _fields(found: RollingSolution, grid: Pressed) -> Fields:
-    x, y = np.meshgrid(grid.x, grid.y)
-    return Fields(
-        x,
-        y,
-        np.full_like(x, grid.dx),
-        np.full_like(x, grid.dy),
-        grid.pressure,
-        found.traction[..., 0],
-        found.traction[..., 1],
-        ~found.stick,
-        grid.contact,
-    )
-
-
-def _placed(fields: Sequence[Fields], places: Sequence[float]) -> tuple[Fields, ...]:
-    """Fields with y along the contour of the rail, so that several patches lie beside one another."""
-    return tuple(replace(one, y=one.y + place) for one, place in zip(fields, places, strict=True))
+    forces, stuck, fields = np.zeros(3), 0.0, list[Fields]()
+    for grid in grids:
+        patch, (x, y) = solve_rolling(grid, friction, *motion, pair), np.meshgrid(grid.x, grid.y)
+        forces += patch.fx, patch.fy, patch.mz
+        stuck += np.count_nonzero(patch.stick & grid.contact) * grid.dx * grid.dy
+        px, py = np.moveaxis(patch.traction, -1, 0)
+        sizes = np.full_like(x, grid.dx), np.full_like(x, grid.dy)
+        fields.append(Fields(x, y, *sizes, grid.pressure, px, py, ~patch.stick, grid.contact))
+    share = float(stuck / sum(grid.area for grid in grids))
+    fx, fy, mz = forces.tolist()
+    return Rolled(fx, fy, mz, share, -float(np.dot((fx, fy, mz), motion)), tuple(fields))
 
 
 MARGINS = (1.2, 1.6, 2.2)
@@ -202,9 +202,13 @@ MARGINS = (1.2, 1.6, 2.2)
 
 def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
     """Exact pressure of one patch, with the load that the simplified theory gives it, in the patch's own place."""
+    (x0, x1, y0, y1), known = part.box, part.patch.distance
     for margin in MARGINS:
+        dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free
+        x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
+        inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
         try:
-            return _on_grid(part, cells, margin, pair)
+            return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
         except InputError as error:  # the contact reaches the edge of the grid
             refused = error
     if not any(part.patch.cut):
@@ -214,21 +218,3 @@ def _solved(part: PatchPressure, cells: int, pair: Pair) -> NormalSolution:
         "another lateral_shift"
     )
     raise InputError("", "method.name", "exact", allowed)
-
-
-def _on_grid(part: PatchPressure, cells: int, margin: float, pair: Pair) -> NormalSolution:
-    x0, x1, y0, y1 = part.box
-    dx, dy = margin * (x1 - x0) / (cells - 2), margin * (y1 - y0) / (cells - 2)  # a frame of cells stays free
-    x, y = (x0 + x1) / 2 + centres(cells, dx), (y0 + y1) / 2 + centres(cells, dy)
-    known = part.patch.distance
-    inside = np.meshgrid(np.clip(x, known.x[0], known.x[-1]), np.clip(y, known.y[0], known.y[-1]))
-    return replace(solve_normal(known.at(*inside), dx, dy, pair, load=part.load), x=x, y=y)
-
-
-def _normal_load(pressed: NormalContact) -> float:
-    """Load across all patches, each along its own normal (N)."""
-    return sum(part.load for part in pressed.patches)
-
-
-def _lever(parts: Sequence[PatchPressure]) -> float:
-    return max((abs(side) for part in parts for side in part.box), default=0.0)

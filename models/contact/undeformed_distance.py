@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from models.contact.distance_kernels import valley, values
-from models.contact.inputs import quantity
+from models.contact.inputs import Array, quantity
 from models.core.errors import InputError
 
 NODES = 97
@@ -31,9 +31,9 @@ class Distance:
     The approach of the bodies counts from distance zero, whether or not the least height is zero.
     """
 
-    x: np.ndarray
-    y: np.ndarray
-    height: np.ndarray
+    x: Array
+    y: Array
+    height: Array
 
     @property
     def dx(self) -> float:
@@ -46,11 +46,11 @@ class Distance:
         return float(self.y[-1] - self.y[0]) / (self.y.size - 1)
 
     @cached_property
-    def padded(self) -> np.ndarray:
+    def padded(self) -> Array:
         """Heights with one more node on every side, continued by the parabola through the last three."""
         return _continued(_continued(self.height).T).T.copy()
 
-    def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def at(self, x: Array, y: Array) -> Array:
         """Distance (m) at points x, y (m), broadcast; raises InputError outside the nodes."""
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         for name, points, nodes in (("x", x, self.x), ("y", y, self.y)):
@@ -60,19 +60,17 @@ class Distance:
         return values(self.padded, u, v).reshape(x.shape)
 
     @cached_property
-    def valley_y(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def valley_y(self) -> tuple[Array, Array, Array]:
         """Lines y (m), the least height on each (m), and the x where it is (m): how the valley runs across y."""
         return self._valley(self.padded, self.y, self.x, self.dx)
 
     @cached_property
-    def valley_x(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def valley_x(self) -> tuple[Array, Array, Array]:
         """Lines x (m), the least height on each (m), and the y where it is (m)."""
         return self._valley(np.ascontiguousarray(self.padded.T), self.x, self.y, self.dy)
 
     @staticmethod
-    def _valley(
-        padded: np.ndarray, along: np.ndarray, across: np.ndarray, step: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _valley(padded: Array, along: Array, across: Array, step: float) -> tuple[Array, Array, Array]:
         finer = 2
         least, where = valley(padded, finer)
         return np.linspace(along[0], along[-1], least.size), least, across[0] + where * step
@@ -83,10 +81,7 @@ class Distance:
 
 
 def from_function(
-    height: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    x: tuple[float, float],
-    y: tuple[float, float],
-    nodes: int = NODES,
+    height: Callable[[Array, Array], Array], x: tuple[float, float], y: tuple[float, float], nodes: int = NODES
 ) -> Distance:
     """Distance from a formula ``height(x, y)`` in m, of arrays in m, over the rectangle x[0]..x[1], y[0]..y[1].
 
@@ -96,15 +91,15 @@ def from_function(
         if not (np.isfinite([first, last]).all() and first < last):
             raise InputError("", name, [first, last], "must be two finite bounds in m, the lower first")
     nodes_x, nodes_y = np.linspace(*x, nodes), np.linspace(*y, nodes)
-    found = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
+    heights = quantity("height", height(nodes_x[None, :], nodes_y[:, None]), "finite everywhere (m)")
     try:
-        found = np.broadcast_to(found, (nodes, nodes))
+        heights = np.broadcast_to(heights, (nodes, nodes))
     except ValueError:
-        raise InputError("", "height", list(found.shape), "must give one distance per point") from None
-    return from_arrays(nodes_x, nodes_y, found)
+        raise InputError("", "height", list(heights.shape), "must give one distance per point") from None
+    return from_arrays(nodes_x, nodes_y, heights)
 
 
-def from_arrays(x: np.ndarray, y: np.ndarray, height: np.ndarray) -> Distance:
+def from_arrays(x: Array, y: Array, height: Array) -> Distance:
     """Distance from values: x (nx,), y (ny,) even ascending nodes (m), height (ny, nx) (m), rows along y.
 
     Raises InputError for a wrong shape, uneven nodes, fewer than four of them, or values that are not finite.
@@ -131,7 +126,7 @@ def quadratic(A: float, B: float, x: float, y: float, nodes: int = NODES) -> Dis
     return from_function(lambda u, v: A * u**2 + B * v**2, (-x, x), (-y, y), nodes)
 
 
-def _continued(rows: np.ndarray) -> np.ndarray:
+def _continued(rows: Array) -> Array:
     """One more row before and after, on the parabola through the three nearest."""
     first = 3.0 * (rows[0] - rows[1]) + rows[2]
     last = 3.0 * (rows[-1] - rows[-2]) + rows[-3]

@@ -23,8 +23,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from models.contact.inputs import quantity
-from models.contact.patches import RIDGE, Patch, ridges
+from models.contact.inputs import Array, quantity
+from models.contact.patches import Patch, ridges
 from models.contact.profiles import Profile
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError, RunFailed
@@ -75,7 +75,7 @@ class Pose:
     fall: float
 
     @cached_property
-    def turn(self) -> np.ndarray:
+    def turn(self) -> Array:
         """Rotation (3, 3) from the wheelset to the track: roll, then yaw."""
         (cr, sr), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (self.roll, self.yaw))
         return np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]]) @ np.array(
@@ -109,25 +109,24 @@ class Side:
     rail: Profile
     wheelset: Wheelset
 
-    def outline(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, 3) of the wheel nearest to straight rails, in the track (m), and their slope dz/dy."""
-        y, slope = self.wheel.y, self.wheel.curve(self.wheel.y, 1)
-        radius = self.wheelset.radius + self.wheel.z
-        lead = np.sin(pose.roll) * np.tan(pose.yaw)
-        sine = -slope * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
-        angle = np.arcsin(np.clip(sine, -1.0, 1.0)) - np.arctan(lead)
-        points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
-        return points @ pose.turn.T + self.centre(pose), slope
-
-    def centre(self, pose: Pose) -> np.ndarray:
+    def centre(self, pose: Pose) -> Array:
         """Middle of the axle in the track (m)."""
         return np.array([0.0, pose.shift, pose.fall - self.wheelset.radius])
 
-    def gaps(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+    def outline(self, pose: Pose) -> Array:
+        """Points (n, 3) of the wheel nearest to straight rails, in the track (m)."""
+        y, radius = self.wheel.y, self.wheelset.radius + self.wheel.z
+        lead = np.sin(pose.roll) * np.tan(pose.yaw)
+        sine = -self.wheel.curve(y, 1) * np.cos(pose.roll) * np.tan(pose.yaw) / np.hypot(1.0, lead)
+        angle = np.arcsin(np.clip(sine, -1.0, 1.0)) - np.arctan(lead)
+        points = np.column_stack([radius * np.sin(angle), self.wheelset.arm + y, radius * np.cos(angle)])
+        return points @ pose.turn.T + self.centre(pose)
+
+    def gaps(self, pose: Pose) -> tuple[Array, Array]:
         """Outline points (n, 3) that lie over the rail, and the vertical gap (m) below each."""
-        points, _ = self.outline(pose)
+        points = self.outline(pose)
         over = (points[:, 1] >= self.rail.y[0]) & (points[:, 1] <= self.rail.y[-1])
-        over &= np.concatenate([np.diff(points[:, 1]) > 0.0, [True]])
+        over &= np.append(np.diff(points[:, 1]) > 0.0, True)
         if np.count_nonzero(over) < 10:
             raise InputError(
                 "",
@@ -142,8 +141,13 @@ class Side:
         """Least vertical gap (m), between the points by a parabola."""
         gap = self.gaps(pose)[1]
         k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
-        rise, bend = (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
+        rise, bend = _parabola(gap, k)
         return float(gap[k] - 0.5 * rise**2 / bend) if bend > abs(rise) else float(gap.min())
+
+
+def _parabola(gap: Array, k: int) -> tuple[float, float]:
+    """Slope and curvature per step of the parabola through three gaps."""
+    return (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
 
 
 def wheel_on_rail(
@@ -166,10 +170,10 @@ def wheel_on_rail(
     quantity("lateral_shift", lateral_shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
     quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
     side = Side(wheel, laid(rail, track), wheelset)
-    found = touches_of(side, placed(side, lateral_shift, yaw))
-    if not found:
+    touches = touches_of(side, placed(side, lateral_shift, yaw))
+    if not touches:
         raise InputError("", "lateral_shift", lateral_shift, "lets wheel and rail touch at the end of a profile only")
-    return found
+    return touches
 
 
 def laid(rail: Profile, track: Track) -> Profile:
@@ -204,45 +208,42 @@ def placed(side: Side, shift: float, yaw: float) -> Pose:
 def touches_of(side: Side, pose: Pose) -> list[Touch]:
     """Places where a wheel touches or nearly does: minima of the vertical gap, each between the ridges beside it."""
     points, gap = side.gaps(pose)
-    cuts = [0, *ridges(gap, RIDGE), gap.size - 1]
-    found = []
-    for first, last in pairwise(cuts):
+    touches = []
+    for first, last in pairwise([0, *ridges(gap), gap.size - 1]):
         k = first + int(np.argmin(gap[first : last + 1]))
         if gap[k] < DEEP and 0 < k < gap.size - 1:
-            found.append(_touch(side, pose, points, gap, (first, k, last)))
-    return sorted(found, key=lambda touch: touch.gap)
+            touches.append(_touch(side, pose, points, gap, (first, k, last)))
+    return sorted(touches, key=lambda touch: touch.gap)
 
 
-def _touch(side: Side, pose: Pose, points: np.ndarray, gap: np.ndarray, at: tuple[int, int, int]) -> Touch:
-    """One touching place and the distance around it."""
+def _touch(side: Side, pose: Pose, points: Array, gap: Array, at: tuple[int, int, int]) -> Touch:
+    """One touching place, where the parabola through three gaps is least, and the distance around it."""
     first, k, last = at
-    lowest = _between(points, gap, k)
+    rise, bend = _parabola(gap, k)
+    share = float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
+    lowest = points[k] + abs(share) * ((points[k + 1] if share > 0.0 else points[k - 1]) - points[k])
     x, y = float(lowest[0]), float(lowest[1])
     angle = float(np.arctan(side.rail.curve(y, 1)))
-    low, high = _reach(gap, at, angle)
+    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5  # where the surroundings end, if not at a ridge
+    below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
+    low, high = first + int(below[-1]) if below.size else first, k + int(above[0]) if above.size else last
     cut = (False, False, low == first and first > 0, high == last and last < gap.size - 1)
     ends = (points[low, 1] - y) / np.cos(angle), (points[high, 1] - y) / np.cos(angle)
-    distance = _distance(side, pose, np.array([x, y, side.rail.curve(y)]), angle, ends)
+    distance = distance_over(side, pose, np.array([x, y, side.rail.curve(y)]), angle, ends)
     top = float(side.rail.y[np.argmin(side.rail.z)])
     between = np.linspace(top, y, 200)
     along = float(np.trapezoid(np.hypot(1.0, side.rail.curve(between, 1)), between))
     ahead, across, _ = pose.turn.T @ (lowest - side.centre(pose))
     patch = Patch(distance, cut, abs(angle), along)
-    return Touch(
-        patch.low / float(np.cos(angle)), angle, float(across) - side.wheelset.arm, y - top, float(ahead), patch
-    )
+    wheel_y = float(across) - side.wheelset.arm
+    return Touch(patch.low / float(np.cos(angle)), angle, wheel_y, y - top, float(ahead), patch)
 
 
-def _between(points: np.ndarray, gap: np.ndarray, k: int) -> np.ndarray:
-    """Where the parabola through three points of the outline has its least gap."""
-    rise, bend = (gap[k + 1] - gap[k - 1]) / 2.0, gap[k + 1] - 2.0 * gap[k] + gap[k - 1]
-    share = float(np.clip(-rise / bend, -0.5, 0.5)) if bend > 0.0 else 0.0
-    neighbour = points[k + 1] if share > 0.0 else points[k - 1]
-    return points[k] + abs(share) * (neighbour - points[k])
+def distance_over(side: Side, pose: Pose, place: Array, angle: float, ends: tuple[float, float]) -> Distance:
+    """Distance over the plane that touches the rail at a place, between two ends along the rail's contour.
 
-
-def _distance(side: Side, pose: Pose, place: np.ndarray, angle: float, ends: tuple[float, float]) -> Distance:
-    """Distance over the plane that touches the rail at a place, between two ends along the rail's contour."""
+    place : x, y, z in the track (m); angle : of the plane (rad); ends : from the place (m).
+    """
     half = 1.2 * np.sqrt(2.0 * DEEP * side.wheelset.radius / np.cos(angle))
     rail_s, rail_n = _rail_heights(side.rail, place, angle)
     x = np.linspace(-half, half, NODES)
@@ -250,33 +251,23 @@ def _distance(side: Side, pose: Pose, place: np.ndarray, angle: float, ends: tup
     return Distance(x, s, CubicSpline(rail_s, rail_n)(s)[:, None] - _wheel_heights(side, pose, place, angle, x, s))
 
 
-def _reach(gap: np.ndarray, at: tuple[int, int, int], angle: float) -> tuple[int, int]:
-    """Indices to both sides of a minimum where its surroundings end: beyond DEEP along the normal, or at a ridge."""
-    first, k, last = at
-    deep = (gap - gap[k]) * np.cos(angle) > DEEP * 1.5
-    below, above = np.flatnonzero(deep[first:k]), np.flatnonzero(deep[k : last + 1])
-    return (first + int(below[-1]) if below.size else first), (k + int(above[0]) if above.size else last)
-
-
-def _rail_heights(rail: Profile, place: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+def _rail_heights(rail: Profile, place: Array, angle: float) -> tuple[Array, Array]:
     """The rail over its tangent plane: s along it and n into the rail (m), where s ascends around the place."""
     y, z = rail.y - place[1], rail.z - place[2]
     s, n = y * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - y * np.sin(angle)
-    backward = np.flatnonzero(np.diff(s) <= 1e-9)
-    here = int(np.argmin(np.abs(s)))
-    low = backward[backward < here]
-    high = backward[backward >= here]
+    backward, here = np.flatnonzero(np.diff(s) <= 1e-9), int(np.argmin(np.abs(s)))
+    low, high = backward[backward < here], backward[backward >= here]
     keep = slice(int(low[-1]) + 1 if low.size else 0, int(high[0]) + 1 if high.size else s.size)
     return s[keep], n[keep]
 
 
-def _wheel_heights(side: Side, pose: Pose, place: np.ndarray, angle: float, x: np.ndarray, s: np.ndarray) -> np.ndarray:
+def _wheel_heights(side: Side, pose: Pose, place: Array, angle: float, x: Array, s: Array) -> Array:
     """The wheel over the plane that touches the rail, (s, x): Newton's method on distance to the axle = radius."""
-    along = np.array([0.0, np.cos(angle), np.sin(angle)])
-    into = np.array([0.0, -np.sin(angle), np.cos(angle)])
-    turn, centre = pose.turn, side.centre(pose)
-    base = place + x[None, :, None] * np.array([1.0, 0.0, 0.0]) + s[:, None, None] * along
-    base, into = (base - centre) @ turn, into @ turn
+    ahead, along, into = np.array(
+        [[1.0, 0.0, 0.0], [0.0, np.cos(angle), np.sin(angle)], [0.0, -np.sin(angle), np.cos(angle)]]
+    )
+    base = place + x[None, :, None] * ahead + s[:, None, None] * along
+    base, into = (base - side.centre(pose)) @ pose.turn, into @ pose.turn
     curve, slope, arm = side.wheel.curve, side.wheel.curve.derivative(), side.wheelset.arm
     height = np.zeros((s.size, x.size))
     for _ in range(ITERATIONS):

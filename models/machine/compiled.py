@@ -21,6 +21,8 @@ import numba
 ROOT = Path(__file__).parents[2]
 COMMON = tuple(ROOT / "models" / name for name in ("vehicles", "engines", "contact", "machine"))
 """Folders whose functions are compiled into kernels of other folders."""
+SOURCES = (".py", ".csv")
+"""Endings of code, and of tables whose numbers kernels are compiled with."""
 IMPORT = re.compile(r"^from ((?:models|validation)[.\w]*) import (?:\(([^)]*)\)|(.*))", re.MULTILINE)
 
 
@@ -30,6 +32,10 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
     What may make arrays says so (``_nrt``), or it would be compiled like whoever calls it first, who may be ``lean``.
     """
     return lambda function: _kept_apart(numba.njit(**{"_nrt": True, **options})(function))
+
+
+compiled = njit(cache=True, error_model="numpy")
+"""``njit`` with numpy's rules where a number is divided by zero; kept on disk."""
 
 
 def lean(function: Callable) -> Any:
@@ -64,8 +70,10 @@ def named(function: Any, *parts: Any) -> Any:
 
 @cache
 def checksum(folder: Path) -> int:
-    """Of the sources that a kernel of this folder may be made of."""
-    sources = (path for place in sorted({folder, *COMMON}) for path in sorted(place.glob("*.py")))
+    """Of the sources that a kernel of this folder may be made of, and of the tables beside them."""
+    sources = (
+        path for place in sorted({folder, *COMMON}) for path in sorted(place.iterdir()) if path.suffix in SOURCES
+    )
     return zlib.crc32(b"".join(path.read_bytes() for path in sources))
 
 

@@ -25,17 +25,18 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the theory that computes, and forces at all motions."""
     from models.contact.theories import Exact, ExactOnEllipse, Linear, Simplified
-    from models.systems.contact import of_scene
+    from models.systems.contact import run
 
-    with mock.patch.object(of_scene, "touches", wraps=of_scene.touches) as searched:
-        own, motions = of_scene.contact(scene), of_scene.creepages(scene)
-    found = [own.roll(motion, 7) for motion in motions]
+    coarse = scene.model_copy(update={"method": scene.method.model_copy(update={"cells": 7})})
+    with mock.patch.object(run, "touches", wraps=run.touches) as searched:
+        forces = run.run(coarse, errors=False)
+    body = forces.detail.contact
     counts = {
-        "bounded": int(not isinstance(own, Linear)),
-        "areas of any shape": int(isinstance(own, Simplified)),
-        "half-spaces": int(isinstance(own, Exact | ExactOnEllipse)),
-        "laws of friction": int(getattr(own, "choices", {}).get("falling") is not None),
+        "bounded": int(not isinstance(body, Linear)),
+        "areas of any shape": int(isinstance(body, Simplified)),
+        "half-spaces": int(isinstance(body, Exact | ExactOnEllipse)),
+        "laws of friction": int(getattr(body, "choices", {}).get("falling") is not None),
         "searches": searched.call_count,
-        "motions with spin": sum(motion[2] != 0.0 for motion in motions),
+        "motions with spin": int((forces["spin"] != 0.0).sum()),
     }
-    return counts, np.array([[one.fx, one.fy, one.mz] for one in found]).tobytes()
+    return counts, np.array([forces[name] for name in ("fx", "fy", "mz")]).tobytes()

@@ -12,6 +12,7 @@ import numpy as np
 
 from models.contact.fastsim import Ellipse
 from models.contact.fastsim_grid import grid
+from models.contact.inputs import Array
 from models.contact.linear_theory import flexibilities
 from models.contact.material import Pair
 from models.machine.compiled import njit
@@ -44,7 +45,7 @@ def forces(axis, load, friction, creep_x, creep_y, flexible_x, flexible_y, strip
     return friction * load * fx, friction * load * fy
 
 
-def calls() -> tuple[Callable[[], np.ndarray], Callable[[], np.ndarray]]:
+def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
     """The product's call and the written one, CALLS times: fx, fy (N)."""
     pair = Pair()
     own = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
@@ -52,12 +53,12 @@ def calls() -> tuple[Callable[[], np.ndarray], Callable[[], np.ndarray]]:
     net = grid(CELLS, own.net.strips.shape[1], "intermediate")
     strips, bound = net.strips[[1, 3]].copy(), net.cells[1].copy()
 
-    def ours() -> np.ndarray:
+    def ours() -> Array:
         for _ in range(CALLS):
             found = own(AXIS, LOAD, FRICTION, *CREEP, 0.0)
         return np.array(found[:2])
 
-    def theirs() -> np.ndarray:
+    def theirs() -> Array:
         for _ in range(CALLS):
             found = forces(AXIS, LOAD, FRICTION, *CREEP, flexible[0], flexible[1], strips, bound)
         return np.array(found)

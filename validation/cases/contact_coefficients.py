@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.linear_theory import RATIOS, coefficients
 from models.contact.material import Material, Pair
 from models.contact.normal_problem import centres
@@ -46,7 +47,7 @@ SLENDER = (
 WHY = "the same continuum problem solved on cells, extrapolated to none"
 
 
-def exact(ratio: float, nu: float, cells: int = CELLS) -> np.ndarray:
+def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
     """C11, C22, C23, C33 (4,) by the exact theory."""
     coarse, middle, fine = (_on_grid(ratio, nu, n) for n in (cells, 2 * cells, 4 * cells))
     found = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
@@ -55,7 +56,7 @@ def exact(ratio: float, nu: float, cells: int = CELLS) -> np.ndarray:
     return found
 
 
-def _on_grid(ratio: float, nu: float, cells: int) -> np.ndarray:
+def _on_grid(ratio: float, nu: float, cells: int) -> Array:
     """The same on one grid, from a unit of each creepage; C23 is the mean of Fy by spin and Mz by xi_y."""
     a, b = ratio**0.5, ratio**-0.5
     more = max(1.0, max(ratio, 1.0 / ratio) / 10.0)
@@ -66,22 +67,18 @@ def _on_grid(ratio: float, nu: float, cells: int) -> np.ndarray:
     body = Material(E=2e11, nu=nu)
     operator = SlipOperator(columns, rows, dx, dy, Pair(body, body))
     system = FreeSystem(operator, inside[..., None, None] * np.eye(2), np.zeros(inside.shape))
-    found = []
+    sums = []
     for motion in np.eye(3):
-        p = _sticking(system, rigid_slip(x, y, *motion)) * (dx * dy)
-        found.append([*p.sum(axis=(0, 1)), (x * p[..., 1] - y[:, None] * p[..., 0]).sum()])
-    (fx, _, _), (_, fy, turn), (_, side, moment) = found
+        rigid = rigid_slip(x, y, *motion)
+        traction = -system.solve(rigid, INNER)  # leaves no free cell any slip
+        left = np.abs(system.free @ (rigid + operator(traction))[..., None]).max()
+        if left > RESIDUAL * np.abs(rigid).max():
+            raise RunFailed("exact linear theory", f"slip of {left:.2g} left")
+        p = traction * (dx * dy)
+        sums.append([*p.sum(axis=(0, 1)), (x * p[..., 1] - y[:, None] * p[..., 0]).sum()])
+    (fx, _, _), (_, fy, turn), (_, side, moment) = sums
     area = np.count_nonzero(inside) * dx * dy / np.pi
     return np.array([-fx / area, -fy / area, (turn - side) / 2.0 / area**1.5, -moment / area**2])
-
-
-def _sticking(system: FreeSystem, rigid: np.ndarray) -> np.ndarray:
-    """Traction (ny, nx, 2) by G that leaves no free cell any slip, to RESIDUAL of the largest rigid slip."""
-    traction = -system.solve(rigid, INNER)
-    left = np.abs(system.free @ (rigid + system.operator(traction))[..., None]).max()
-    if left > RESIDUAL * np.abs(rigid).max():
-        raise RunFailed("exact linear theory", f"slip of {left:.2g} left")
-    return traction
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -91,19 +88,21 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     data: dict[str, Any] = {"nodes": nodes}
     rows = [*_node_rows(np.array(nodes)), _misprint(np.array(nodes))]
     if not quick:
-        data["between"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in _between()]
+        middle = [(float(ratio), 0.25) for ratio in np.sqrt(RATIOS[1:] * RATIOS[:-1])]  # of every two ratios
+        middle += [(ratio, nu) for ratio in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
+        data["between"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in middle]
         data["beyond"] = [[ratio, nu, *exact(ratio, nu)] for ratio, nu in SLENDER]
         rows += _between_rows(np.array(data["between"]), np.array(nodes)) + _beyond_rows(np.array(data["beyond"]))
     return rows, data
 
 
-def deviation(solved: np.ndarray) -> np.ndarray:
+def deviation(solved: Array) -> Array:
     """Coefficients as the library gives them by those of the exact theory, minus 1, (n, 4), of rows (n, 6)."""
     c = coefficients(solved[:, 0], solved[:, 1])
     return np.stack([c.c11, c.c22, c.c23, c.c33], axis=-1) / solved[:, 2:] - 1.0
 
 
-def _node_rows(nodes: np.ndarray) -> list[Row]:
+def _node_rows(nodes: Array) -> list[Row]:
     off = np.abs(deviation(nodes))
     middle = (nodes[:, 0] > 0.19) & (nodes[:, 0] < 5.1)
     rows = [_worst(name, off[middle, i], nodes[middle], "a/b 0.2 to 5", BOUNDS[name]) for i, name in enumerate(NAMES)]
@@ -115,7 +114,7 @@ def _node_rows(nodes: np.ndarray) -> list[Row]:
     return rows
 
 
-def _worst(name: str, off: np.ndarray, nodes: np.ndarray, where: str, bound: float) -> Row:
+def _worst(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
     ratio, nu = nodes[int(off.argmax()), :2]
     return at_most(
         f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
@@ -130,7 +129,7 @@ def _worst(name: str, off: np.ndarray, nodes: np.ndarray, where: str, bound: flo
     )
 
 
-def _misprint(nodes: np.ndarray) -> Row:
+def _misprint(nodes: Array) -> Row:
     """What the same comparison says of the misprint."""
     node = nodes[(np.abs(nodes[:, 0] - 0.8) < 1e-9) & (nodes[:, 1] == 0.25)][0]
     off = abs(MISPRINT / node[4] - 1.0)
@@ -145,13 +144,7 @@ def _misprint(nodes: np.ndarray) -> Row:
     )
 
 
-def _between() -> list[tuple[float, float]]:
-    """The geometric middle of every two ratios at the tabulated nu, and some ratios at nu between."""
-    middle = np.sqrt(RATIOS[1:] * RATIOS[:-1])
-    return [(float(r), 0.25) for r in middle] + [(r, nu) for r in (0.1, 1.0, 10.0) for nu in (0.125, 0.375)]
-
-
-def _between_rows(between: np.ndarray, nodes: np.ndarray) -> list[Row]:
+def _between_rows(between: Array, nodes: Array) -> list[Row]:
     """Error of interpolation alone: the deviation there, less the mean of that at the nodes on both sides."""
     at_nodes = deviation(nodes).reshape(len(RATIOS), len(NUS), 4)
     count = len(RATIOS) - 1
@@ -176,7 +169,7 @@ def _between_rows(between: np.ndarray, nodes: np.ndarray) -> list[Row]:
     ]
 
 
-def _beyond_rows(beyond: np.ndarray) -> list[Row]:
+def _beyond_rows(beyond: Array) -> list[Row]:
     """Slender patches; C33 of long ones is what is left of large parts, and has nodes of its own at 20 and 50."""
     off = np.abs(deviation(beyond))
     long = beyond[:, 0] > 1.0
@@ -204,7 +197,7 @@ def _beyond_rows(beyond: np.ndarray) -> list[Row]:
     ]
 
 
-def _span(rows: np.ndarray) -> str:
+def _span(rows: Array) -> str:
     """The ratios of some rows."""
     return ", ".join(f"{ratio:g}" if ratio >= 1 else f"1/{1 / ratio:g}" for ratio in np.unique(rows[:, 0]))
 

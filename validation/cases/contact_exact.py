@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.contact.hertz import by_axes
-from models.contact.hertz_cells import hertzian
+from models.contact.inputs import Array
 from models.contact.material import Material, Pair
-from models.contact.normal_problem import NormalSolution, centres, solve_normal
+from models.contact.normal_problem import NormalSolution, centres, hertzian, solve_normal
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
 from models.systems.contact.work_precision import Case
@@ -45,7 +45,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows for both problems against closed forms, their refinement, symmetries, and the sample where there is one;
     quick: two cases up to 32 cells instead of all up to 80, every fourth contact of the sample by half the cells.
     """
-    refined = _refined((8, 16, 32) if quick else (10, 20, 40, 80), ("x", "spin") if quick else tuple(CASES))
+    grids, names = ((8, 16, 32), ("x", "spin")) if quick else ((10, 20, 40, 80), tuple(CASES))
+    refined = {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
     rows = [
         *_hertz_rows(),
         *_strip_rows(20 if quick else 80),
@@ -63,15 +64,15 @@ def _row(name: str, words: str, value: float, bound: float, why: str, unit: str 
     return at_most(f"contact_exact.{name}", SYSTEM, words, value, unit, bound, why, side)
 
 
-def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, np.ndarray]:
+def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
     """The normal problem of an ellipse a/b = ratio on cells, and its errors of approach, peak and area (3,)."""
     a, b = SIZE * ratio**0.5, SIZE / ratio**0.5
     truth = by_axes(a, b, PAIR, load=LOAD)
     dx, dy = 2 * a / cells, 2 * b / cells
     x, y = centres(cells + 5, dx), centres(cells + 5, dy)
-    found = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, PAIR, load=LOAD)
-    values = np.array([found.approach, found.pressure.max(), found.area])
-    return found, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
+    solved = solve_normal(float(truth.A) * x**2 + float(truth.B) * y[:, None] ** 2, dx, dy, PAIR, load=LOAD)
+    values = np.array([solved.approach, solved.pressure.max(), solved.area])
+    return solved, values / [float(truth.approach), float(truth.p0), np.pi * a * b] - 1.0
 
 
 def _hertz_rows() -> list[Row]:
@@ -107,7 +108,7 @@ def _hertz_rows() -> list[Row]:
     return rows
 
 
-def carter(x: np.ndarray, a: float, share: float) -> np.ndarray:
+def carter(x: Array, a: float, share: float) -> Array:
     """Traction by mu p0 on a strip -a < x < a that rolls to +x, at a creepage of ``share`` of that of full sliding.
 
     Carter (1926) as in Johnson, Contact Mechanics, 1985, section 8.3: two semi-ellipses, of which the second fills the
@@ -124,8 +125,8 @@ def _strip(cells: int, share: float) -> tuple[list[float], list[float], float]:
     a = STRIP * b
     pressed = hertzian(a, b, LOAD, cells + 1)  # odd: one strip of cells lies in the middle
     bound = MU * 1.5 * LOAD / (np.pi * a * b)
-    found = solve_rolling(pressed, MU, 2 * share * bound / PAIR.modulus, 0.0, 0.0, PAIR)
-    traction = -found.traction[cells // 2, :, 0] / bound
+    solved = solve_rolling(pressed, MU, 2 * share * bound / PAIR.modulus, 0.0, 0.0, PAIR)
+    traction = -solved.traction[cells // 2, :, 0] / bound
     error = float(traction.sum() * pressed.dx / (np.pi * a / 2) - (1 - (1 - share) ** 2))
     return (pressed.x / a).tolist(), traction.tolist(), error
 
@@ -166,14 +167,14 @@ def _shift_rows() -> list[Row]:
     ]
 
 
-def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> np.ndarray:
+def roll(name: str, cells: int, sign: float = 1.0, mirrored: float = 1.0) -> Array:
     """fx, fy by mu N and mz by mu N sqrt(ab) (3,) of one of CASES, reversed and mirrored at will."""
     ratio, xi_x, xi_y, spin = CASES[name]
     creepage = LIMIT / (PAIR.G * SIZE**2) * sign
     pressed = hertzian(SIZE * ratio**0.5, SIZE / ratio**0.5, LOAD, cells)
     across = mirrored * creepage
-    found = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / SIZE, PAIR)
-    return np.array([found.fx, found.fy, found.mz / SIZE]) / LIMIT
+    solved = solve_rolling(pressed, MU, creepage * xi_x, across * xi_y, across * spin / SIZE, PAIR)
+    return np.array([solved.fx, solved.fy, solved.mz / SIZE]) / LIMIT
 
 
 def _sliding_rows() -> list[Row]:
@@ -181,8 +182,8 @@ def _sliding_rows() -> list[Row]:
     pressed = hertzian(SIZE, SIZE, LOAD, 20)
     rows = []
     for angle in (0.0, 0.7, 2.0):
-        found = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, PAIR)
-        gap = np.hypot(found.fx + LIMIT * np.cos(angle), found.fy + LIMIT * np.sin(angle)) / LIMIT
+        solved = solve_rolling(pressed, MU, np.cos(angle), np.sin(angle), 0.0, PAIR)
+        gap = np.hypot(solved.fx + LIMIT * np.cos(angle), solved.fy + LIMIT * np.sin(angle)) / LIMIT
         rows.append(
             _row(
                 f"sliding.{angle:g}",
@@ -192,7 +193,7 @@ def _sliding_rows() -> list[Row]:
                 "half of 0.3 degrees",
             )
         )
-    most = np.hypot(found.fx, found.fy) / LIMIT - 1.0
+    most = np.hypot(solved.fx, solved.fy) / LIMIT - 1.0
     return [*rows, _row("sliding.most", "force above mu N, by mu N", max(float(most), 0.0), 1e-12, "Coulomb")]
 
 
@@ -210,11 +211,6 @@ def _symmetry_rows() -> list[Row]:
             "no side is preferred",
         ),
     ]
-
-
-def _refined(grids: tuple[int, ...], names: tuple[str, ...]) -> dict[str, list[list[float]]]:
-    """Name of a case -> for every grid its cells and forces."""
-    return {name: [[cells, *roll(name, cells).tolist()] for cells in grids] for name in names}
 
 
 def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
@@ -288,9 +284,9 @@ def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
         return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]
     lines = (folder / SAMPLE).read_text(encoding="utf-8").splitlines()
     table = list(csv.DictReader(line for line in lines if not line.startswith("#")))[:: 4 if quick else 1]
-    found = [_beside(row, 20 if quick else 40) for row in table]
-    force, moment = (max(part[i] for part in found) for i in (2, 3))
-    return found, [
+    solved = [_beside(row, 20 if quick else 40) for row in table]
+    force, moment = (max(part[i] for part in solved) for i in (2, 3))
+    return solved, [
         _row("sample", words, force, 0.01, "its own error and ours", side="native"),
         _row(
             "sample.moment",
@@ -308,7 +304,7 @@ def _beside(row: dict[str, str], cells: int) -> list[Any]:
     value = {name: float(text) for name, text in row.items() if name != "kind"}
     a, b, nu = value["a_mm"] / 1e3, value["b_mm"] / 1e3, value["nu"]
     body = Material(E=2e6 * value["G_MPa"] * (1 + nu), nu=nu)
-    found = solve_rolling(
+    solved = solve_rolling(
         hertzian(a, b, value["FN_N"], cells),
         value["mu"],
         value["xi_x"],
@@ -317,8 +313,8 @@ def _beside(row: dict[str, str], cells: int) -> list[Any]:
         Pair(body, body),
     )
     limit = value["mu"] * value["FN_N"]
-    force = np.hypot(found.fx - value["Fx_N"], found.fy - value["Fy_N"]) / limit
-    moment = abs(found.mz - value["Mz_Nmm"] / 1e3) / (limit * (a * b) ** 0.5)
+    force = np.hypot(solved.fx - value["Fx_N"], solved.fy - value["Fy_N"]) / limit
+    moment = abs(solved.mz - value["Mz_Nmm"] / 1e3) / (limit * (a * b) ** 0.5)
     return [row["kind"], value["a_over_b"], float(force), moment]
 
 
@@ -329,7 +325,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         (name, *(f"{100 * fx:z.2f}, {100 * fy:z.2f}" for _, fx, fy, _ in values))
         for name, values in data["refined"].items()
     )
-    found = [
+    solved = [
         Table(
             "Refinement of the exact rolling problem",
             "Fx, Fy in % of mu N; cells along each axis.",
@@ -342,7 +338,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             (f"{ratio:g}", kind, f"{100 * force:.2f}", f"{100 * moment:.2f}")
             for kind, ratio, force, moment in data["sample"]
         )
-        found.append(
+        solved.append(
             Table(
                 "The exact theory beside CONTACT",
                 "Differences in % of mu N and of mu N sqrt(ab).",
@@ -350,7 +346,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 rows,
             )
         )
-    return found
+    return solved
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -41,13 +41,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             f"contact_hertz.{name}",
             SYSTEM,
             f"{NAMES.get(name, name)}, axis ratios 1e-6 to 1e6: worst relative error",
-            max(found),
+            max(worst),
             "",
             BOUND,
             WHY,
             "closed form",
         )
-        for name, found in errors.items()
+        for name, worst in errors.items()
     ]
     return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
 
@@ -98,7 +98,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     flat, steep, load, approach = (
         np.array([float(one[name]) for one in truth]) for name in ("flat", "steep", "load", "approach")
     )
-    found = [
+    touching = [
         by_load(flat, steep, load, PAIR),
         by_approach(flat, steep, approach, PAIR),
         _turned(by_load(steep, flat, load, PAIR)),
@@ -107,28 +107,28 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
         name: [
-            max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in found)
+            max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in touching)
             for i, exact in enumerate(truth)
         ]
         for field, name in named.items()
     }
 
 
-def _turned(found: Hertz) -> Hertz:
+def _turned(touching: Hertz) -> Hertz:
     """The same contact with x and y exchanged."""
-    return Hertz(found.b, found.a, found.p0, found.approach, found.load, found.B, found.A)
+    return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 
 
 def _published() -> list[Row]:
     """A contact that another program computed on a grid, and scaling."""
-    found, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
+    touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
         within(
             "contact_hertz.contact.p0",
             SYSTEM,
             "largest pressure of a wheel on a rail, 100 kN",
-            float(found.p0),
+            float(touching.p0),
             "Pa",
             1.22674e9,
             1e6,
@@ -139,7 +139,7 @@ def _published() -> list[Row]:
             "contact_hertz.contact.approach",
             SYSTEM,
             "approach of the same",
-            float(found.approach),
+            float(touching.approach),
             "m",
             1.04996e-4,
             1e-8,
@@ -150,7 +150,7 @@ def _published() -> list[Row]:
             "contact_hertz.scaling",
             SYSTEM,
             "axes at eight times the load, by the axes",
-            float(eight.a / found.a),
+            float(eight.a / touching.a),
             "",
             2.0,
             1e-14,
@@ -226,8 +226,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
-    found = by_load(curvature, 1.0, LOAD, Pair())
-    for values, name in ((found.a, "a, along x"), (found.b, "b, along y")):
+    touching = by_load(curvature, 1.0, LOAD, Pair())
+    for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):
         left.loglog(curvature, values * 1e3, label=name)
     left.set(title="semi-axes, steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B", ylabel="[mm]")
     left.legend()

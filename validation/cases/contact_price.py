@@ -4,6 +4,7 @@ What accuracy costs in rolling contact stands among the problems of ``price``.
 """
 
 import time
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import BEST, left, rolled
-from models.contact.hertz import by_axes
 from models.contact.theories import Fastsim
 from models.machine.timing import paired_ratio
 from models.systems.contact.cases_table import answer
+from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import Case, exact
 from validation.common.rows import Row, System, Table, aim, at_most, finding
@@ -68,16 +69,16 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
     """The kept forces against those that the exact theory gives now."""
     known = {(round(c.a / c.b, 6), c.kind, c.level): c for c in cases}
-    found = []
+    answers = []
     for key in REPEATED[:2] if quick else REPEATED:
         now = exact(known[key], (20,) if quick else (40,))
-        found.append(float(np.linalg.norm(now.force - known[key].force)))
+        answers.append(float(np.linalg.norm(now.force - known[key].force)))
     return [
         at_most(
             "contact_price.reference",
             SYSTEM,
-            f"exact forces computed anew against those kept, {len(found)} cases, largest difference by mu N",
-            max(found),
+            f"exact forces computed anew against those kept, {len(answers)} cases, largest difference by mu N",
+            max(answers),
             "",
             REFERENCE[quick],
             "what the cells leave uncertain after their first order is taken out",
@@ -119,10 +120,10 @@ def _total_rows(cases: list[Case]) -> list[Row]:
     """What is stated of cells and theory together, at 21 cells, on wide contacts of every Poisson's ratio."""
     ratios, off, stated = np.array([case.pair.nu for case in cases]), [], []
     for case in cases:
-        contact = _fastsim(case, {})
-        found, error = rolled(contact, case.motion, 21)
+        contact = case.contact(Fastsim, **BEST)
+        answers, error = rolled(contact, case.motion, 21)
         limit, moment = case.limit, case.limit * np.sqrt(case.a * case.b) * case.mz
-        off.append((np.linalg.norm(found.force - limit * case.force), abs(found.mz - moment)))
+        off.append((np.linalg.norm(answers.force - limit * case.force), abs(answers.mz - moment)))
         stated.append((error.total, error.moment + ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
     return [
@@ -198,22 +199,17 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
 
 def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[float]:
     """Shares of contacts whose error of force and moment is beyond the stated one of the cells."""
-    found = []
+    answers = []
     for case in cases:
-        contact = _fastsim(case, choices)
+        contact = case.contact(Fastsim, **{**BEST, **choices})
         fine, true = contact.roll(case.motion, cells), contact.roll(case.motion, CONVERGED)
         off = np.linalg.norm(fine.force - true.force), abs(fine.mz - true.mz)
-        found.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
-    return [float(value) for value in np.mean(found, axis=0)]
+        answers.append(np.array(off) > np.array(left(contact, case.motion, cells, fine)) + ROUNDING * case.limit)
+    return [float(value) for value in np.mean(answers, axis=0)]
 
 
-def _fastsim(case: Case, choices: dict[str, str]) -> Fastsim:
-    hertz = by_axes(case.a, case.b, case.pair, load=case.load)
-    return Fastsim(hertz, case.friction, case.pair, **{**BEST, **choices})
-
-
-def _program_rows(found: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(own) for name, own in found["seconds"].items()}
+def _program_rows(answers: dict[str, Any]) -> list[Row]:
+    t = {name: np.array(own) for name, own in answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "contact and forces by the program of 1983, by the time of the one of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
@@ -244,11 +240,11 @@ def _table_row(folder: Path) -> Row:
         header="a [mm],b [mm],load [kN],friction [-],xi_x [%],xi_y [%],spin [1/m]",
     )
     start = time.perf_counter()
-    found = answer(path, out, PAIR, Method())
+    answers = answer(path, out, partial(Built, PAIR), Method())
     seconds = time.perf_counter() - start
     path.unlink()
     out.unlink()
-    assert found == {"rows": ROWS, "wrong": 0}
+    assert answers == {"rows": ROWS, "wrong": 0}
     what = f"a CSV of {ROWS:,} contacts answered, with errors and status, once"
     return finding("contact_price.table", SYSTEM, what, seconds, "s", "seconds", "reported and never gated", "none")
 

@@ -92,7 +92,7 @@ def _file_rows() -> list[Row]:
             for name in ("S1002", "UIC60")
         ]
     wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
-    off = {"S1002": _wheel_off(wheel), "UIC60": _rail_off(rail)}
+    off = {"S1002": wheel_off(wheel), "UIC60": rail_off(rail)}
     return [
         at_most(
             f"contact_profiles.{name}",
@@ -108,14 +108,14 @@ def _file_rows() -> list[Row]:
     ]
 
 
-def _wheel_off(wheel: Profile) -> float:
+def wheel_off(wheel: Profile) -> float:
     """Largest difference in height (m) where both are known."""
     own = s1002()
     inside = (wheel.y >= own.y[0]) & (wheel.y <= own.y[-1])
     return float(np.abs(own.curve(wheel.y[inside]) - wheel.z[inside]).max())
 
 
-def _rail_off(rail: Profile) -> float:
+def rail_off(rail: Profile) -> float:
     """Largest distance (m) of the file's points from the inclined rail, after the best shift: its origin is its own."""
     own = uic60().turned(Track().inclination)
     tree = KDTree(np.column_stack([own.y, own.z]))

@@ -1,7 +1,6 @@
 """Kalker's theory of 1983 against the exact contact of half-spaces: approach, area, peak pressure, forces, and time."""
 
 import re
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -16,11 +15,13 @@ from models.contact.patches import Patch, separate
 from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
+from models.machine.timing import interleave
 from validation.common.rows import Row, System, Table, at_most, finding
 from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
     PAIR,
+    Box,
     Shape,
     creepages,
     exact_normal,
@@ -44,6 +45,8 @@ WAYS = {
     "elliptic, one net": replace(PLAIN, separate=False),
 }
 """Ways to use the theory; the first is the default, the second the paper to the letter."""
+ROUNDS = 10
+"""Of timing."""
 NETS = (5, 7, 9, 11, 15, 19, 25)
 HERTZ = (0.05, 0.2, 1.0, 5.0, 20.0)
 """B/A of the ellipses whose exact answer is closed."""
@@ -55,7 +58,7 @@ ABOUT = "the theory has one W for the whole contact: nothing is claimed, the fig
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on Hertz's ellipses and on the continuity; in the full run on all shapes, ways, nets and the time."""
     hertz = {f"{ratio:g}": _hertz(ratio, PLAIN) | {"paper": _hertz(ratio, PAPER)["approach"]} for ratio in HERTZ}
-    jump = _largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
+    jump = largest_jump(separate(formulas()[4].distance)[0], 20 if quick else 200)
     data: dict[str, Any] = {"hertz": hertz, "jump": jump}
     rows = [*_hertz_rows(hertz), _jump_row(jump)]
     if quick:
@@ -80,14 +83,13 @@ def _errors(found: NormalContact, approach: float, area: float, peak: float) -> 
     return {key: getattr(found, key) / value - 1.0 for key, value in exact.items()}
 
 
-def _largest_jump(patch: Patch, steps: int) -> float:
+def largest_jump(patch: Patch, steps: int) -> float:
     """Largest jump (N) of N(a_3): every step of a sweep is halved, towards the larger change, down to rounding."""
-    depths = np.linspace(2e-6, 6e-5, steps + 1)
 
     def load(depth: float) -> float:
         return load_at_depth(patch, depth, PAIR).load
 
-    return max(_jump(load, float(low), float(high)) for low, high in pairwise(depths))
+    return max(_jump(load, *ends) for ends in pairwise(np.linspace(2e-6, 6e-5, steps + 1).tolist()))
 
 
 def _jump(load: Callable[[float], float], low: float, high: float) -> float:
@@ -105,17 +107,20 @@ def _jump(load: Callable[[float], float], low: float, high: float) -> float:
 
 def _against_exact(shape: Shape) -> dict[str, Any]:
     """Errors of every way, in shares of the exact figure and forces in % of mu N, and the exact figures."""
-    found = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
-    normal = exact_normal(shape, FULL, shape.box or _around(found["elliptic"]))
-    exact = {key: exact_rolling(normal, creepage) for key, creepage in creepages(normal.area, shape.load).items()}
+    contacts = {name: press(shape.distance, PAIR, load=shape.load, options=way) for name, way in WAYS.items()}
+    normal = exact_normal(shape, FULL, shape.box or _around(contacts["elliptic"]))
+    motions = creepages(normal.area, shape.load)
+    exact = {key: exact_rolling(normal, motion) for key, motion in motions.items()}
     solved = {key: solution for key, solution in exact.items() if solution is not None}
-    peak = float(normal.pressure.max())
+    figures = {"approach": normal.approach, "area": normal.area, "peak": float(normal.pressure.max())}
     ways = {}
-    for name, contact in found.items():
-        forces = [_off(contact, creepages(normal.area, shape.load)[key], solved[key], shape.load) for key in solved]
+    for name, contact in contacts.items():
+        forces = [
+            float(100.0 * np.hypot(own.fx - true.fx, own.fy - true.fy) / (FRICTION * shape.load))
+            for own, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
+        ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
-        ways[name] = _errors(contact, normal.approach, normal.area, peak) | {"force": mean, "force_max": most}
-    figures = {"approach": normal.approach, "area": normal.area, "peak": peak}
+        ways[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
     return {"exact": figures, "ways": ways, "rolling": len(solved), "asked": len(exact)}
 
 
@@ -140,17 +145,12 @@ def _placed() -> dict[str, dict[str, float]]:
     return found
 
 
-def _around(found: NormalContact) -> tuple[float, float, float, float]:
+def _around(pressed: NormalContact) -> Box:
     """The contact's box with a fifth more on every side."""
-    boxes = np.array([part.box for part in found.patches])
-    x0, x1, y0, y1 = boxes[:, 0].min(), boxes[:, 1].max(), boxes[:, 2].min(), boxes[:, 3].max()
-    return x0 - 0.2 * (x1 - x0), x1 + 0.2 * (x1 - x0), y0 - 0.2 * (y1 - y0), y1 + 0.2 * (y1 - y0)
-
-
-def _off(contact: NormalContact, creepage: tuple[float, float, float], exact: Any, load: float) -> float:
-    """Distance of the force from the exact one, in % of mu N."""
-    found = roll(contact, FRICTION, *creepage)
-    return float(100.0 * np.hypot(found.fx - exact.fx, found.fy - exact.fy) / (FRICTION * load))
+    x0, x1, y0, y1 = np.array([part.box for part in pressed.patches]).T
+    (low_x, high_x), (low_y, high_y) = (x0.min(), x1.max()), (y0.min(), y1.max())
+    wide, high = 0.2 * (high_x - low_x), 0.2 * (high_y - low_y)
+    return low_x - wide, high_x + wide, low_y - high, high_y + high
 
 
 def _times() -> dict[str, list[float]]:
@@ -158,26 +158,15 @@ def _times() -> dict[str, list[float]]:
     hertz = by_load(CURVATURE, 1.5 * CURVATURE, 1e5, PAIR)
     a, b = float(hertz.a), float(hertz.b)
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
-    contact = press(distance, PAIR, load=1e5)
-    patch = separate(distance)[0]
-    return {
-        "1982": _taken(lambda: fastsim(a, b, 1e5, FRICTION, *creepage, PAIR, cells=45)),
-        "roll": _taken(lambda: roll(contact, FRICTION, *creepage)),
-        "press": _taken(lambda: press(distance, PAIR, load=1e5)),
-        "depth": _taken(lambda: load_at_depth(patch, 5e-5, PAIR)),
-        "exact": _taken(lambda: exact_normal(formulas()[0], 45, (-0.008, 0.008, -0.008, 0.008)), 3),
+    contact, (patch,) = press(distance, PAIR, load=1e5), separate(distance)
+    jobs: dict[str, Callable[[], Any]] = {
+        "1982": lambda: fastsim(a, b, 1e5, FRICTION, *creepage, PAIR, cells=45),
+        "roll": lambda: roll(contact, FRICTION, *creepage),
+        "press": lambda: press(distance, PAIR, load=1e5),
+        "depth": lambda: load_at_depth(patch, 5e-5, PAIR),
+        "exact": lambda: exact_normal(formulas()[0], 45, (-0.008, 0.008, -0.008, 0.008)),
     }
-
-
-def _taken(call: Callable[[], Any], repeats: int = 20) -> list[float]:
-    """Times (s) of calls."""
-    call()
-    taken = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        taken.append(time.perf_counter() - start)
-    return taken
+    return dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
 
 
 def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:

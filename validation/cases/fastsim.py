@@ -10,6 +10,7 @@ from models.contact.fastsim import KINDS as KINDS_OF_FLEXIBILITY
 from models.contact.fastsim import fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
@@ -41,6 +42,8 @@ SLIDING = (5.0, 5.5, 6.0, 7.0, 8.0, 10.0, 15.0, 20.0, 50.0, 200.0)
 """Levels from where all begins to slide."""
 LOAD, FRICTION, MEAN_AXIS = 80e3, 0.3, 5e-3
 PAIR = Pair()
+UNITS = FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+"""Of fx, fy (N) and mz (N m)."""
 Contacts = dict[str, Any]
 """Arrays by the names of the parameters of ``fastsim``."""
 CELLS = (11, 21, 41, 81)
@@ -67,9 +70,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows += _limits() + _spun() + _derivatives() + _drawn()
     if quick:
         return rows, data
-    found, data["model"] = _model()
+    answers, data["model"] = _model()
     timed, data["speed"] = speed(PAIR, LOAD, FRICTION, MEAN_AXIS)
-    return rows + found + timed, data
+    return rows + answers + timed, data
 
 
 def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
@@ -91,21 +94,21 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
     }
 
 
-def _vector(given: Contacts, **options: Any) -> np.ndarray:
+def _vector(columns: Contacts, **options: Any) -> Array:
     """Forces (n, 2) by mu N."""
-    found = fastsim(**given, pair=PAIR, **options)
-    return np.stack([found.fx, found.fy], axis=1) / (FRICTION * LOAD)
+    answers = fastsim(**columns, pair=PAIR, **options)
+    return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
 def _discretisation() -> tuple[list[Row], dict[str, Any]]:
     """Largest error of every net, and the order between the second and the last."""
-    given = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(KINDS), LEVELS)
     rows: list[Row] = []
     data: dict[str, Any] = {}
     for bound in POWERS:
-        truth = _vector(given, cells=FINE, bound=bound)
+        truth = _vector(columns, cells=FINE, bound=bound)
         for march in ("second-order", "plain"):
-            errors = [np.hypot(*(_vector(given, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
+            errors = [np.hypot(*(_vector(columns, cells=n, bound=bound, march=march) - truth).T) for n in CELLS]
             data[f"{bound}, {march}"] = [[float(e.mean()), float(e.max())] for e in errors]
             if march == "plain":
                 continue
@@ -142,12 +145,12 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
 
 def _invariants(batches: int, count: int, first: int) -> list[Row]:
     """Everything that must always hold, over random contacts."""
-    found: dict[str, float] = {}
+    answers: dict[str, float] = {}
     for i in range(batches):
         options = OPTIONS[i % len(OPTIONS)]
         for name, value in worst(contacts(SEED, first + i, count), options, PAIR).items():
             name += " coarse" if name == "power" and options.get("cells", 21) < 20 else ""
-            found[name] = max(found.get(name, 0.0), value)
+            answers[name] = max(answers.get(name, 0.0), value)
     what = {
         "finite": "results that are not finite",
         "bound": "|F| beyond mu N",
@@ -173,17 +176,19 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
             *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
             "none",
         )
-        for name, value in found.items()
+        for name, value in answers.items()
     ]
 
 
 def _limits() -> list[Row]:
     """Small creepages against the linear theory, and the direction of full sliding."""
-    given = creepages(("x", "y", "spin"), (1e-6,))
-    found = fastsim(**given, pair=PAIR)
-    linear = np.stack(linear_forces(given["a"], given["b"], given["xi_x"], given["xi_y"], given["spin"], PAIR))
+    columns = creepages(("x", "y", "spin"), (1e-6,))
+    answers = fastsim(**columns, pair=PAIR)
+    linear = np.stack(
+        linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], PAIR)
+    )
     size = np.hypot(linear[0], linear[1])
-    slope = np.hypot(found.fx - linear[0], found.fy - linear[1]) / size
+    slope = np.hypot(answers.fx - linear[0], answers.fy - linear[1]) / size
     sliding = creepages(("x", "y"), SLIDING)
     turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
     most = np.hypot(sliding["xi_x"], sliding["xi_y"])
@@ -266,20 +271,18 @@ def _spun() -> list[Row]:
 
 def _derivatives() -> list[Row]:
     """Analytic derivatives against central differences of the forces."""
-    given = creepages(tuple(KINDS), LEVELS)
+    columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
-    own = derivatives(**given, pair=PAIR)
-    off = []
+    known, off = derivatives(**columns, pair=PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
-        h = 1e-6 * unit
-        ends = [_forces(_moved(given, name, sign * h)) for sign in (1.0, -1.0)]
-        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - own.slopes[..., k] * unit) / _units())
+        ends = [_moved(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
+        off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
         at_most(
             "fastsim.derivatives",
             SYSTEM,
-            f"derivatives to creepages, spin and load against differences, 98 % of {len(own.forces)} cases",
+            f"derivatives to creepages, spin and load against differences, 98 % of {len(known.forces)} cases",
             float(share),
             "mu N, mu N c",
             1e-7,
@@ -289,22 +292,14 @@ def _derivatives() -> list[Row]:
     ]
 
 
-def _moved(given: Contacts, name: str, step: float) -> Contacts:
-    """The contacts with one value changed; a load that grows takes the ellipse with it."""
-    moved = {**given, name: given[name] + step}
+def _moved(columns: Contacts, name: str, step: float) -> Array:
+    """Forces and moments (n, 3) with one value changed; a load that grows takes the ellipse with it."""
+    moved = {**columns, name: columns[name] + step}
     if name == "load":
-        grown = np.cbrt(moved["load"] / given["load"])
-        moved |= {"a": given["a"] * grown, "b": given["b"] * grown}
-    return moved
-
-
-def _forces(given: Contacts) -> np.ndarray:
-    found = fastsim(**given, pair=PAIR)
-    return np.stack([found.fx, found.fy, found.mz], axis=1)
-
-
-def _units() -> np.ndarray:
-    return FRICTION * LOAD * np.array([1.0, 1.0, MEAN_AXIS])
+        grown = np.cbrt(moved["load"] / columns["load"])
+        moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
+    creep = fastsim(**moved, pair=PAIR)
+    return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 
 def _drawn() -> list[Row]:
@@ -348,7 +343,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         (name, *(f"{100 * mean:.2g} / {100 * most:.2g}" for mean, most in values))
         for name, values in data["cells"].items()
     )
-    found = [
+    answers = [
         Table(
             "FASTSIM: error of the cells",
             "Mean / largest error of the force in % of mu N against "
@@ -358,7 +353,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         )
     ]
     if "model" in data:
-        found.append(
+        answers.append(
             Table(
                 "FASTSIM: error of the model",
                 "Converged, against the exact theory: force in % of mu N, "
@@ -368,7 +363,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
             )
         )
     if "speed" in data:
-        found.append(
+        answers.append(
             Table(
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
@@ -377,7 +372,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 tuple(tuple(row) for row in data["speed"]),
             )
         )
-    return found
+    return answers
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:

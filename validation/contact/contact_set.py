@@ -13,6 +13,7 @@ from dataclasses import replace
 from itertools import cycle
 from math import cos, radians, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,7 @@ FITTED, JUDGED = 0, 1
 FILE = Path(__file__).with_suffix(".csv")
 DRAWN_FILE, WIDE_FILE = (FILE.with_name(f"contact_{name}.csv") for name in ("drawn", "wide"))
 ANSWERS = ("fx", "fy", "mz", "error")
+Ends = tuple[float, float]
 
 
 def cases() -> list[Case]:
@@ -53,35 +55,28 @@ def cases() -> list[Case]:
 
 def drawn(part: int) -> list[Case]:
     """A part of the drawn contacts, without their forces: every direction of the scaled creepages is as likely."""
-    rng = np.random.default_rng((SEED, part))
-    ratios, levels = (
-        np.exp(rng.uniform(np.log(low), np.log(high), DRAWN)).tolist() for low, high in ((RATIOS[0], RATIOS[-1]), RANGE)
-    )
-    return [
-        Case(*_axes(ratio), LOAD, FRICTION, PAIR, f"drawn {part}", (x, y, spin), level)
-        for ratio, level, (x, y, spin) in zip(ratios, levels, rng.normal(size=(DRAWN, 3)).tolist(), strict=True)
-    ]
+    return _drawn(part, DRAWN, (RATIOS[0], RATIOS[-1]), RANGE, f"drawn {part}", [PAIR])
 
 
 def wide(part: int) -> list[Case]:
     """A part of the wide contacts, without their forces."""
-    first = 2 + len(WIDE[FITTED]) * part
-    return [case for stream, count in enumerate(WIDE[part], first) for case in _wide(stream, count)]
+    bodies = [Material(E=PAIR.one.E, nu=nu) for nu in POISSON]
+    pairs, first = [Pair(body, body) for body in bodies], 2 + len(WIDE[FITTED]) * part
+    streams = enumerate(WIDE[part], first)
+    return [case for stream in streams for case in _drawn(*stream, WIDE_RATIOS, WIDE_RANGE, "wide", pairs, ABSENT)]
 
 
-def _wide(stream: int, count: int) -> list[Case]:
+def _drawn(
+    stream: int, count: int, ratios: Ends, sizes: Ends, kind: str, pairs: list[Pair], absent: float = 0.0
+) -> list[Case]:
+    """Contacts of a stream of numbers, of pairs in turn; each creepage is absent in a share of them, but never all."""
     rng = np.random.default_rng((SEED, stream))
-    ratios, levels = (
-        np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (WIDE_RATIOS, WIDE_RANGE)
-    )
-    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= ABSENT
+    ratio, level = (np.exp(rng.uniform(np.log(low), np.log(high), count)).tolist() for low, high in (ratios, sizes))
+    directions, present = rng.normal(size=(count, 3)), rng.uniform(size=(count, 3)) >= absent
     present[~present.any(axis=1)] = True
-    bodies = cycle([Material(E=PAIR.one.E, nu=nu) for nu in POISSON])
-    parts = (directions * present).tolist()
-    return [
-        Case(*_axes(ratio), LOAD, FRICTION, Pair(body, body), "wide", (x, y, spin), level)
-        for ratio, level, (x, y, spin), body in zip(ratios, levels, parts, bodies, strict=False)
-    ]
+    parts = map(tuple, (directions * present).tolist())
+    drawn = zip(ratio, level, parts, cycle(pairs), strict=False)
+    return [Case(*_axes(a_by_b), LOAD, FRICTION, pair, kind, part, size) for a_by_b, size, part, pair in drawn]
 
 
 def _axes(ratio: float) -> tuple[float, float]:
@@ -106,11 +101,8 @@ def read_wide(part: int) -> list[Case]:
 def _read(path: Path, asked: list[Case]) -> list[Case]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    return [_answered(case, *(float(row[name]) for name in ANSWERS)) for case, row in zip(asked, rows, strict=True)]
-
-
-def _answered(case: Case, fx: float, fy: float, mz: float, error: float) -> Case:
-    return replace(case, fx=fx, fy=fy, mz=mz, error=error)
+    forces: list[dict[str, Any]] = [{name: float(row[name]) for name in ANSWERS} for row in rows]
+    return [replace(case, **force) for case, force in zip(asked, forces, strict=True)]
 
 
 def write(path: Path, asked: list[Case]) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.patches import Patch
@@ -43,7 +44,7 @@ class Shape:
     box: Box | None = None
 
 
-def _over(name: str, height: Callable[[np.ndarray, np.ndarray], np.ndarray], load: float, x: float, y: float) -> Shape:
+def _over(name: str, height: Callable[[Array, Array], Array], load: float, x: float, y: float) -> Shape:
     """A shape from a formula, its exact contact within -x..x and -y..y."""
     distance = from_function(height, (-2.0 * x, 2.0 * x), (-2.0 * y, 2.0 * y))
     return Shape(name, distance, load, (-x, x, -y, y))
@@ -101,7 +102,7 @@ def grown() -> list[Shape]:
         (3, 4, 40, 0),
         (10, 5, 80, 5),
     )
-    found = [
+    shapes = [
         _well(
             f"grooves {2 * half:g} mm apart, ridge {ridge:g} um, one {tilt:g} um higher, {load:g} kN",
             1e-6 * ridge,
@@ -112,7 +113,7 @@ def grown() -> list[Shape]:
         for ridge, half, load, tilt in wells
     ]
     return [
-        *found,
+        *shapes,
         _over(
             "two arcs that meet in an edge",
             lambda u, v: CURVATURE * u**2 + 1.7 * (np.abs(v) - 3e-3) ** 2,
@@ -138,11 +139,11 @@ def grown() -> list[Shape]:
 
 def profiles() -> list[Shape]:
     """The main patch of the right wheel S1002 on UIC 60, inclined 1:40, at some lateral shifts (m) and loads (N)."""
-    found = []
+    shapes = []
     for shift, load in ((0.002, 5e4), (0.004, 5e4), (0.006, 2e4), (0.008, 2e4)):
         distance = wheel_on_rail(s1002(), uic60(), lateral_shift=shift)[0].patch.distance
-        found.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
-    return found
+        shapes.append(Shape(f"S1002 on UIC 60, {1e3 * shift:g} mm", distance, load))
+    return shapes
 
 
 @dataclass(frozen=True)
@@ -160,56 +161,51 @@ def placed() -> list[Placed]:
 
     Half-spaces are joined along the contour there; flange and tread lie on none.
     """
-    found = []
+    wheelsets = []
     for yaw in (0.0, 0.01, -0.02):
         for shift in np.arange(-4e-3, 8.1e-3, 2e-3):
             touches = wheel_on_rail(s1002(), uic60(), lateral_shift=float(shift), yaw=yaw)
             if max(touch.patch.lean for touch in touches) < UPRIGHT or len(touches) == 1:
-                found += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
-    return found
+                wheelsets += [Placed(float(shift), yaw, load, touches) for load in (2e4, 1e5)]
+    return wheelsets
 
 
 UPRIGHT = 0.15
 """Angle (rad) between patch and track up to which several patches are joined to one half-space."""
 
 
-def exact_placed(one: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
-    """The exact contact of profiles: each height counts along the track's vertical."""
-    for margin in MARGINS[:-1]:
-        try:
-            return _exact_placed(one, pressed, cells, margin)
-        except InputError:  # the contact reaches the edge of the grid
-            continue
-    return _exact_placed(one, pressed, cells, MARGINS[-1])
-
-
 MARGINS = (1.4, 2.0, 3.0)
 """Sides of the exact grid by those of the simplified theory's area."""
 
 
-def _exact_placed(one: Placed, pressed: NormalContact, cells: int, margin: float) -> NormalSolution:
-    boxes = [(part.box, part.patch) for part in pressed.patches]
-    x0, x1 = (pick(box[k] for box, _ in boxes) for pick, k in ((min, 0), (max, 1)))
-    y0, y1 = (pick(box[k] + patch.place for box, patch in boxes) for pick, k in ((min, 2), (max, 3)))
-    step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
-    x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
-    heights = np.min([_height(touch.patch, x, y) for touch in one.touches], axis=0)
-    slope = float(np.cos(min(patch.lean for _, patch in boxes)))
-    return solve_normal(heights * slope, step_x, step_y, PAIR, load=one.load / slope)
+def exact_placed(wheelset: Placed, pressed: NormalContact, cells: int) -> NormalSolution:
+    """The exact contact of profiles: each height counts along the track's vertical."""
+    boxes = np.array([np.add(part.box, (0.0, 0.0, part.patch.place, part.patch.place)) for part in pressed.patches]).T
+    (x0, y0), (x1, y1) = boxes[::2].min(axis=1), boxes[1::2].max(axis=1)
+    slope = float(np.cos(min(part.patch.lean for part in pressed.patches)))
+    for margin in MARGINS:
+        step_x, step_y = margin * (x1 - x0) / cells, margin * (y1 - y0 + 2e-3) / (2 * cells)
+        x, y = (x0 + x1) / 2 + centres(cells, step_x), (y0 + y1) / 2 + centres(2 * cells, step_y)
+        heights = np.min([_height(touch.patch, x, y) for touch in wheelset.touches], axis=0)
+        try:
+            return solve_normal(heights * slope, step_x, step_y, PAIR, load=wheelset.load / slope)
+        except InputError as error:  # the contact reaches the edge of the grid
+            refused = error
+    raise refused
 
 
 FAR = 1e-3
 """Height (m) where a distance is not known."""
 
 
-def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
     known, own = patch.distance, y - patch.place
     over = (own >= known.y[0]) & (own <= known.y[-1])
-    found = np.full((y.size, x.size), FAR)
+    heights = np.full((y.size, x.size), FAR)
     inside = np.clip(x, known.x[0], known.x[-1])
-    found[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
-    return found
+    heights[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
+    return heights
 
 
 def exact_normal(shape: Shape, cells: int, box: Box) -> NormalSolution:

@@ -11,7 +11,7 @@ from models.contact.fastsim import Ellipse, fastsim
 from models.contact.fastsim_grid import grid
 from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
 from models.contact.material import Pair
-from models.machine.compiled import njit
+from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
 from validation.common.rows import Row, System, aim
 
@@ -40,10 +40,11 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
         "pair": pair,
     }
     calls = {n: Ellipse(1.0, pair, cells=n) for n in (12, CELLS)}
+    marched = REPEATS * CELLS * LANES
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
-        "bound": (lambda: _bound(values, REPEATS), REPEATS * CELLS * LANES),
-        "plain": (lambda: _plain(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
-        "second": (lambda: _second(lanes, cells, REPEATS), REPEATS * CELLS * LANES),
+        "bound": (partial(_bound, values, REPEATS), marched),
+        "plain": (partial(_plain, lanes, cells, REPEATS), marched),
+        "second": (partial(_second, lanes, cells, REPEATS), marched),
         **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
         **{
             f"many {march}": (partial(fastsim, **many, march=march), CONTACTS * CELLS * (CELLS + 1))
@@ -51,45 +52,16 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
         },
     }
     took = _timed(jobs)
-    ratio = {name: paired_ratio(own, took["bound"]) for name, own in took.items()}
+    ratio = {name: paired_ratio(seconds, took["bound"]) for name, seconds in took.items()}
     calls_took = {n: median(1e6 * took[f"call {n}"]) for n in calls}
     rows = [
-        aim(
-            "fastsim.speed.plain",
-            SYSTEM,
-            f"plain march per cell, by a root and a division{_between(ratio['plain'])}",
-            ratio["plain"][0],
-            "",
-            1.8,
-            WHY,
-        ),
-        aim(
-            "fastsim.speed.second",
-            SYSTEM,
-            f"second-order march per cell, by a root and a division{_between(ratio['second'])}",
-            ratio["second"][0],
-            "",
-            4.0,
-            WHY,
-        ),
-        aim(
-            "fastsim.speed.call.1",
-            SYSTEM,
-            f"one call from Python, 12 cells per strip (0.8 % of mu N){_between(calls_took[12])}",
-            calls_took[12][0],
-            "us",
-            5.0,
-            WHY,
-        ),
-        aim(
-            "fastsim.speed.call.04",
-            SYSTEM,
-            f"one call from Python, 21 cells per strip (0.4 % of mu N){_between(calls_took[CELLS])}",
-            calls_took[CELLS][0],
-            "us",
-            10.0,
-            WHY,
-        ),
+        aim(f"fastsim.speed.{name}", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", value, unit, most, WHY)
+        for name, what, (value, low, high), unit, most in (
+            ("plain", "plain march per cell, by a root and a division", ratio["plain"], "", 1.8),
+            ("second", "second-order march per cell, by a root and a division", ratio["second"], "", 4.0),
+            ("call.1", "one call from Python, 12 cells per strip (0.8 % of mu N)", calls_took[12], "us", 5.0),
+            ("call.04", "one call from Python, 21 cells per strip (0.4 % of mu N)", calls_took[CELLS], "us", 10.0),
+        )
     ]
     table = [
         [
@@ -102,13 +74,9 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     return rows, table
 
 
-def _call(one: Ellipse, values: tuple[float, ...]) -> None:
+def _call(ellipse: Ellipse, values: tuple[float, ...]) -> None:
     for _ in range(REPEATS):
-        one(*values)
-
-
-def _between(found: tuple[float, float, float]) -> str:
-    return f", 95 % interval {found[1]:.3g} to {found[2]:.3g}"
+        ellipse(*values)
 
 
 def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.ndarray]:
@@ -124,7 +92,7 @@ def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.nda
     return dict(zip(jobs, seconds.T, strict=True))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _bound(values, repeats):
     """A root and a division per element, each independent of all others, in vector registers."""
     total = 0.0
@@ -142,13 +110,13 @@ def _zeros(count: int) -> np.ndarray:
     return room[first : first + count]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _plain(lanes, cells, repeats):
     for _ in range(repeats):
         march_plain(lanes, cells)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _second(lanes, cells, repeats):
     for _ in range(repeats):
         march_second_order(lanes, cells)

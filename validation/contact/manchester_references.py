@@ -6,6 +6,7 @@ Published are the reference outputs mbench_a22_right and mbench_a22_left that CO
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
@@ -13,34 +14,10 @@ from scipy.optimize import brentq
 from models.contact.material import Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.undeformed_distance import Distance
-from models.contact.wheel_on_rail import Pose, Side, _distance, touches_of
+from models.contact.wheel_on_rail import Pose, Side, distance_over, touches_of
 from models.rail.contact_table import Contact, Placed
 
-CONTACT = np.array(
-    [
-        [0.0, 0.0, 751.4397, 9997, 338.3, 751.4397, 9997, 338.3],
-        [0.5, -0.02304, 744.7416, 9870, 632.5, 754.2648, 10050, 395.3],
-        [1.0, -0.05049, 741.8109, 9827, 741.3, 755.2849, 10050, 423.9],
-        [1.5, -0.08103, 741.3132, 9811, 754.1, 756.0026, 10050, 446.5],
-        [2.0, -0.11280, 740.9042, 9799, 744.8, 756.5382, 10040, 465.9],
-        [2.5, -0.14570, 740.4689, 9787, 730.4, 756.9482, 10040, 483.1],
-        [3.0, -0.18030, 739.9795, 9774, 713.2, 757.2640, 10030, 498.8],
-        [3.5, -0.21680, 739.4199, 9760, 691.6, 757.5068, 10030, 513.4],
-        [4.0, -0.25570, 738.7560, 9745, 664.4, 757.6900, 10030, 527.2],
-        [4.5, -0.29770, 737.9185, 9726, 625.5, 757.8237, 10030, 540.2],
-        [5.0, -0.35540, 727.9412, 9619, 1556.0, 757.9189, 10030, 552.8],
-        [5.5, -0.47770, 726.1267, 9629, 1486.0, 757.9972, 10020, 565.8],
-        [6.0, -0.62720, 725.1701, 9709, 1149.0, 758.0421, 10020, 578.5],
-        [6.5, -4.37600, 718.4776, 15440, 2603.0, 758.6418, 10010, 637.0],
-        [7.0, -6.39300, 719.0298, 14030, 2622.0, 758.6240, 10010, 666.7],
-        [7.5, -7.64200, 719.4491, 13260, 2630.0, 758.4584, 10010, 685.9],
-        [8.0, -8.60600, 719.8180, 12720, 2634.0, 758.2352, 10020, 701.1],
-        [8.5, -9.40800, 720.1578, 12310, 2638.0, 757.9798, 10020, 714.0],
-        [9.0, -10.10113, 720.4778, 11970, 2640.0, 757.7031, 10020, 725.3],
-        [9.5, -10.71386, 720.7830, 11680, 2641.0, 757.4113, 10020, 735.2],
-        [10.0, -11.26431, 721.0765, 11440, 2643.0, 757.1077, 10020, 744.0],
-    ]
-)
+CONTACT = np.loadtxt(Path(__file__).with_name("manchester_contact.csv"), delimiter=",", skiprows=1)
 """Shift (mm), roll (mrad), then of the right and of the left wheel the mean place of contact across the track (mm), the
 normal force (N) and the largest pressure (MPa)."""
 PLANE = (5.0e-3, 727.0855e-3, -0.2905)
@@ -70,7 +47,7 @@ def on_one_plane(contact: Contact, placed: Placed) -> tuple[float, float, list[f
     x, s = centres(140, CELL), 5e-3 + centres(180, CELL)
 
     def pressed(depth: float) -> NormalSolution:
-        distance = _distance(side, replace(pose, fall=pose.fall + depth), place, angle, (-5e-3, 15e-3))
+        distance = distance_over(side, replace(pose, fall=pose.fall + depth), place, angle, (-5e-3, 15e-3))
         return solve_normal(distance.at(x[None, :], s[:, None]) + DEEPEST, CELL, CELL, contact.pair, approach=DEEPEST)
 
     depth = brentq(lambda depth: pressed(depth).load - normal, 2e-5, 4e-5, xtol=1e-9)

@@ -1,15 +1,16 @@
 """Kalker's programs of 1982 and 1983 side by side on ellipses, as the paper compares them, but measured."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import Creep, fastsim
 from models.contact.hertz import by_axes
-from models.contact.simplified_theory import CELLS, PAPER, NormalContact, press, roll
-from models.contact.undeformed_distance import quadratic
+from models.contact.simplified_theory import CELLS, PAPER, NormalContact, Rolling, roll
 from models.machine.seconds import cost
 from models.machine.timing import interleave
+from models.systems.contact.run import interpenetrating
 from models.systems.contact.work_precision import Case
 from validation.common.rows import Table
 
@@ -20,21 +21,21 @@ ROUNDS = 5
 def compare(cases: list[Case]) -> dict[str, Any]:
     """Errors of both programs by mu N, of the 1983 one's normal contact by Hertz's, and seconds of one evaluation."""
     pressed = {(c.a, c.b): _pressed(c) for c in cases}
-    errors: dict[str, list[float]] = {"1982": [], "1983": []}
-    for case in cases:
-        old = fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD)
-        new = roll(pressed[case.a, case.b], case.friction, *case.motion)
-        for name, one in (("1982", old), ("1983", new)):
-            errors[name].append(float(np.hypot(*(np.array([one.fx, one.fy]) / case.limit - case.force))))
+
+    def old(case: Case) -> Creep:
+        return fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD)
+
+    def new(case: Case) -> Rolling:
+        return roll(pressed[case.a, case.b], case.friction, *case.motion)
+
+    def error(case: Case, forces: Creep | Rolling) -> float:
+        return float(np.hypot(*(np.array([forces.fx, forces.fy]) / case.limit - case.force)))
+
+    errors = {"1982": [error(case, old(case)) for case in cases], "1983": [error(case, new(case)) for case in cases]}
     normal = [_normal(case, pressed[case.a, case.b]) for case in {(c.a, c.b): c for c in cases}.values()]
-    case = cases[len(cases) // 2]
-    both = pressed[case.a, case.b]
-    jobs = {
-        "1982": lambda: fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD),
-        "press": lambda: _pressed(case),
-        "1983": lambda: roll(both, case.friction, *case.motion),
-    }
-    seconds = dict(zip(jobs, interleave(list(jobs.values()), ROUNDS).tolist(), strict=True))
+    ways = {"1982": old, "press": _pressed, "1983": new}
+    jobs = [partial(way, cases[len(cases) // 2]) for way in ways.values()]
+    seconds = dict(zip(ways, interleave(jobs, ROUNDS).tolist(), strict=True))
     return {"errors": errors, "normal": normal, "seconds": seconds}
 
 
@@ -43,29 +44,27 @@ OLD: dict[str, Any] = {"cells": CELLS, "march": "plain", "flexibilities": "one",
 
 
 def _pressed(case: Case) -> NormalContact:
-    hertz = by_axes(case.a, case.b, case.pair, load=case.load)
-    x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (hertz.A, hertz.B))
-    return press(quadratic(float(hertz.A), float(hertz.B), x, y), case.pair, load=case.load, options=PAPER)
+    return interpenetrating(by_axes(case.a, case.b, case.pair, load=case.load), case.pair, PAPER)
 
 
-def _normal(case: Case, found: NormalContact) -> dict[str, float]:
+def _normal(case: Case, pressed: NormalContact) -> dict[str, float]:
     """Relative errors of approach, area and largest pressure."""
     hertz = by_axes(case.a, case.b, case.pair, load=case.load)
-    return {
-        "approach": found.approach / float(hertz.approach) - 1,
-        "area": found.area / (np.pi * case.a * case.b) - 1,
-        "peak": found.peak / float(hertz.p0) - 1,
-    }
+    exact = {"approach": float(hertz.approach), "area": np.pi * case.a * case.b, "peak": float(hertz.p0)}
+    return {name: getattr(pressed, name) / value - 1 for name, value in exact.items()}
 
 
-def table(found: dict[str, Any]) -> Table:
+def table(comparison: dict[str, Any]) -> Table:
     """The paper's comparison with figures in it."""
     error = {
         name: f"mean {100 * np.mean(e):.1f}, largest {100 * max(e):.0f} % of mu N"
-        for name, e in found["errors"].items()
+        for name, e in comparison["errors"].items()
     }
-    normal = {key: _span([one[key] for one in found["normal"]]) for key in ("approach", "area", "peak")}
-    t = {name: np.array(own) for name, own in found["seconds"].items()}
+    normal = {}
+    for key in ("approach", "area", "peak"):
+        values = [100 * errors[key] for errors in comparison["normal"]]
+        normal[key] = f"{min(values):+.1f} to {max(values):+.1f} %"
+    t = {name: np.array(own) for name, own in comparison["seconds"].items()}
     both = t["1983"] + t["press"]
     rows = (
         ("goes in", "semi-axes, load, creepages, linear coefficients", "undeformed distance, load, creepages"),
@@ -89,7 +88,3 @@ def table(found: dict[str, Any]) -> Table:
         ("", "1982", "1983"),
         rows,
     )
-
-
-def _span(values: list[float]) -> str:
-    return f"{100 * min(values):+.1f} to {100 * max(values):+.1f} %"

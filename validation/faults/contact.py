@@ -10,6 +10,7 @@ import numpy as np
 from models.contact import fastsim as creep
 from models.contact import hertz, normal_problem, rolling_problem
 from models.contact.fastsim_kernels import PLAIN
+from models.contact.inputs import Array
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import NormalSolution, centres
@@ -34,15 +35,15 @@ def _ball() -> tuple[float, float, float]:
 
 def _hertz() -> float:
     """Hertz's ball: radius, approach, greatest pressure."""
-    found = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
-    return off(np.array([found.a, found.approach, found.p0]) / _ball(), np.ones(3))
+    answer = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, LOAD, PAIR)
+    return off(np.array([answer.a, answer.approach, answer.p0]) / _ball(), np.ones(3))
 
 
 def _ellipse() -> float:
     """Ellipse of unlike curvatures: load by the integral of its pressure, 2/3 pi a b p0, and its longer axis."""
-    found = hertz.by_load(2.0, 1.0, LOAD, PAIR)
-    balanced = abs(float(2.0 / 3.0 * np.pi * found.a * found.b * found.p0) / LOAD - 1.0)
-    return balanced if found.b > found.a else np.inf
+    answer = hertz.by_load(2.0, 1.0, LOAD, PAIR)
+    balanced = abs(float(2.0 / 3.0 * np.pi * answer.a * answer.b * answer.p0) / LOAD - 1.0)
+    return balanced if answer.b > answer.a else np.inf
 
 
 def _pressed() -> NormalSolution:
@@ -53,45 +54,45 @@ def _pressed() -> NormalSolution:
 
 def _normal() -> float:
     """Ball on cells against the closed form: approach and greatest pressure."""
-    found = _pressed()
-    return off(np.array([found.approach, found.pressure.max()]) / _ball()[1:], np.ones(2))
+    answer = _pressed()
+    return off(np.array([answer.approach, answer.pressure.max()]) / _ball()[1:], np.ones(2))
 
 
 def _published() -> float:
     """Forces of small creepages and spin by Kalker's published coefficients."""
     soft = Pair(Material(E=2.5e11, nu=0.25), Material(E=2.5e11, nu=0.25))
     a, shear = 5e-3, 1e11
-    given = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
-    found = creep.fastsim(a, a, LOAD, MU, given[0], given[1], given[2], soft)
+    motion = np.array([[1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0], [0.0, 0.0, 1e-4]])
+    answer = creep.fastsim(a, a, LOAD, MU, motion[0], motion[1], motion[2], soft)
     c11, c22, c23 = PUBLISHED
     wanted = -shear * a * a * np.array([c11 * 1e-7, c22 * 1e-7, c23 * a * 1e-4])
-    return off(np.array([found.fx[0], found.fy[1], found.fy[2]]) / wanted, np.ones(3))
+    return off(np.array([answer.fx[0], answer.fy[1], answer.fy[2]]) / wanted, np.ones(3))
 
 
 def _linear() -> float:
     """Small creepages on an ellipse against the linear theory: all of them, 41 cells."""
-    given = (1e-7, 0.7e-7, 2e-5)
-    found = creep.fastsim(A, B, LOAD, MU, *given, PAIR, cells=41)
-    return off(np.array([found.fx, found.fy]), np.array(forces(A, B, *given, PAIR)[:2]))
+    motion = (1e-7, 0.7e-7, 2e-5)
+    answer = creep.fastsim(A, B, LOAD, MU, *motion, PAIR, cells=41)
+    return off(np.array([answer.fx, answer.fy]), np.array(forces(A, B, *motion, PAIR)[:2]))
 
 
 def _sliding() -> float:
     """Gross sliding against mu N, and its direction."""
-    found = creep.fastsim(A, B, LOAD, MU, 0.03, 0.04, 0.0, PAIR)
-    return off(np.array([found.fx, found.fy]), -MU * LOAD * np.array([0.6, 0.8]))
+    answer = creep.fastsim(A, B, LOAD, MU, 0.03, 0.04, 0.0, PAIR)
+    return off(np.array([answer.fx, answer.fy]), -MU * LOAD * np.array([0.6, 0.8]))
 
 
 def _theories() -> float:
     """Exact theory and FASTSIM under creepages that slip in part, by mu N."""
     pressed, a = _pressed(), _ball()[0]
-    given = (1.2e-3, -0.8e-3, 0.2)
-    exact = rolling_problem.solve_rolling(pressed, MU, *given, PAIR)
-    found = creep.fastsim(a, a, LOAD, MU, *given, PAIR)
-    return float(np.hypot(exact.fx - found.fx, exact.fy - found.fy) / (MU * LOAD))
+    motion = (1.2e-3, -0.8e-3, 0.2)
+    exact = rolling_problem.solve_rolling(pressed, MU, *motion, PAIR)
+    answer = creep.fastsim(a, a, LOAD, MU, *motion, PAIR)
+    return float(np.hypot(exact.fx - answer.fx, exact.fy - answer.fy) / (MU * LOAD))
 
 
 @cache
-def _stuck() -> np.ndarray:
+def _stuck() -> Array:
     a = _ball()[0]
     return np.array(forces(a, a, 2e-5, 1e-5, 0.0, PAIR)[:2])
 
@@ -114,12 +115,12 @@ CHECKS = {
 }
 
 
-def _columns(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
+def _columns(change: Callable[[Array], Array]) -> Patch:
     """Contacts (n, 10) of FASTSIM changed: a, b, load, mu, xi_x, xi_y, spin and flexibilities."""
 
     def contacts(real: Any) -> Any:
-        def made(*given: Any) -> Any:
-            columns, shape = real(*given)
+        def made(*motion: Any) -> Any:
+            columns, shape = real(*motion)
             return np.ascontiguousarray(change(columns)), shape
 
         return made
@@ -148,19 +149,19 @@ FAULTS = (
     Fault(
         "diameter for radius",
         "Hertz",
-        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(a / 2, b / 2, *own)),
+        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(a / 2, b / 2, *arguments)),
     ),
     Fault(
         "curvatures exchanged",
         "Hertz",
-        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *own: real(b, a, *own)),
+        attribute("models.contact.hertz:by_load", lambda real: lambda a, b, *arguments: real(b, a, *arguments)),
     ),
     Fault(
         "axes not squared up: p0 of a cylinder",
         "Hertz",
         attribute(
             "models.contact.hertz:by_load",
-            lambda real: lambda *own: replace(real(*own), p0=2.0 / 3.0 * 4.0 / np.pi * real(*own).p0),
+            lambda real: lambda *arguments: replace(real(*arguments), p0=2.0 / 3.0 * 4.0 / np.pi * real(*arguments).p0),
         ),
     ),
     Fault(
@@ -173,7 +174,7 @@ FAULTS = (
     Fault(
         "influence of one body alone",
         "normal problem",
-        attribute("models.contact.normal_problem:influence", lambda real: lambda *own: 0.5 * real(*own)),
+        attribute("models.contact.normal_problem:influence", lambda real: lambda *arguments: 0.5 * real(*arguments)),
     ),
     Fault(
         "whole first step at the leading edge",
@@ -190,12 +191,12 @@ FAULTS = (
     Fault(
         "gradient taken downstream",
         "exact theory",
-        attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *own: -real(*own)),
+        attribute("models.contact.rolling_problem:rigid_slip", lambda real: lambda *arguments: -real(*arguments)),
     ),
     Fault(
         "gradient of half the length",
         "exact theory",
-        attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * own for own in real)),
+        attribute("models.contact.rolling_problem:UPSTREAM", lambda real: tuple(2.0 * arguments for arguments in real)),
     ),
     Fault(
         "sign of the spin",

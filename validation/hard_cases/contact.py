@@ -20,8 +20,8 @@ A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 def no_creepage(implementation: str, folder: Path) -> float:
     """Forces without creepage, and whether their derivatives are numbers."""
-    found = derivatives(A, B, LOAD, MU, 0.0, 0.0, 0.0, PAIR)
-    return float(np.abs(found.forces).max() + (0.0 if np.isfinite(found.slopes).all() else np.inf))
+    answer = derivatives(A, B, LOAD, MU, 0.0, 0.0, 0.0, PAIR)
+    return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
 def no_creepage_naive(folder: Path) -> str:
@@ -34,24 +34,27 @@ def no_creepage_naive(folder: Path) -> str:
 def next_to_none(implementation: str, folder: Path) -> float:
     """Creepages of 1e-300 to 1e-12 against the linear theory."""
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
-    given = (small, -0.5 * small, 30.0 * small)
-    found, linear = fastsim(A, B, LOAD, MU, *given, PAIR), forces(A, B, *given, PAIR)
-    off = np.hypot(found.fx / linear[0] - 1.0, (found.fy - linear[1]) / np.abs(linear[0]))
+    motion = (small, -0.5 * small, 30.0 * small)
+    answer, linear = fastsim(A, B, LOAD, MU, *motion, PAIR), forces(A, B, *motion, PAIR)
+    off = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
     return float(np.abs(off).max())
 
 
 def against(implementation: str, folder: Path) -> float:
     """Spin whose pole is anywhere in the ellipse: error of 21 cells by mu N, all bounded."""
     pole = np.linspace(-1.0, 1.0, 41)
-    given = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
-    coarse, fine = (fastsim(A, B, LOAD, MU, *given, PAIR, cells=cells) for cells in (21, 201))
+    motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
+    coarse, fine = (fastsim(A, B, LOAD, MU, *motion, PAIR, cells=cells) for cells in (21, 201))
     return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
 
 
 def against_naive(folder: Path) -> str:
     """The march of 1982 on the same cells."""
-    given = (0.0, -0.25 * A, 0.5)
-    plain, fine = fastsim(A, B, LOAD, MU, *given, PAIR, march="plain"), fastsim(A, B, LOAD, MU, *given, PAIR, cells=201)
+    motion = (0.0, -0.25 * A, 0.5)
+    plain, fine = (
+        fastsim(A, B, LOAD, MU, *motion, PAIR, march="plain"),
+        fastsim(A, B, LOAD, MU, *motion, PAIR, cells=201),
+    )
     return f"the plain march is {100 * abs(plain.fy - fine.fy) / (MU * LOAD):.1f} % of mu N off on as many cells"
 
 
@@ -59,8 +62,8 @@ def lift_off(implementation: str, folder: Path) -> float:
     """Force by mu N as the load goes to nothing and below: full sliding, then exactly none."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
     contact = hertz.by_load(1.1, 0.8, load, PAIR)
-    found = fastsim(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0, PAIR)
-    return float(np.abs(found.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
+    answer = fastsim(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0, PAIR)
+    return float(np.abs(answer.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
 
 
 def flipping(implementation: str, folder: Path) -> float:
@@ -72,8 +75,8 @@ def flipping(implementation: str, folder: Path) -> float:
 
 def locked(implementation: str, folder: Path) -> float:
     """A locked wheel, and spin of a thousand per metre: |F| beyond mu N."""
-    found = fastsim(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3, PAIR)
-    return float(np.max(np.hypot(found.fx, found.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
+    answer = fastsim(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3, PAIR)
+    return float(np.max(np.hypot(answer.fx, answer.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
 
 
 CASES = (

@@ -22,8 +22,8 @@ CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
 
 
 def _linear_error(cells: int, march: March) -> float:
-    found = fastsim(A, B, LOAD, MU, SMALL, 0.0, 0.0, PAIR, cells=cells, march=march)
-    return abs(float(found.fx / forces(A, B, SMALL, 0.0, 0.0, PAIR)[0]) - 1.0)
+    answer = fastsim(A, B, LOAD, MU, SMALL, 0.0, 0.0, PAIR, cells=cells, march=march)
+    return abs(float(answer.fx / forces(A, B, SMALL, 0.0, 0.0, PAIR)[0]) - 1.0)
 
 
 def few_cells(implementation: str, folder: Path) -> float:
@@ -38,22 +38,22 @@ def few_cells_naive(folder: Path) -> str:
 
 def _drawn(count: int = 400) -> np.ndarray:
     """Creepages and spin (3, count) from sticking to sliding."""
-    own = np.random.default_rng(8)
-    return own.uniform(-1.0, 1.0, (3, count)) * 10.0 ** own.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
+    draw = np.random.default_rng(8)
+    return draw.uniform(-1.0, 1.0, (3, count)) * 10.0 ** draw.uniform(-5.0, -1.0, count) * [[1.0], [1.0], [100.0]]
 
 
 def reversed_signs(implementation: str, folder: Path) -> float:
     """All creepages turned round: forces that do not turn round exactly, by mu N."""
     along, across, spin = _drawn()
-    one, two = (fastsim(A, B, LOAD, MU, s * along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
-    return float(max(np.abs(one.fx + two.fx).max(), np.abs(one.fy + two.fy).max()) / (MU * LOAD))
+    first, second = (fastsim(A, B, LOAD, MU, s * along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def mirrored(implementation: str, folder: Path) -> float:
     """Left and right exchanged: lateral creepage, spin and lateral force change their sign; by mu N."""
     along, across, spin = _drawn()
-    one, two = (fastsim(A, B, LOAD, MU, along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
-    return float(max(np.abs(one.fx - two.fx).max(), np.abs(one.fy + two.fy).max()) / (MU * LOAD))
+    first, second = (fastsim(A, B, LOAD, MU, along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def power(implementation: str, folder: Path) -> float:
@@ -80,17 +80,17 @@ def _balls(apart: float, load: float, cells: tuple[int, int] = (41, 101)) -> Nor
 
 def two_patches(implementation: str, folder: Path) -> float:
     """Two patches: halves that differ, or an area off that of a ball alone by more than the cells along its edge."""
-    own = _balls(9e-3, 2.0 * SPHERE)
-    left = float(own.pressure[:, : own.x.size // 2].sum() * CELL**2)
+    draw = _balls(9e-3, 2.0 * SPHERE)
+    left = float(draw.pressure[:, : draw.x.size // 2].sum() * CELL**2)
     alone = hertz.by_load(0.5 / RADIUS, 0.5 / RADIUS, SPHERE, PAIR)
     edge = CELL * 2.0 * np.pi * float(alone.a)
-    return max(abs(left / SPHERE - 1.0), abs(own.area / 2.0 - np.pi * float(alone.a) ** 2) / edge - 1.0, 0.0)
+    return max(abs(left / SPHERE - 1.0), abs(draw.area / 2.0 - np.pi * float(alone.a) ** 2) / edge - 1.0, 0.0)
 
 
 def merging(implementation: str, folder: Path) -> float:
     """Balls that come nearer in steps of a fifth of a cell: largest jump of the approach, by itself."""
-    found = [_balls(apart, 2.0 * SPHERE, (41, 81)).approach for apart in np.linspace(4.0e-3, 3.4e-3, 21)]
-    return float(np.abs(np.diff(found, 2)).max() / found[0])
+    answer = [_balls(apart, 2.0 * SPHERE, (41, 81)).approach for apart in np.linspace(4.0e-3, 3.4e-3, 21)]
+    return float(np.abs(np.diff(answer, 2)).max() / answer[0])
 
 
 def at_the_edge(implementation: str, folder: Path) -> float:

@@ -5,21 +5,23 @@ distance), and ``load``, ``friction``, ``xi_x``, ``xi_y``, ``spin``. The answer 
 order: forces, moment, errors and a status, which is ``ok`` or what is wrong with that row.
 """
 
-from collections.abc import Callable, Iterator
+import csv
+from collections.abc import Callable
+from functools import partial
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from models.contact.accuracy import band, cells_error, halved, moment_band, slenderness, spin_share, used_with_moment
 from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
-from models.contact.material import Pair
+from models.contact.inputs import Array
 from models.core.errors import InputError
 from models.core.table_stream import Block, blocks
 from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES
 from models.core.whole_files import whole_file
-from models.systems.contact.built import Built
 from models.systems.contact.scene import Method
 
 MOTION = {"load": NEWTONS, "friction": SHARES, "xi_x": SHARES, "xi_y": SHARES, "spin": PER_METRE}
@@ -38,66 +40,53 @@ HEADER = (
     "moment_error_of_theory [N m]",
     "status",
 )
+SOUND = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g},{:.4g},{:.4g},{:.4g},{:.4g},ok\n"
 ANSWERS = 9
 """Columns of numbers behind the line."""
-Progress = Callable[[int], None]
-Extend = Callable[[Built], Built]
-"""What the effects of a scene make of the rows of a block."""
+BLOCK = 10_000
+"""Rows of an answer that are read at once, and those that a result keeps."""
+Build = Callable[[Array, Array], Any]
+"""Makes ``Built`` of the friction and the load (N) of some rows."""
 
 
 def answer(
-    path: Path,
-    out: Path,
-    pair: Pair,
-    method: Method,
-    progress: Progress = lambda rows: None,
-    extend: Extend = lambda built: built,
+    path: Path, out: Path, built: Build, method: Method, progress: Callable[[int], None] = lambda rows: None
 ) -> dict[str, int]:
     """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
 
     Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
-    pair.require_likeness()  # the scene's mistake, not that of every row
+    built(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading = blocks(path, (BY_AXES, BY_CURVATURES))
-    first = next(reading, None)
+    first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(out) as part, part.open("w") as file:
         file.write(",".join(HEADER) + "\n")
-        for block in _with(first, reading):
-            found, wrong = _answered(block, pair, method, extend)
-            _write(file, block, found, wrong)
+        for block in chain(first, reading):
+            answers, wrong = _answered(block, partial(_forces, built=built, method=method))
+            rows = enumerate(zip(block.lines, answers.tolist(), strict=True))
+            file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)
             counts["rows"] += len(block.lines)
             counts["wrong"] += len(wrong)
             progress(counts["rows"])
     return counts
 
 
-def compile_first(pair: Pair, method: Method, extend: Extend = lambda built: built) -> None:
+def compile_first(built: Build, method: Method) -> None:
     """Have the kernels behind ``answer`` compiled or loaded, for times that are those of the rows."""
-    one = np.ones(1)
-    _forces({"A": one, "B": one, **dict.fromkeys(MOTION, one)}, pair, method, extend)
+    unit = np.ones(1)
+    _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, built, method)
 
 
-def _with(first: Block | None, others: Iterator[Block]) -> Iterator[Block]:
-    """All blocks; the first was read before the answer's file was made, so that a wrong header leaves none."""
-    if first is not None:
-        yield first
-    yield from others
-
-
-def _answered(block: Block, pair: Pair, method: Method, extend: Extend) -> tuple[np.ndarray, dict[int, str]]:
+def _answered(block: Block, solve: Callable[[dict[str, Any]], Array]) -> tuple[Array, dict[int, str]]:
     """Answers (rows, ANSWERS), NaN where a row is wrong, and what is wrong there."""
-    found, wrong = np.full((len(block.lines), ANSWERS), np.nan), dict(block.wrong)
+    answers, wrong = np.full((len(block.lines), ANSWERS), np.nan), dict(block.wrong)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
-    values = {name: column[good] for name, column in block.values.items()}
-    found[good], refused = _sound(values, lambda some: _forces(some, pair, method, extend))
-    wrong |= {int(good[i]): text for i, text in refused.items()}
-    return found, wrong
+    answers[good], refused = _sound({name: column[good] for name, column in block.values.items()}, solve)
+    return answers, wrong | {int(good[i]): text for i, text in refused.items()}
 
 
-def _sound(
-    values: dict[str, np.ndarray], solve: Callable[[dict[str, Any]], np.ndarray]
-) -> tuple[np.ndarray, dict[int, str]]:
+def _sound(values: dict[str, Array], solve: Callable[[dict[str, Any]], Array]) -> tuple[Array, dict[int, str]]:
     """Answers of all rows; rows that are refused are found by halving, and the others answered without them."""
     count = len(next(iter(values.values())))
     if count == 0:
@@ -108,21 +97,23 @@ def _sound(
         if count == 1:
             return np.full((1, ANSWERS), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
-    low, wrong = _sound({name: column[:half] for name, column in values.items()}, solve)
-    high, others = _sound({name: column[half:] for name, column in values.items()}, solve)
+    (low, wrong), (high, others) = (
+        _sound({name: column[rows] for name, column in values.items()}, solve)
+        for rows in (slice(half), slice(half, None))
+    )
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
 
 
-def _forces(values: dict[str, Any], pair: Pair, method: Method, extend: Extend) -> np.ndarray:
+def _forces(values: dict[str, Any], built: Build, method: Method) -> Array:
     """Answers (rows, ANSWERS); raises InputError if a row is out of what the theory takes."""
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
-    built = extend(Built(pair, friction, load))
-    load, friction, pair = built.load, built.friction, built.pair
-    if built.falling is not None:
+    touching = built(friction, load)
+    load, friction, pair = touching.load, touching.friction, touching.pair
+    if touching.falling is not None:
         raise InputError("", "effects", None, "make friction fall, and a table of cases has constant friction")
     if "A" in values:
-        touching = by_load(values["A"], values["B"], load, pair)
-        a, b = touching.a, touching.b
+        area = by_load(values["A"], values["B"], load, pair)
+        a, b = area.a, area.b
     else:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
@@ -134,29 +125,52 @@ def _forces(values: dict[str, Any], pair: Pair, method: Method, extend: Extend) 
     a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
     most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
     relative, other = (
-        np.divide([one.fx, one.fy, one.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
-        for one in (fine, coarse)
+        np.divide([creep.fx, creep.fy, creep.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
+        for creep in (fine, coarse)
     )
     left = cells_error(relative, other, method.cells, method.order)
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
     theory = wider * limit * band(method.band, used, share)
     moment = wider * most * moment_band(method.band, used_with_moment(used, relative[2]), share)
-    return (
-        np.column_stack(
-            [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation, limit * left, theory, most * left, moment]
-        )
-        + 0.0
-    )
+    forces = fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation
+    return np.column_stack([*forces, limit * left, theory, most * left, moment]) + 0.0
 
 
-def _write(file: TextIO, block: Block, found: np.ndarray, wrong: dict[int, str]) -> None:
-    for i, (line, row) in enumerate(zip(block.lines, found.tolist(), strict=True)):
-        if i in wrong:
-            file.write(f'{line}{"," * (ANSWERS + 1)}"{_plain(wrong[i])}"\n')
-        else:
-            file.write(f"{line}," + "%.9g,%.9g,%.9g,%.6g,%.9g,%.4g,%.4g,%.4g,%.4g,ok\n" % tuple(row))  # noqa: UP031
+def _line(line: int, row: list[float], wrong: str | None) -> str:
+    """A row of the answer's file; text that says what is wrong stands within quotation marks."""
+    if wrong is None:
+        return SOUND.format(line, *row)
+    text = wrong.replace('"', "'")
+    return f'{line}{"," * (ANSWERS + 1)}"{text}"\n'
 
 
-def _plain(text: str) -> str:
-    """A text for within quotation marks."""
-    return text.replace('"', "'")
+def sizes(path: Path) -> dict[str, dict[str, Any]]:
+    """Largest magnitude and rms of every column of an answer, over its sound rows; read block by block."""
+    with path.open(newline="") as file:
+        rows = csv.reader(file)
+        heads = [_name_and_unit(head) for head in next(rows)[1:-1]]
+        largest, squares, count = np.zeros(len(heads)), np.zeros(len(heads)), 0
+        while block := list(islice(rows, BLOCK)):
+            sound = np.array([row[1:-1] for row in block if row[-1] == "ok"], float).reshape(-1, len(heads))
+            largest = np.maximum(largest, np.abs(sound).max(axis=0, initial=0.0))
+            squares, count = squares + (sound**2).sum(axis=0), count + len(sound)
+    return {
+        name: {"unit": unit, "largest": float(most), "rms": float(np.sqrt(square / count))}
+        for (name, unit), most, square in zip(heads, largest, squares, strict=True)
+        if count
+    }
+
+
+def kept_rows(path: Path) -> dict[str, tuple[str, np.ndarray]]:
+    """Columns name -> (unit, values) of the first BLOCK rows of an answer; numbers of wrong rows are NaN."""
+    with path.open(newline="") as file:
+        heads, *rows = islice(csv.reader(file), BLOCK + 1)
+    *columns, status = np.array(rows, dtype=object).reshape(-1, len(heads)).T
+    columns = [np.array([float(cell or "nan") for cell in column]) for column in columns]
+    named = {name: (unit, values) for (name, unit), values in zip(map(_name_and_unit, heads), columns, strict=False)}
+    return named | {"status": ("", status.astype(str))}
+
+
+def _name_and_unit(head: str) -> tuple[str, str]:
+    name, _, unit = head.rstrip("]").partition(" [")
+    return name, unit

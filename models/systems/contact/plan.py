@@ -1,6 +1,5 @@
 """What a contact scene will compute: printed by ``twinrig show``, checked before any run."""
 
-from models.contact.material import Material
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.systems.contact.scene import ContactScene
@@ -25,7 +24,7 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     """A doubt about every radius that is not large beside the contact."""
     if scene.radii is None or scene.contact is None:
         return ()
-    from models.systems.contact.of_scene import hertz_of
+    from models.systems.contact.run import hertz_of
 
     area = hertz_of(scene)
     out = list[Finding]()
@@ -42,34 +41,26 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
 
 def describe(scene: ContactScene) -> str:
     """The scene's plan as text: bodies, geometry, contact, creepage and theory."""
-    wheel, rail = scene.bodies.wheel, scene.bodies.rail
-    lines = [
-        scene.title,
-        _line("scene", f"{scene.file}, study {scene.study}"),
-        _line("wheel", _material(wheel)),
-        _line("rail", _material(rail)),
-    ]
-    lines.append(_line(scene.geometry, _values(getattr(scene, scene.geometry))))
+    bodies = {
+        name: f"E = {body.E / 1e9:g} GPa, nu = {body.nu:g}, G = {body.G / 1e9:.4g} GPa" for name, body in scene.bodies
+    }
+    heads = {
+        "scene": f"{scene.file}, study {scene.study}",
+        **bodies,
+        scene.geometry: _values(getattr(scene, scene.geometry)),
+    }
     if scene.contact is not None:
-        lines.append(_line("contact", _values(scene.contact)))
+        heads["contact"] = _values(scene.contact)
     if scene.falling_friction is not None:
         law = "by the speed of slip s: floor + (1 - floor) exp(-decay s) of it is left"
-        lines.append(_line("friction", f"{law}; {_values(scene.falling_friction)}"))
+        heads["friction"] = f"{law}; {_values(scene.falling_friction)}"
     if scene.contact is not None:
-        lines.append(_line("creepage", _values(scene.creepage)))
+        heads["creepage"] = _values(scene.creepage)
     if scene.sweep is not None:
-        lines.append(_line("sweep", _values(scene.sweep)))
+        heads["sweep"] = _values(scene.sweep)
     method = _values(scene.method, {"name", *scene.method.unread()})
-    theory = _line("theory", THEORIES[scene.method.name] + (f"; {method}" if method else ""))
-    return "\n".join([*lines, theory, *effect_lines(scene)])
-
-
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
-
-
-def _material(body: Material) -> str:
-    return f"E = {body.E / 1e9:g} GPa, nu = {body.nu:g}, G = {body.G / 1e9:.4g} GPa"
+    heads["theory"] = THEORIES[scene.method.name] + (f"; {method}" if method else "")
+    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)])
 
 
 def _values(table: object, left_out: frozenset[str] | set[str] = frozenset()) -> str:

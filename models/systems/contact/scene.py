@@ -1,15 +1,15 @@
 """Scenes of rolling contact: two bodies, where they touch, how they roll, and by which theory they are computed."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from models.contact.falling_friction import Falling
 from models.contact.inputs import LARGEST_APPROACH, LARGEST_CREEPAGE, LARGEST_LOAD, LARGEST_SPIN
-from models.contact.material import STEEL, Material, Pair
+from models.contact.material import STEEL, Falling, Material, Pair
 from models.core.errors import InputError
 from models.core.scene_effects import check, with_own
 from models.core.scene_file import SceneFile, checked
@@ -182,49 +182,50 @@ class ContactScene(SceneFile):
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> ContactScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(ContactScene, table, file, folder)
-    _check_geometry(scene)
-    _check_size(scene)
-    _check_sweep(scene)
-    _check_method(scene)
-    check(found := with_own(scene))
-    _check_friction(scene)
-    return found
+    _refuse(scene, _geometry, _contact, _sizes, _sweep, _method)
+    complete = with_own(scene)
+    check(complete)
+    _refuse(scene, _friction)
+    return complete
 
 
-def _check_geometry(scene: ContactScene) -> None:
-    given = [name for name in GEOMETRIES if getattr(scene, name) is not None]
-    if len(given) != 1:
-        found = f"found {', '.join(given)}" if given else "found none"
-        allowed = f"one of the tables {', '.join(GEOMETRIES)} says where the bodies touch; {found}"
-        raise InputError(scene.file, "", None, allowed)
+Wrong = Iterator[tuple[str, Any, str]]
+"""Places of a scene, their values and what is allowed there; the first is told."""
+
+
+def _refuse(scene: ContactScene, *checks: Callable[[ContactScene], Wrong]) -> None:
+    for place, value, allowed in chain.from_iterable(wrong(scene) for wrong in checks):
+        raise InputError(scene.file, place, value, allowed)
+
+
+def _geometry(scene: ContactScene) -> Wrong:
+    """One geometry; a turned or mirrored rail, and a wheel in mm, are told as what they are."""
+    tables = [name for name in GEOMETRIES if getattr(scene, name) is not None]
+    if len(tables) != 1:
+        known = ", ".join(GEOMETRIES)
+        yield "", None, f"one of the tables {known} says where the bodies touch; found {', '.join(tables) or 'none'}"
     if scene.radii is not None:
         scene.radii.curvatures(scene.file)
-    if scene.profiles is not None:
-        _check_profiles(scene.profiles, scene.file)
-    _check_contact(scene)
-
-
-def _check_profiles(profiles: Profiles, file: str) -> None:
-    """A turned or mirrored rail, and a wheel in mm, are told as what they are."""
-    for key, least, most in (
-        ("inclination", -0.5, 0.5),
-        ("radius", 0.02, 5.0),
-        ("gauge", 0.1, 3.0),
-        ("back_to_back", 0.1, 3.0),
-        ("gauge_depth", 0.0, 0.1),
-    ):
+    if (profiles := scene.profiles) is None:
+        return
+    for key, (least, most, unit) in RANGES.items():
         value = getattr(profiles, key)
         if not least <= value <= most:
-            unit = "rad" if key == "inclination" else "m"
-            raise InputError(file, f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}")
+            yield f"profiles.{key}", value, f"must be from {least:g} to {most:g} {unit}"
     if profiles.smoothing and "." not in profiles.wheel + profiles.rail:
-        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+        yield "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles"
 
 
-OF_CASES = ("contact", "creepage", "sweep")
+RANGES = {
+    "inclination": (-0.5, 0.5, "rad"),
+    "radius": (0.02, 5.0, "m"),
+    "gauge": (0.1, 3.0, "m"),
+    "back_to_back": (0.1, 3.0, "m"),
+    "gauge_depth": (0.0, 0.1, "m"),
+}
+"""Of numbers of profiles, in their unit."""
+OF_CASES = {"contact", "creepage", "sweep"}
 """Tables whose content every row of a table of cases has itself."""
-
-
 LARGEST = {
     "contact.load": LARGEST_LOAD,
     "contact.approach": LARGEST_APPROACH,
@@ -236,74 +237,63 @@ LARGEST = {
 """What the theories take, of either sign."""
 
 
-def _check_size(scene: ContactScene) -> None:
+def _contact(scene: ContactScene) -> Wrong:
+    contact = scene.contact
+    if scene.cases is not None:
+        for table in sorted(scene.model_fields_set & OF_CASES):
+            yield table, None, "is in the file of cases: drop this table"
+    elif contact is None:
+        yield "contact", None, "is missing: a table with load or approach, and friction"
+    elif (contact.load is None) == (contact.approach is None):
+        yield "contact.load", contact.load, "give either the load in N or contact.approach in m"
+
+
+def _sizes(scene: ContactScene) -> Wrong:
     """The theories refuse what is larger, but know neither the file nor the key."""
     for place, most in LARGEST.items():
         table, key = place.split(".")
-        found = {place: getattr(getattr(scene, table), key, None)}
+        values = {place: getattr(getattr(scene, table), key, None)}
         if scene.sweep is not None and scene.sweep.of == key:
-            found = {f"sweep.{end}": getattr(scene.sweep, end) for end in ("start", "stop")}
-        for where, value in found.items():
+            values = {f"sweep.{end}": getattr(scene.sweep, end) for end in ("start", "stop")}
+        unit = {"load": " N", "approach": " m", "spin": " 1/m"}.get(key, "")
+        for where, value in values.items():
             if value is not None and abs(value) > most:
-                unit = {"load": " N", "approach": " m", "spin": " 1/m"}.get(key, "")
-                raise InputError(scene.file, where, value, f"must be at most {most:g}{unit}, of either sign")
+                yield where, value, f"must be at most {most:g}{unit}, of either sign"
 
 
-def _check_contact(scene: ContactScene) -> None:
-    given = sorted(scene.model_fields_set & {*OF_CASES})
-    if scene.cases is not None:
-        if given:
-            raise InputError(scene.file, given[0], None, "is in the file of cases: drop this table")
-        return
-    if scene.contact is None:
-        raise InputError(scene.file, "contact", None, "is missing: a table with load or approach, and friction")
-    if (scene.contact.load is None) == (scene.contact.approach is None):
-        allowed = "give either the load in N or contact.approach in m"
-        raise InputError(scene.file, "contact.load", scene.contact.load, allowed)
-
-
-def _check_sweep(scene: ContactScene) -> None:
-    sweep = scene.sweep
-    if sweep is None:
+def _sweep(scene: ContactScene) -> Wrong:
+    if (sweep := scene.sweep) is None:
         return
     if sweep.start == sweep.stop:
-        raise InputError(scene.file, "sweep.stop", sweep.stop, "must differ from sweep.start")
+        yield "sweep.stop", sweep.stop, "must differ from sweep.start"
     if sweep.spacing == "logarithmic" and sweep.start * sweep.stop <= 0:
-        allowed = "start and stop must then both be above 0, or both below"
-        raise InputError(scene.file, "sweep.spacing", sweep.spacing, allowed)
+        yield "sweep.spacing", sweep.spacing, "start and stop must then both be above 0, or both below"
     if sweep.of in scene.creepage.model_fields_set:
-        value = getattr(scene.creepage, sweep.of)
-        raise InputError(
-            scene.file,
-            f"creepage.{sweep.of}",
-            value,
-            "is swept: drop this key; on the command line give the whole table, as in --set creepage={xi_x=1e-3}",
-        )
+        whole = "on the command line give the whole table, as in --set creepage={xi_x=1e-3}"
+        yield f"creepage.{sweep.of}", getattr(scene.creepage, sweep.of), f"is swept: drop this key; {whole}"
 
 
 ON_PROFILES = ("simplified", "exact")
 """Theories that need no ellipse."""
 
 
-def _check_method(scene: ContactScene) -> None:
+def _method(scene: ContactScene) -> Wrong:
     """No key that the theory would not read, and no theory that the geometry does not fit."""
     method = scene.method
     for key in sorted(method.model_fields_set & method.unread()):
-        raise InputError(scene.file, f"method.{key}", getattr(method, key), f"has no meaning for {method.name}")
+        yield f"method.{key}", getattr(method, key), f"has no meaning for {method.name}"
     if scene.cases is not None and method.name != "fastsim":
-        raise InputError(scene.file, "method.name", method.name, "a table of cases is computed by fastsim")
+        yield "method.name", method.name, "a table of cases is computed by fastsim"
     if scene.profiles is not None and method.name not in ON_PROFILES:
-        raise InputError(
-            scene.file, "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
-        )
+        yield "method.name", method.name, "needs an ellipse; for profiles use " + " or ".join(ON_PROFILES)
 
 
-def _check_friction(scene: ContactScene) -> None:
+def _friction(scene: ContactScene) -> Wrong:
     """Friction falls in FASTSIM marched to second order, and not in a table of cases."""
-    method = scene.method
+    march = scene.method.march
     if scene.falling_friction is None:
         return
     if scene.cases is not None:
-        raise InputError(scene.file, "falling_friction", None, "a table of cases has constant friction")
-    if method.march != "second-order":
-        raise InputError(scene.file, "method.march", method.march, "must be second-order where friction falls")
+        yield "falling_friction", None, "a table of cases has constant friction"
+    if march != "second-order":
+        yield "method.march", march, "must be second-order where friction falls"

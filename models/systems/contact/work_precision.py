@@ -8,18 +8,22 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from models.contact.fastsim import Ellipse
 from models.contact.hertz import by_axes
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.material import Pair
-from models.contact.theories import Contact, ExactOnEllipse, Linear, Motion, Simplified
+from models.contact.theories import ExactOnEllipse, Linear, Motion, OnEllipse, Simplified
 from models.core.errors import RunFailed
+from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
-from models.systems.contact.of_scene import interpenetrating
+from models.systems.contact.run import Progress, built_of, hertz_of, interpenetrating
+from models.systems.contact.scene import ContactScene
 
 Parts = tuple[float, float, float]
 KINDS: dict[str, Parts] = {
@@ -74,13 +78,13 @@ class Case:
         return tuple(float(v) for v in self.level * unit * parts / np.linalg.norm(parts))  # type: ignore[return-value]
 
     @property
-    def force(self) -> np.ndarray:
+    def force(self) -> Array:
         """Exact force by mu N, (2,)."""
         return np.array([self.fx, self.fy])
 
-    def contact(self, theory: type[ExactOnEllipse] | type[Linear]) -> Contact:
+    def contact(self, theory: Callable[..., OnEllipse], **choices: Any) -> OnEllipse:
         """The contact by a theory of the ellipse."""
-        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair)
+        return theory(by_axes(self.a, self.b, self.pair, load=self.load), self.friction, self.pair, **choices)
 
 
 def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
@@ -104,7 +108,7 @@ def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
     return replace(case, fx=float(found[0]), fy=float(found[1]), mz=float(found[2]), error=error)
 
 
-def without_grid(grids: list[np.ndarray]) -> tuple[np.ndarray, float]:
+def without_grid(grids: list[Array]) -> tuple[Array, float]:
     """Answers (fx, fy, mz) of three grids, each with cells half as long, led on to none, and the error of fx and fy.
 
     The error of the cells is of first order where much sticks and of second where all slips: taken is the order by
@@ -139,7 +143,7 @@ def _simplified(case: Case, cells: int) -> Roll:
     return lambda motion: contact.roll(motion, cells)
 
 
-def _of(theory: type[ExactOnEllipse] | type[Linear]) -> Callable[[Case, int], Roll]:
+def _of(theory: Callable[..., OnEllipse]) -> Callable[[Case, int], Roll]:
     def rolled(case: Case, cells: int) -> Roll:
         contact = case.contact(theory)
         return lambda motion: contact.roll(motion, cells)
@@ -187,12 +191,15 @@ def measure(way: Way, cells: int, cases: list[Case], repeats: int = 3) -> Point:
     """Errors on all cases, and seconds: the median of ``repeats`` for each case, and that of the cases."""
     errors, seconds = [], []
     for case in cases:
-        roll, motion = way.rolled(case, cells), case.motion
-        found = _timed(roll, motion, repeats)
-        force = np.array(found[0][:2]) if isinstance(found[0], tuple) else found[0].force
-        errors.append(float(np.linalg.norm(force / case.limit - case.force)))
-        seconds.append(found[1])
+        answer, taken = _timed(way.rolled(case, cells), case.motion, repeats)
+        errors.append(float(np.linalg.norm(force_of(answer) / case.limit - case.force)))
+        seconds.append(taken)
     return Point(way.name, cells, tuple(errors), float(np.median(seconds)), (min(seconds), max(seconds)))
+
+
+def force_of(answer: Any) -> Array:
+    """Force (2,) in N of what a way rolls: forces and moment, or what has its force."""
+    return np.array(answer[:2]) if isinstance(answer, tuple) else answer.force
 
 
 LEAST = 2e-5
@@ -201,21 +208,21 @@ LEAST = 2e-5
 
 def _timed(roll: Roll, motion: Motion, repeats: int) -> tuple[Any, float]:
     start = time.perf_counter()
-    found = roll(motion)
+    answer = roll(motion)
     count = max(1, int(LEAST / max(time.perf_counter() - start, 1e-7)))
     taken = []
     for _ in range(repeats if count > 1 else 1):
         start = time.perf_counter()
         for _ in range(count):
-            found = roll(motion)
+            answer = roll(motion)
         taken.append((time.perf_counter() - start) / count)
-    return found, float(np.median(taken))
+    return answer, float(np.median(taken))
 
 
 def cheapest(points: list[Point], target: float, error: Callable[[Point], float]) -> Point | None:
     """The fastest of all whose error is at most ``target``; None if there is none."""
-    meets = [one for one in points if error(one) <= target]
-    return min(meets, key=lambda one: one.seconds, default=None)
+    meets = [point for point in points if error(point) <= target]
+    return min(meets, key=lambda point: point.seconds, default=None)
 
 
 def ellipse_cases(
@@ -233,22 +240,45 @@ def ellipse_cases(
     ]
 
 
+def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -> Result:
+    """Errors and seconds of every theory on every number of cells, on the scene's ellipse; the points are the detail.
+
+    levels : sizes of the creepage; at 1 the linear theory reaches mu N.
+    """
+    hertz, built = hertz_of(scene), built_of(scene)
+    cases = ellipse_cases(float(hertz.a), float(hertz.b), float(hertz.load), built.friction, built.pair, levels)
+    known, points = list[Case](), list[Point]()
+    for i, case in enumerate(cases):
+        progress("exact theory", 0.5 * i / len(cases))
+        known.append(exact(case))
+    for i, way in enumerate(WAYS):
+        progress(way.name, 0.5 + 0.5 * i / len(WAYS))
+        points += [measure(way, cells, known) for cells in way.cells]
+    channels = {
+        "theory": Channel("point", [point.name for point in points], "", "theory, with its choices"),
+        "cells": Channel("point", [point.cells for point in points], "", "cells along each axis"),
+        "error": Channel(("point", "contact"), [point.errors for point in points], "mu N", "of the tangential force"),
+        "seconds": Channel("point", [point.seconds for point in points], "s", "of an evaluation, median of contacts"),
+        "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
+    }
+    return result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
+
+
 TARGETS = (0.05, 0.02, 0.01, 0.005)
 """Errors by mu N that are asked for."""
 
 
 def cheapest_lines(points: list[Point]) -> list[tuple[str, ...]]:
     """For every target: the cheapest that meets it in the mean, and the one that does in 95 of 100 cases."""
+    errors = attrgetter("mean"), attrgetter("most")
     return [
-        (
-            f"{100 * target:g} %",
-            *(_told(cheapest(points, target, error), error) for error in (lambda one: one.mean, lambda one: one.most)),
-        )
+        (f"{100 * target:g} %", *(_told(cheapest(points, target, error), error) for error in errors))
         for target in TARGETS
     ]
 
 
-def _told(one: Point | None, error: Callable[[Point], float]) -> str:
-    if one is None:
+def _told(point: Point | None, error: Callable[[Point], float]) -> str:
+    if point is None:
         return "none"
-    return f"{one.name}, {one.cells} cells: {cost((one.seconds, *one.range))} ({100 * error(one):.2g} %)"
+    seconds = cost((point.seconds, *point.range))
+    return f"{point.name}, {point.cells} cells: {seconds} ({100 * error(point):.2g} %)"

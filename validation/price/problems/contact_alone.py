@@ -12,8 +12,8 @@ from functools import cache, partial
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.systems.contact.work_precision import WAYS, Case, Way
-from studies.contact import doubted
+from models.contact.theories import beyond_friction
+from models.systems.contact.work_precision import WAYS, Way, force_of
 from validation.contact.contact_set import read
 
 EVERY = 23
@@ -97,17 +97,10 @@ class ContactAlone:
         return dict(zip(self.units, (float(off.mean()), float(np.quantile(off, 0.95))), strict=True))
 
     def _run(self, way: Way, cells: int) -> Result:
-        forces = np.array([_force(way, case, cells) for case in self._cases])
+        forces = np.array([force_of(way.rolled(case, cells)(case.motion)) / case.limit for case in self._cases])
         linear, number = way.name == "linear theory", len(self._cases)
         counts = {"contacts": number, "contact cells": number * (1 if linear else cells**2)}
-        return Result(forces, counts, doubted(np.linalg.norm(forces, axis=1)) if linear else "")
-
-
-def _force(way: Way, case: Case, cells: int) -> np.ndarray:
-    """Force (2,) by mu N."""
-    found = way.rolled(case, cells)(case.motion)
-    force = found[:2] if isinstance(found, tuple) else found.force
-    return np.array(force) / case.limit
+        return Result(forces, counts, beyond_friction(np.linalg.norm(forces, axis=1)) if linear else "")
 
 
 @cache

@@ -1,5 +1,132 @@
-"""Effects of scenes of one contact, one file each: see ``models.core.scene_effects``.
+"""Effects of scenes of one contact: see ``models.core.scene_effects``.
 
 The theory of a scene is made of them: linear is that of no effect, FASTSIM that of saturation alone. Counts are those
 of what computes: whether forces are bounded, areas of any shape, half-spaces, laws of friction, motions with spin.
 """
+
+from collections.abc import Callable
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.scene_effects import Entry, Table
+
+
+def _of_theory(says: str, theory: str, cost: str, count: str, instead: Callable[[Any], dict[str, str]]) -> Entry:
+    """A theory beyond FASTSIM; ``instead`` gives the method of a scene without it, its cells left out."""
+
+    def leave_out(table: Table, scene: Any) -> None:
+        cells = {key: value for key, value in table["method"].items() if key == "cells"}
+        table["method"] = cells | instead(scene)
+
+    return Entry(
+        says,
+        "method.name",
+        cost,
+        {count: 1},
+        **BOUND_BY_CONSTANT_FRICTION,
+        there=lambda scene: scene.method.name == theory,
+        leave_out=leave_out,
+        put_in=_method(theory),
+    )
+
+
+def _without_shape(scene: Any) -> dict[str, str]:
+    if scene.profiles is not None:
+        raise InputError(scene.file, "method.name", "simplified", "is the cheapest theory of profiles: leave it in")
+    return {}
+
+
+def _without_half_space(scene: Any) -> dict[str, str]:
+    return {"name": "fastsim" if scene.profiles is None else "simplified"}
+
+
+def _method(name: str) -> Callable[[Table, Any], None]:
+    """The edit that names a theory."""
+
+    def put_in(table: Table, scene: Any) -> None:
+        table["method"] = {"name": name}
+
+    return put_in
+
+
+def _without_slip(table: Table, scene: Any) -> None:
+    if scene.profiles is not None:
+        allowed = "cannot be left out on profiles: the linear theory needs an ellipse"
+        raise InputError(scene.file, "method.name", scene.method.name, allowed)
+    table["method"] = {"name": "linear"}
+
+
+def _without_profiles(table: Table, scene: Any) -> None:
+    allowed = "can only give way to an ellipse: name ellipse, curvatures or radii"
+    raise InputError(scene.file, "profiles", None, allowed)
+
+
+def _swept(scene: Any) -> bool:
+    """Whether spin is what a scene sweeps."""
+    return scene.sweep is not None and scene.sweep.of == "spin"
+
+
+def _without_spin(table: Table, scene: Any) -> None:
+    if _swept(scene):
+        allowed = "is what this scene asks for: sweep another creepage to leave it out"
+        raise InputError(scene.file, "sweep.of", "spin", allowed)
+    table["creepage"].pop("spin")
+
+
+SATURATION = ("saturation",)
+BOUND_BY_CONSTANT_FRICTION: dict[str, Any] = {
+    "needs": SATURATION,
+    "excludes": ("falling_friction",),
+    "why": "which FASTSIM alone computes",
+}
+TABLE = {
+    "saturation": Entry(
+        "Slip: creep forces that friction bounds, by FASTSIM where no other theory is named",
+        "method.name",
+        "some microseconds per contact, where the linear theory multiplies by a matrix",
+        {"bounded": 1},
+        there=lambda scene: scene.method.name != "linear",
+        leave_out=_without_slip,
+        put_in=_method("fastsim"),
+    ),
+    "any_shape": _of_theory(
+        "Contact areas of any shape, by the simplified theory of 1983",
+        "simplified",
+        "an area that is found cell by cell",
+        "areas of any shape",
+        _without_shape,
+    ),
+    "half_space": _of_theory(
+        "Tractions and displacements of half-spaces, by the exact theory",
+        "exact",
+        "a system of equations as large as the area has cells, hundreds of times FASTSIM",
+        "half-spaces",
+        _without_half_space,
+    ),
+    "profiles": Entry(
+        "Cross-sections of wheel and rail, whose patches are looked for",
+        "profiles",
+        "a search of where both touch, once, and one contact per patch",
+        {"searches": 1},
+        **BOUND_BY_CONSTANT_FRICTION,
+        leave_out=_without_profiles,
+    ),
+    "falling_friction": Entry(
+        "Friction that falls with the speed of slip",
+        "falling_friction",
+        "an exponential per cell, and a march of its own",
+        {"laws of friction": 1},
+        SATURATION,
+        modules=("models.contact.fastsim_falling",),
+        usual={"floor": 0.4, "decay": 0.6, "speed": 20.0},  # of the size of measured values
+    ),
+    "spin": Entry(
+        "Spin of the wheel about the contact's normal",
+        "creepage.spin",
+        "nothing: the third column of the same creepages",
+        {"motions with spin": 1},
+        usual=0.3,  # 1/m, as of a wheel of usual conicity
+        there=lambda scene: bool(scene.creepage.spin) or _swept(scene),
+        leave_out=_without_spin,
+    ),
+}

@@ -1,0 +1,272 @@
+"""One contact over its creepages, or a table of contacts: from scene to result."""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, field
+from functools import partial
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from models.contact.accuracy import Error, rolled
+from models.contact.hertz import Hertz, by_approach, by_axes, by_load
+from models.contact.material import Falling, Pair
+from models.contact.profile_files import read_profile
+from models.contact.profiles import Profile
+from models.contact.simplified_theory import PLAIN, NormalContact, Options, press
+from models.contact.standard_profiles import RAILS, WHEELS, built_in
+from models.contact.theories import (
+    Contact,
+    Exact,
+    ExactOnEllipse,
+    Fastsim,
+    Linear,
+    Motion,
+    Rolled,
+    Simplified,
+    beyond_friction,
+)
+from models.contact.undeformed_distance import quadratic
+from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
+from models.core.errors import InputError
+from models.core.result import Channel, Result, result
+from models.core.scene_effects import extended
+from models.systems.contact.cases_table import answer, compile_first, kept_rows, sizes
+from models.systems.contact.scene import ContactScene
+
+BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
+FORCES = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+CHANNELS = {
+    "xi_x": ("-", "longitudinal creepage"),
+    "xi_y": ("-", "lateral creepage"),
+    "spin": ("1/m", "spin by the rolling speed"),
+    "fx": ("N", "force on the wheel in the direction of rolling"),
+    "fy": ("N", "force on the wheel to the right"),
+    "mz": ("N m", "moment on the wheel about the normal"),
+    "stick": ("-", "share of the area that sticks"),
+    "dissipation": ("N", "power lost by the rolling speed"),
+    "error_of_cells": ("N", "error of the force that the cells leave"),
+    "error_of_theory": ("N", "error of the force that the theory has"),
+    "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
+    "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
+}
+"""Units and meanings of a motion, of its forces (``FORCES``) and of their errors (``Error``), in this order."""
+FIELDS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
+POWERS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
+"""By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Built:
+    """What touches and how, before it is pressed: what effects of contact extend.
+
+    pair : elastic constants; friction : its coefficient; load (N) or approach (m): the other one is None.
+    falling : friction that falls with the speed of slip, of FASTSIM alone; profiles : cross-sections of "wheel" and
+    "rail", none where an ellipse is given. In a table of cases friction and load are (n,), those of its rows.
+    """
+
+    pair: Pair
+    friction: Any
+    load: Any = None
+    approach: float | None = None
+    falling: Falling | None = None
+    profiles: Mapping[str, Profile] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Rolls:
+    """A contact with its forces at every motion, and their errors if they were asked for.
+
+    pressing : seconds that it took to press the bodies; rolling : (n,) to roll them at each motion, errors included.
+    """
+
+    contact: Contact
+    motions: list[Motion]
+    rolled: Sequence[Rolled]
+    errors: Sequence[Error]
+    pressing: float
+    rolling: np.ndarray
+
+
+def run(
+    scene: ContactScene,
+    engine: str = "",
+    *,
+    errors: bool = True,
+    fields: bool = False,
+    answers: Path | None = None,
+    progress: Progress = lambda stage, share: None,
+) -> Result:
+    """Forces of a scene at every creepage, with ``Rolls`` as detail; or of its table of cases.
+
+    errors : whether to state how far forces are off, which takes another evaluation of each. fields : whether the
+    last motion shows its cells; everything is then compiled before times are taken. answers : the CSV into which a
+    table of cases is answered block by block; the result has its first rows, and sizes of all. There are no engines.
+    Raises InputError, or RunFailed where the exact theory is not solved.
+    """
+    if scene.cases is not None:
+        if answers is None:
+            raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
+        return _of_table(scene, answers, progress)
+    motions, cells = creepages(scene), scene.method.cells
+    progress("loading", 0.0)
+    shown = rolled(contact(scene), motions[-1], cells, fields=True) if fields else None
+    begun, start = time.process_time(), time.perf_counter()
+    body = contact(scene)
+    steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
+    for i, motion in enumerate(motions):
+        progress("rolling", i / len(motions))
+        steps.append(rolled(body, motion, cells) if errors else (body.roll(motion, cells), None))
+        marks.append(time.perf_counter())
+    seconds = time.process_time() - begun
+    if shown is not None:
+        steps[-1] = shown
+    forces, off = zip(*steps, strict=True)
+    rolls = Rolls(body, motions, forces, off if errors else (), marks[0] - start, np.diff(marks))
+    return _result(scene, rolls, seconds)
+
+
+def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
+    body, count, power = rolls.contact, len(rolls.motions), POWERS[scene.method.name]
+    errors = [astuple(error) for error in rolls.errors] or [()] * count
+    rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
+    columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
+    doubt = ""
+    if isinstance(body, Linear):
+        with np.errstate(divide="ignore", invalid="ignore"):  # no friction carries nothing
+            used = np.array([np.linalg.norm(force.force) for force in rolls.rolled])
+            doubt = beyond_friction(used / (body.friction * body.pressing.load))
+    return result(
+        scene,
+        {name: Channel("motion", values, *CHANNELS[name]) for name, values in zip(CHANNELS, columns, strict=False)},
+        {},
+        counts={
+            "steps": count,
+            "calls": count,
+            "states": 0,
+            "terms": 0 if power is None else scene.method.cells**power,
+        },
+        seconds=seconds,
+        doubts=[doubt] if doubt else [],
+        detail=rolls,
+    )
+
+
+def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
+    """Pressure and tractions in every cell in contact at the last motion, patch after patch; None without fields."""
+    patches = rolls.rolled[-1].fields
+    if not patches:
+        return None
+    columns = {
+        name: Channel("cell", np.concatenate([getattr(patch, name)[patch.inside] for patch in patches]), unit)
+        for name, unit in FIELDS.items()
+    }
+    return result(scene, columns, {}, motion=list(rolls.motions[-1]))
+
+
+def _of_table(scene: ContactScene, answers: Path, progress: Progress) -> Result:
+    """The first rows of the answers, which the file has in full."""
+    built = partial(_of_rows, scene)
+    compile_first(built, scene.method)  # no part of the time below
+    start = time.perf_counter()
+    counts = answer(scene.cases_file(), answers, built, scene.method, lambda rows: progress(f"{rows:,} rows", 0.0))
+    seconds = time.perf_counter() - start
+    rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
+    return result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
+
+
+def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:
+    """What touches in rows of a table of cases."""
+    return extended(Built(scene.pair, friction, load), scene)
+
+
+def built_of(scene: ContactScene) -> Built:
+    """What touches and how, with the scene's effects."""
+    table = scene.contact
+    assert table is not None
+    kinds: tuple[Literal["wheel", "rail"], ...] = ("wheel", "rail") if scene.profiles is not None else ()
+    profiles: dict[str, Profile] = {kind: _profile(scene, kind) for kind in kinds}
+    return extended(
+        Built(scene.pair, table.friction, table.load, table.approach, scene.falling_friction, profiles), scene
+    )
+
+
+def contact(scene: ContactScene) -> Contact:
+    """The contact of a scene, pressed, by the theory that the scene names."""
+    method, built = scene.method, built_of(scene)
+    friction, pair = built.friction, built.pair
+    if built.falling is not None and method.name != "fastsim":
+        raise InputError(
+            scene.file,
+            "method.name",
+            method.name,
+            "has constant friction, and an effect of this scene makes it fall: use fastsim",
+        )
+    if scene.profiles is not None:
+        patches = [touch.patch for touch in touches(scene, built)]
+        pressed = press(patches, pair, load=built.load, approach=built.approach)
+        return Simplified(pressed, friction) if method.name == "simplified" else Exact(pressed, friction, method.cells)
+    hertz = hertz_of(scene)
+    if method.name == "simplified":
+        return Simplified(interpenetrating(hertz, pair), friction)
+    if method.name == "fastsim":
+        choices = method.model_dump(include={"march", "bound", "flexibilities"})
+        return Fastsim(hertz, friction, pair, **choices, falling=built.falling)
+    return (Linear if method.name == "linear" else ExactOnEllipse)(hertz, friction, pair)
+
+
+def creepages(scene: ContactScene) -> list[Motion]:
+    """The creepages of the scene, one or a sweep of them."""
+    fixed = scene.creepage.model_dump()
+    values = [{}] if scene.sweep is None else [{scene.sweep.of: float(value)} for value in scene.sweep.values()]
+    return [tuple({**fixed, **value}.values()) for value in values]  # type: ignore[misc]
+
+
+def interpenetrating(hertz: Hertz, pair: Pair, options: Options = PLAIN) -> NormalContact:
+    """An ellipse as the theory of 1983 finds it, with room for more than its area."""
+    A, B = float(hertz.A), float(hertz.B)
+    x, y = (float(np.sqrt(1.5 * hertz.approach / curvature)) for curvature in (A, B))
+    return press(quadratic(A, B, x, y), pair, load=float(hertz.load), options=options)
+
+
+def touches(scene: ContactScene, built: Built) -> list[Touch]:
+    """Where the profiles of a scene touch."""
+    p = scene.profiles
+    assert p is not None
+    return wheel_on_rail(
+        built.profiles["wheel"],
+        built.profiles["rail"],
+        lateral_shift=p.lateral_shift,
+        yaw=p.yaw,
+        track=Track(p.gauge, p.gauge_depth, p.inclination),
+        wheelset=Wheelset(p.radius, p.back_to_back),
+    )
+
+
+def _profile(scene: ContactScene, kind: Literal["wheel", "rail"]) -> Profile:
+    """A built-in profile by its name, or the user's file."""
+    assert scene.profiles is not None
+    name = getattr(scene.profiles, kind)
+    if name in BUILT_IN[kind]:
+        return built_in(name)
+    if "." not in name:
+        raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(BUILT_IN[kind]))
+    return read_profile(scene.path(name, f"profiles.{kind}"), kind, smoothing=scene.profiles.smoothing)
+
+
+def hertz_of(scene: ContactScene) -> Hertz:
+    """Hertz' contact from semi-axes, curvatures or radii, by load or approach."""
+    built = built_of(scene)
+    load, approach, pair = built.load, built.approach, built.pair
+    if scene.ellipse is not None:
+        return by_axes(scene.ellipse.a, scene.ellipse.b, pair, load=load, approach=approach)
+    if scene.radii is not None:
+        A, B = scene.radii.curvatures(scene.file)
+    else:
+        assert scene.curvatures is not None
+        A, B = scene.curvatures.A, scene.curvatures.B
+    return by_load(A, B, load, pair) if load is not None else by_approach(A, B, approach, pair)
