@@ -5,13 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drawing.figures import plt, save
+from models.drawing.figures import COLOURS as ENGINES
+from models.drawing.figures import LABELS, plt, save
+from models.ride.frequency import spectra
+from models.ride.statistical_linearisation import GRADES
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
 from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
 from models.road.isotropic import isotropic_like
 from models.road.two_track import TwoTrackRoad
+from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
@@ -107,8 +111,6 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
-    from models.ride.frequency import spectra
-
     frequency = np.geomspace(0.1, 100.0, 800)
     found = 4 * np.pi * spectra(linear, excitation, speed, 2 * np.pi * frequency)  # one-sided, over Hz
     moved = {output.kind for i, output in enumerate(linear.outputs) if found[:, i].any()}
@@ -205,3 +207,95 @@ def drive_figure(
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     figure.suptitle(f"{title}\nsolid: exact; dashed: each speed taken by itself", fontsize=11)
     save(figure, path)
+
+
+MOST = 12
+"""Outputs that a figure shows."""
+
+
+def nonlinear_figure(answer: Nonlinear, title: str, path: Path) -> None:
+    """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
+    outputs = answer.shown.vehicle.outputs
+    figure, axes = _panels(min(len(outputs), MOST))
+    left = answer.of("left_out")
+    for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
+        factor, unit = (1e3, "mm") if output.unit == "m" else (1.0, output.unit.replace("^2", "²"))
+        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color="0.6", label="slopes at rest (small motion)")
+        axis.plot(
+            answer.speeds,
+            factor * answer.deviation[:, i],
+            color="#0072b2",
+            label="statistical linearisation" + (", tyres on the road" if answer.lifts else ""),
+        )
+        poor = left[:, i] > GRADES[-1][0]
+        axis.plot(
+            answer.speeds[poor],
+            factor * answer.deviation[poor, i],
+            "o",
+            color="#0072b2",
+            fillstyle="none",
+            label="no longer good by its own measure",
+        )
+        for j, (speed, copies) in enumerate(answer.copies.items()):
+            spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
+            axis.errorbar(
+                [speed],
+                [factor * copies.deviation[i]],
+                [factor * spread],
+                fmt="s",
+                color="#d55e00",
+                markersize=4,
+                capsize=3,
+                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.lifts else ""),
+            )
+        axis.set(
+            xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
+        )
+    axes[0].legend(fontsize=7.5)
+    figure.suptitle(f"{title}\nStandard deviations over speed", fontsize=11)
+    save(figure, path)
+
+
+def engine_spectra_figure(
+    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, title: str, path: Path
+) -> None:
+    """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
+    from scipy.signal import welch
+
+    frequency = np.geomspace(0.3, 40.0, 300)
+    own = 4 * np.pi * spectra(linear, road, speed, 2 * np.pi * frequency)
+    first = next(iter(runs.values()))
+    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST]
+    figure, axes = _panels(len(shown))
+    for axis, i in zip(axes, shown, strict=False):
+        for (engine, run), style in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
+            f, density = welch(run.outputs[:, i], 1 / run.interval, nperseg=round(4 / run.interval))
+            keep = (f > 0.4) & (f <= frequency[-1])  # below, leakage of the windows
+            axis.loglog(
+                f[keep],
+                density[keep],
+                style[0],
+                linewidth=style[1],
+                color=ENGINES[engine],
+                label=f"{LABELS[engine]}, nonlinear in time",
+            )
+        axis.loglog(frequency, own[:, i], "k", label="statistical linearisation")
+        name, unit, top = linear.outputs[i].name, linear.outputs[i].unit.replace("^2", "²"), own[:, i].max()
+        axis.set(
+            xlabel="frequency [Hz]",
+            ylabel=f"one-sided density [({unit})²/Hz]",
+            title=name.capitalize(),
+            ylim=(1e-5 * top, 5 * top),
+        )
+    axes[0].legend(fontsize=7.5)
+    figure.suptitle(f"{title}\nSpectra at {speed:g} m/s", fontsize=11)
+    save(figure, path)
+
+
+def _panels(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
+    """A figure of this many panels, two or three beside each other."""
+    wide = 2 if count in (1, 2, 4) else 3
+    figure, axes = plt.subplots(-(-count // wide), wide, figsize=(4.6 * wide, 3.4 * -(-count // wide)), squeeze=False)
+    for axis in axes.ravel()[count:]:
+        axis.remove()
+    return figure, list(axes.ravel()[:count])

@@ -8,8 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
 from models.ride.marginal import Unstable, parts
 from models.ride.sweep import ASKED, sweep

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.core.errors import InputError
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"

@@ -17,8 +17,7 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.ride.covariance import Covariance, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.gaussian_laws import of_rate, of_travel
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
@@ -93,7 +92,7 @@ class StatisticallyLinear:
 
 def bent(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
     """The springs that have curves or friction."""
-    return tuple(s for s in vehicle.springs if s.travel_force or s.rate_force or s.friction)
+    return tuple(spring for spring in vehicle.springs if spring.bent)
 
 
 def statistically_linear(

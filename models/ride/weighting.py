@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from models.core.errors import InputError
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 
 
 @dataclass(frozen=True)

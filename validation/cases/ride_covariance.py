@@ -11,8 +11,7 @@ import numpy as np
 
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import FINITE, Covariance, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
 from models.ride.marginal import Unstable, parts
 from models.ride.sweep import sweep

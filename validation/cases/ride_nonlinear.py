@@ -7,19 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from models.systems.ride.in_engines import Ride, ridden
 from scipy.integrate import quad
 
 from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.ride.frequency import spectra
+from models.ride.frequency import spectra, standard_errors
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import promised, statistically_linear
-from models.ride.time_averages import standard_errors
 from models.road.excitation import Excitation
 from models.road.two_track import LEVEL, excitation, half_track, on_track, road_of_level
-from models.systems.ride.in_engines import Ride, ridden
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels

@@ -9,9 +9,8 @@ from scipy.integrate import quad
 from scipy.linalg import block_diag
 
 from models.ride.covariance import stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
-from models.ride.height_densities import both_sides, output_densities, variances
+from models.ride.excited import DelayedSystem, excited
+from models.ride.frequency import both_sides, output_densities, variances
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
 from models.road.isotropic import IsotropicRoad, Part, cross_spectrum_of, isotropic_like, spectral_matrix

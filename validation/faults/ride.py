@@ -10,14 +10,13 @@ import numpy as np
 from models.engines.spatial_reference import SpatialReference
 from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.frequency import quadrature
-from models.ride.operating_point import poles
 from models.ride.weighting import WEIGHTINGS, weighting
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel, poles
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute

@@ -16,18 +16,16 @@ from models.core.errors import InputError
 from models.core.scene_file import parse
 from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import DIFFUSING, INFINITE, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature
 from models.ride.marginal import Unstable
-from models.ride.operating_point import poles
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
 from models.road.two_track import excitation, half_track, on_track, road_of_level
 from models.systems.ride.of_scene import linear_vehicle
-from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.advice.ride_choice.cost import STAGES
-from models.advice.ride_choice.march import March
+from models.advice.ride_choice.march import STAGES, March
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 

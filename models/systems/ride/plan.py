@@ -5,8 +5,7 @@ from dataclasses import replace
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
-from models.road.two_track import half_track
-from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
+from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.limits import NONE
 from models.vehicles.linear_vehicle import Wheel
@@ -43,7 +42,7 @@ def describe(scene: RideScene) -> str:
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
     lines += [_line("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}")]
     lines += _bodies(vehicle)
-    lines += [_line("road", road_of(scene, wheels(vehicle)).label(_track(scene, vehicle)))]
+    lines += [_line("road", road_of(scene, wheels(vehicle)).label(half_track_of(scene, wheels(vehicle))))]
     lines += [_line("", text) for text in met(scene, wheels(vehicle))]
     lines += [_line("speed", _speed(scene))]
     lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
@@ -77,12 +76,6 @@ def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
 
 def _line(head: str, text: str) -> str:
     return f"  {head:<10} {text}"
-
-
-def _track(scene: RideScene, vehicle: SpatialVehicle) -> float:
-    if scene.road.file is not None:
-        return scene.road.track_width / 2.0
-    return scene.road.half_track or half_track(wheels(vehicle))
 
 
 def _bodies(vehicle: SpatialVehicle) -> list[str]:
