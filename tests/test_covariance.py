@@ -18,7 +18,7 @@ from models.road.two_track import CASES, excitation, road_of_level
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.ride_corners import corners
+from validation.ride.rides import corners
 
 CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 Q = 1e-4

@@ -20,6 +20,7 @@ from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel, poles
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
+from validation.ride.rides import R19_FREQUENCIES, STANDARD, off
 
 SPEED = 17.0
 INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
@@ -46,7 +47,7 @@ def _by_frequency() -> np.ndarray:
 
 def _quadrature() -> float:
     """Variances of the half car against the integrals over its spectra."""
-    return _off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
+    return off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
 
 
 def _closed_form() -> float:
@@ -55,7 +56,7 @@ def _closed_form() -> float:
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     found = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
-    return _off(found, car.body_acceleration(q * SPEED, corner * SPEED))
+    return off(found, car.body_acceleration(q * SPEED, corner * SPEED))
 
 
 @cache
@@ -78,21 +79,19 @@ def _heights() -> float:
     from models.ride import excited
 
     found = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
-    return _off(found, _covariance_of_heights())
+    return off(found, _covariance_of_heights())
 
 
 def _published_road() -> float:
     """Variance of a track of the paper's road: pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
     found = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
-    return _off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
+    return off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
 def _frequencies() -> float:
     """19 eigenfrequencies of R19-ride as its data have them."""
-    from validation.cases.ride_engines import FREQUENCIES
-
-    own = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
-    return _off(np.sort(np.abs(poles(own)))[::2] / (2 * np.pi), np.array(FREQUENCIES))
+    rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
+    return off(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
 def _whole_inertia() -> float:
@@ -137,19 +136,13 @@ def _states_of_weighting() -> float:
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
     found = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
-    return float(np.abs(found / WEIGHTINGS["Wk"].response(frequency) - 1.0).max())
+    return off(found, WEIGHTINGS["Wk"].response(frequency))
 
 
 def _table_of_weighting() -> float:
     """Wk against the standard's table, relative."""
-    from validation.cases.ride_road import STANDARD
-
     frequency, wk, _ = np.array(STANDARD).T
-    return float(np.abs(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)) / wk - 1.0).max())
-
-
-def _off(found: Any, wanted: Any) -> float:
-    return float(np.abs(np.asarray(found) / wanted - 1.0).max())
+    return off(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
 
 
 CHECKS = {
