@@ -81,8 +81,7 @@ def _system(
     D: Iterable[np.ndarray],
 ) -> DelayedSystem:
     delays = tuple(length / speed for length in excitation.lengths)
-    names = tuple(output.name for output in vehicle.outputs)
-    return DelayedSystem(A, tuple(B), delays, C, tuple(D), names, excitation.independent)
+    return DelayedSystem(A, tuple(B), delays, C, tuple(D), vehicle.names, excitation.independent)
 
 
 NOTHING = 1e-10

@@ -208,7 +208,7 @@ def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: flo
     What lies outside is left out: a band limit where that is wanted, an error where it is not.
     """
     wavenumber, weight = both_sides(vehicle, low, high)
-    return np.asarray(weight @ output_densities(vehicle, heights, speed, wavenumber))
+    return weight @ output_densities(vehicle, heights, speed, wavenumber)
 
 
 def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:

@@ -114,7 +114,7 @@ def copies_in_time(
         if left <= BLOCK:
             break
     return Copies(
-        march.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
+        march.plain.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
     )
 
 
@@ -125,8 +125,7 @@ class March:
         springs = bent(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
         self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
-        self.names = tuple(output.name for output in self.plain.outputs)
-        self.sums = np.zeros((POWERS, len(self.names), copies))
+        self.sums = np.zeros((POWERS, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
     def over(self, roads: np.ndarray, first: int, every: int = EVERY) -> None:

@@ -110,7 +110,7 @@ def _quick(
     if isinstance(quick, str):
         return quick
     none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
-    status, reason = verdicts(hits(system)[1], quick.variance, quick.floor, none, quick.fastest, accuracy)
+    status, reason = verdicts(hits(system).D, quick.variance, quick.floor, none, quick.fastest, accuracy)
     finite = np.array(status) == FINITE
     if (quick.loss[finite] > LOSS).any():
         return "terms cancel"
@@ -206,15 +206,14 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
         heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
     C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
     C = np.hstack([C0 @ own.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
-    B, _, delays = hits(system)
-    inputs = []
-    for b in B:
+    arrivals, inputs = hits(system), []
+    for b in arrivals.B:
         of_road = back @ b[vehicle:last]
         of_vehicle = own.inverse @ (b[:vehicle] - met @ of_road)
         of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
         inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
     condition = own.condition * path.condition * behind.condition
-    return _summed(np.concatenate(values), C, inputs, delays, system.independent, condition)
+    return _summed(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 
 def _joined(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:

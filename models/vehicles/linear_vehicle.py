@@ -69,6 +69,11 @@ class LinearVehicle:
         places = {wheel.axle: wheel.x for wheel in self.wheels}
         return tuple(places[i] for i in sorted(places))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(output.name for output in self.outputs)
+
     @cached_property
     def read(self) -> Rows:
         """Factors of all outputs."""

@@ -124,7 +124,7 @@ def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
     delays = tuple(length / speed for length in road.lengths)
     names = tuple(map(str, range(len(C))))
     A = np.kron(axles, speed * road.F)
-    return np.asarray(C @ stationary(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T)
+    return C @ stationary(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T
 
 
 def _limit_row() -> Row:
@@ -306,11 +306,10 @@ def _weighted_rows() -> list[Row]:
     found = stationary(system).deviation[-len(filters) :]
     k, weight = both_sides(vehicle, *BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
-    names = [output.name for output in vehicle.outputs]
     rows = []
     for value, (output, name) in zip(found, filters.items(), strict=True):
         gain = np.abs(WEIGHTINGS[name].response(SPEED * k / (2.0 * np.pi))) ** 2
-        expected = math.sqrt(weight @ (gain * density[:, names.index(output)]))
+        expected = math.sqrt(weight @ (gain * density[:, vehicle.names.index(output)]))
         rows.append(
             at_most(
                 f"ride_road.weighted.{name}",

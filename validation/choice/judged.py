@@ -47,7 +47,7 @@ def _by_frequency(whole: Whole, scene: ReducedScene, rows: list[int]) -> np.ndar
     """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
     rest = whole.reduced(scene)
     densities = spectra(rest.vehicle, rest.excitation, whole.speed, OMEGA)[:, rows]
-    return np.asarray(2 * np.trapezoid(densities, OMEGA, axis=0))
+    return 2 * np.trapezoid(densities, OMEGA, axis=0)
 
 
 def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:

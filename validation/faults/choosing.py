@@ -119,7 +119,7 @@ def _other_sign(real: Any) -> Any:
     def predicted(screen: LinearScreen, reduced: Any) -> np.ndarray:
         C = screen.base.system.C[screen.rows]
         full = np.einsum("ki,ij,kj->k", C, screen.P, C)
-        return np.asarray(np.maximum(2 * full - real(screen, reduced), 0.0))
+        return np.maximum(2 * full - real(screen, reduced), 0.0)
 
     return predicted
 

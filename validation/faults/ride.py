@@ -170,8 +170,9 @@ def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
 
 def _reversed(real: Any) -> Any:
     def hits(system: DelayedSystem) -> Any:
-        B, D, delays = real(system)
-        return B[::-1], D[::-1], [delays[-1] - delay for delay in delays[::-1]]
+        met = real(system)
+        delays = [met.delays[-1] - delay for delay in met.delays[::-1]]
+        return met._replace(B=met.B[::-1], D=met.D[::-1], delays=delays)
 
     return hits
 
@@ -224,10 +225,7 @@ FAULTS = (
     Fault(
         "cross terms of the axles missing",
         "covariance",
-        attribute(
-            "models.ride.covariance:_responses",
-            lambda real: lambda A, B, delays, independent: [np.zeros_like(b) for b in B],
-        ),
+        attribute("models.ride.covariance:_responses", lambda real: lambda A, met: [np.zeros_like(b) for b in met.B]),
     ),
     Fault(
         "noise without the root of the speed",

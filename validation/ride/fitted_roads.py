@@ -59,7 +59,7 @@ def _passed(f: ShapeFilter, noise: np.ndarray, step: float) -> np.ndarray:
     kept = math.exp(-f.corner * step)
     driven = noise * math.sqrt((1.0 - kept**2) * f.intensity / (2.0 * f.corner))
     driven[0] = noise[0] * math.sqrt(f.intensity / (2.0 * f.corner))
-    return np.asarray(lfilter([1.0], [1.0, -kept], driven))
+    return lfilter([1.0], [1.0, -kept], driven)
 
 
 def measured() -> tuple[list[Row], list[dict[str, Any]]]:

@@ -146,7 +146,7 @@ def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation_: Excitati
 
     frequency = np.geomspace(0.2, 40.0, 300)
     own = 4.0 * np.pi * spectra(linear, excitation_, SPEED, 2.0 * np.pi * frequency)
-    names = [output.name for output in linear.outputs]
+    names = linear.names
     shown = {"frequency": frequency.tolist(), "own": {name: own[:, names.index(name)].tolist() for name in SHOWN}}
     for engine, run in runs.items():
         f, density = welch(run.outputs, 1.0 / run.interval, nperseg=round(4.0 / run.interval), axis=0)

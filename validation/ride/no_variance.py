@@ -26,7 +26,7 @@ def weighting_rows(seed: int) -> list[Row]:
     for name in ("Wk", "Wd"):
         deviation = stationary(weighted(excited(vehicle, road, 20.0), {"left occupant": name})).deviation[-1]
         integrals = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
-        at = [output.name for output in vehicle.outputs].index("left occupant")
+        at = vehicle.names.index("left occupant")
         rows.append(
             at_most(
                 f"ride_covariance.weighting.{name}",

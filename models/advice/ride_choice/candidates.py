@@ -191,4 +191,4 @@ class Candidates:
 
 def largest(changes: np.ndarray) -> np.ndarray:
     """Of changes (n, quantities) the largest of each quantity, with its sign."""
-    return np.asarray(changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])])
+    return changes[abs(changes).argmax(axis=0), np.arange(changes.shape[1])]

@@ -64,11 +64,11 @@ class March:
         plain = [
             names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row for row in self.rows
         ]
-        return np.asarray(self.reduced.system.C[plain, : self.reduced.states])
+        return self.reduced.system.C[plain, : self.reduced.states]
 
     def heard(self, states: np.ndarray) -> np.ndarray:
         """Quantities (q, ...), before their weightings, of states of vehicle and road (n + m, ...)."""
-        return np.asarray(self._read @ states)
+        return self._read @ states
 
     @cached_property
     def longest(self) -> float:
@@ -94,7 +94,7 @@ class March:
         heard = np.tensordot(seen, moved, 1) + np.tensordot(self._read[:, self.vehicle :], road, 1)
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = ((abs(heard) ** 2).sum(axis=2).reshape(len(seen), len(alike), -1) * count).sum(axis=1)
-        return np.asarray(np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi))
+        return np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi)
 
     def _alike(self, step: float) -> int:
         """Waves to either side up to which not all of them fall with their square."""

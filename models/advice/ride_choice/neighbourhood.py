@@ -98,7 +98,7 @@ class Neighbourhood:
         """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
         full = self.whole if factors is None else self.spectra(_off(self.scene, factors), self.speeds)
         left = self.spectra(_off(rest, factors or {}), self.speeds)
-        return np.asarray(np.sqrt(left.variances / full.variances) - 1.0)
+        return np.sqrt(left.variances / full.variances) - 1.0
 
     def corners(self, rest: ReducedScene) -> list[dict[Parameter, float]]:
         """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few
@@ -157,7 +157,7 @@ class Response:
         outputs = tuple(_less(a, b, Rows._fields) for a, b in zip(other.outputs, self.vehicle.outputs, strict=True))
         less = replace(_less(other, self.vehicle, matrices), outputs=outputs)
         (Z, B), (C, direct) = self._stiffness(less), self._outputs(less)
-        return np.asarray(C @ self.q + direct - self.back @ (Z @ self.q - B))
+        return C @ self.q + direct - self.back @ (Z @ self.q - B)
 
     def _asked(self, vehicle: LinearVehicle) -> LinearVehicle:
         """The vehicle with the outputs that are asked for."""
@@ -189,4 +189,4 @@ def _rates(vehicle: LinearVehicle) -> np.ndarray:
     right = np.block([[np.zeros((n, n)), np.eye(n)], [-vehicle.stiffness, -vehicle.damping]])
     rates = eigvals(right, left)
     rates = rates[np.isfinite(rates)]
-    return np.asarray(rates[abs(rates) < 1e9])
+    return rates[abs(rates) < 1e9]

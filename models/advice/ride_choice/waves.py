@@ -41,7 +41,7 @@ def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> n
     corners, V = np.linalg.eig(excitation.F)
     driven = np.linalg.solve(V, excitation.G + 0j)
     waves = 1j * omega[:, None] - speeds[:, None, None] * corners
-    return np.asarray(speeds[:, None, None, None] ** 0.5 * (V @ (driven / waves[..., None])))
+    return speeds[:, None, None, None] ** 0.5 * (V @ (driven / waves[..., None]))
 
 
 def at_axles(

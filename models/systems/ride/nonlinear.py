@@ -183,21 +183,21 @@ def ridden(
     model = build(engine, vehicle, settings, road.speed, table)
     zero = np.zeros(len(vehicle.coordinates()))
     run = model.run(zero, zero)
-    linear = linearise(vehicle, road.speed).outputs
+    linear = linearise(vehicle, road.speed)
     at = np.arange(int(np.ceil(skipped / road.step)), steps + 1, every)
     accelerations = np.array([model.acceleration(run.positions[i], run.rates[i], table[2 * i]) for i in at])
     rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
-    outputs = rows @ np.array([row_of(output) for output in linear]).T
+    outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.bent}
     pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
-    for spec, output, values in zip(vehicle.outputs, linear, outputs.T, strict=True):
+    for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
         if spec.kind == "force" and spec.part in bent:
             values[:] = np.nan
         elif spec.kind == "tyre force" and spec.tyre in pushing:
             elastic = rows @ row_of(replace(output, rate=0.0 * output.rate, road_rate=0.0 * output.road_rate))
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
-    return Ride(tuple(output.name for output in linear), run, at * road.step - at[0] * road.step, outputs)
+    return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs)
 
 
 def row_of(output: Output) -> np.ndarray:

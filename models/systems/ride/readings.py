@@ -42,8 +42,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         variances(linear, partial(spectral_matrix, each, placed), speed, low, SHORTEST)
         for each in (road, isotropic_like(road, y))
     )
-    names = [output.name for output in vehicle.outputs]
-    pairs = zip(names, of_road, of_isotropic, strict=True)
+    pairs = zip(linear.names, of_road, of_isotropic, strict=True)
     return {name: float(np.sqrt(isotropic / own) - 1.0) for name, own, isotropic in pairs if own > 0}
 
 
