@@ -85,6 +85,11 @@ def spectra(
     return (abs(turned.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
+def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
+    """One-sided densities (n, p) over the frequency (Hz)."""
+    return 4 * np.pi * spectra(vehicle, excitation, speed, 2 * np.pi * frequency)
+
+
 def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
     """Outputs by heights (n, p, w), the weighted ones in place of their own."""
     whole = transfer(vehicle, omega)

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.ride.frequency import spectra, standard_errors
+from models.ride.frequency import one_sided, standard_errors
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import promised, statistically_linear
 from models.road.excitation import Excitation
@@ -140,22 +140,15 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
     return rows, _spectra(runs, linear, excitation_)
 
 
-def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation_: Excitation) -> dict[str, Any]:
+def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
     """One-sided densities over Hz of shown outputs: the covariance's own, and each engine's by Welch's method."""
-    from scipy.signal import welch
-
     frequency = np.geomspace(0.2, 40.0, 300)
-    own = 4.0 * np.pi * spectra(linear, excitation_, SPEED, 2.0 * np.pi * frequency)
-    names = linear.names
-    shown = {"frequency": frequency.tolist(), "own": {name: own[:, names.index(name)].tolist() for name in SHOWN}}
-    for engine, run in runs.items():
-        f, density = welch(run.outputs, 1.0 / run.interval, nperseg=round(4.0 / run.interval), axis=0)
-        keep = (f > 0.4) & (f <= frequency[-1])  # below, leakage of the windows
-        shown[engine] = {
-            "frequency": f[keep].tolist(),
-            **{name: density[keep, names.index(name)].tolist() for name in SHOWN},
-        }
-    return shown
+    sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
+    sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
+    return {
+        side: {"frequency": f.tolist(), **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN}}
+        for side, (f, density) in sides.items()
+    }
 
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -178,7 +171,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
                 linewidth=width,
                 label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
             )
-        axis.loglog(shown["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
+        axis.loglog(shown["own"]["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
         top = max(shown["own"][name])
         axis.set(title=name.capitalize(), ylabel=f"one-sided density [{unit}]", ylim=(1e-5 * top, 5 * top))
     for axis in axes[1]:

@@ -160,6 +160,17 @@ class Ride:
         """Time (s) from one row of outputs to the next."""
         return float(self.times[1] - self.times[0])
 
+    def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (f,) in Hz and one-sided densities (f, p) of the outputs by Welch's method.
+
+        They end at ``highest`` (Hz), and begin where windows no longer leak.
+        """
+        from scipy.signal import welch
+
+        f, density = welch(self.outputs, 1 / self.interval, nperseg=round(4 / self.interval), axis=0)
+        shown = (f > 0.4) & (f <= highest)
+        return f[shown], density[shown]
+
 
 def ridden(
     engine: str,
