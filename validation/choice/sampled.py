@@ -9,7 +9,7 @@ The covariance S(a - b) of f(a) and f(b) is exact, so that of x_i with f and of 
 In the motions of the vehicle R is diagonal.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,9 +23,10 @@ SHARES = (0.0, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Sampled:
-    """Runs of ``march``, whose quantities have no weightings."""
+    """Runs of ``march``, whose quantities have no weightings, in steps (s)."""
 
     march: March
+    step: float = 0.0
 
     @property
     def longest(self) -> float:
@@ -35,23 +36,11 @@ class Sampled:
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities at the steps (s) of a run."""
         assert not self.march.weightings
-        return _Steps(self.march, step).deviations()
-
-
-@dataclass(frozen=True)
-class _Steps:
-    """A run of ``march`` in steps (s)."""
-
-    march: March
-    step: float
-
-    def deviations(self) -> np.ndarray:
-        """Standard deviations (q,) of the quantities."""
-        axles = range(len(self._delays))
+        run, axles = replace(self, step=step), range(len(self._delays))
         total = np.zeros(len(self.march.rows))
         for i in axles:
             for j in [i] if self.march.reduced.excitation.independent else axles:
-                total += self._shared(i, j)
+                total += run._shared(i, j)
         return np.sqrt(total)
 
     def _shared(self, i: int, j: int) -> np.ndarray:
