@@ -97,7 +97,7 @@ def has_closed_form(scene: Any) -> bool:
     """Whether a scene's choice needs no runs."""
     if scene.system != "ride":
         return False
-    from models.advice.ride_choice.in_time import goes_in_time
+    from models.systems.ride.of_scene import goes_in_time
 
     return not goes_in_time(scene)
 
@@ -135,11 +135,10 @@ def _linear(scene: Any) -> Found:
     """The same of a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
-    from models.systems.ride.of_scene import told_by, vehicle_of
-    from models.systems.ride.reduced_scene import Held
+    from models.systems.ride.of_scene import told_by
 
     with told_by(scene):
-        chooser = Linear(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)
+        chooser = Linear.of(scene)
         found = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls

@@ -1,6 +1,5 @@
 """Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +10,24 @@ import numpy as np
 from models.advice.choice.systems.ride import opened
 from models.advice.ride_choice.activity import activity
 from models.advice.ride_choice.choose import Choice, Chooser
-from models.advice.ride_choice.in_time import Samples, goes_in_time
+from models.advice.ride_choice.in_time import Samples
 from models.advice.ride_choice.reduced_files import SCENE, write
 from models.core.errors import InputError
+from models.core.result import Channel, result
 from models.core.strict import read
-from models.systems.ride.of_scene import told_by, vehicle_of
-from models.systems.ride.reduced_scene import Effect, Held, illegal
+from models.core.whole_files import write_whole
+from models.systems.ride.of_scene import goes_in_time, told_by
+from models.systems.ride.reduced_scene import Effect, illegal
 from models.systems.ride.scene import RideScene
 from studies.choice import told
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
+
+LOWEST, HIGHEST = 1e-4, 1e3
+"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+ELEMENTS = 12
+"""Elements whose activity is drawn, the most active first."""
 
 
 class Options(Samples):
@@ -54,16 +60,13 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Choose; saves ``effects.csv``, ``activity.csv``, a figure, files of what is left; by runs for bent springs."""
-    from studies.ride_choice_figure import choice_figure
-
+    """Choose, by runs for bent springs; saves ``choice.nc``, two CSV of it, a figure, files of what is left."""
     check(scene, engines)
     if goes_in_time(scene):
         return told([scene], engines, folder, progress)
-    assert scene.speeds is not None and scene.tolerance is not None
     progress("screening", 0.1)
     with told_by(scene):
-        chooser = Chooser(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)
+        chooser = Chooser.of(scene)
         choice = chooser.choose()
         progress("single effects", 0.7)
         further = chooser.further(frozenset(choice.left_out))
@@ -71,8 +74,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         watts = activity(chooser.wholes[len(chooser.wholes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
-    _save(scene, alone, choice, folder / "effects.csv")
-    _save_activity(watts, folder / "activity.csv")
+    _save(scene, alone, choice, watts, folder)
     choice_figure(scene, alone, choice, watts, folder / "choice.png")
     return {
         "scene": scene.title,
@@ -114,22 +116,77 @@ def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> d
     }
 
 
-def _save(scene: RideScene, alone: list[Alone], choice: Choice, path: Path) -> None:
-    """A row per effect: what leaving it out alone changes, predicted and confirmed, and whether it was left out."""
-    with path.open("x", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        heads = [f"{name}, {kind} [-]" for name in scene.quantities for kind in ("predicted", "confirmed")]
-        writer.writerow(["effect", "left out", *heads, "not alone because"])
-        for one in alone:
-            values = np.column_stack([one.predicted, one.confirmed]).ravel().tolist()
-            writer.writerow([one.effect.name, one.effect in choice.left_out, *map(repr, values), one.illegal])
+def _save(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str, float], folder: Path) -> None:
+    """What leaving out each effect alone changes, predicted and confirmed, and whether it was left out; a CSV of these
+    and one of the energy activity of every element beside."""
+    import pandas as pd
+
+    told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in alone]}
+    changes = {
+        part: np.array([getattr(each, part) for each in alone]).reshape(-1, len(scene.quantities))
+        for part in ("predicted", "confirmed")
+    }
+    effects, why = [each.effect.name for each in alone], [each.illegal for each in alone]
+    channels = {part: Channel(("effect", "quantity"), values, "1") for part, values in changes.items()}
+    channels |= {"left_out": Channel("effect", told["left out"]), "not_alone_because": Channel("effect", why)}
+    axes = {"effect": effects, "quantity": list(scene.quantities), "element": list(watts)}
+    saved = result(
+        scene,
+        channels | {"activity": Channel("element", list(watts.values()), "W", "energy activity")},
+        {name: Channel(name, values) for name, values in axes.items()},
+        engine="reference",
+        counts={"confirmations": choice.rounds},
+    )
+    saved.save(folder / "choice.nc")
+    told |= {
+        f"{name}, {part} [-]": values[:, i]
+        for i, name in enumerate(scene.quantities)
+        for part, values in changes.items()
+    }
+    table = pd.DataFrame(told | {"not alone because": why}, pd.Index(effects, name="effect"))
+    write_whole(folder / "effects.csv", table.to_csv(na_rep="nan"))
+    activities = saved.data["activity"].to_pandas().rename("activity [W]")
+    write_whole(folder / "activity.csv", activities.to_csv(na_rep="nan"))
 
 
-def _save_activity(watts: dict[str, float], path: Path) -> None:
-    """Energy activity of every element."""
-    with path.open("x", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerows([["element", "activity [W]"], *([name, repr(value)] for name, value in watts.items())])
+def choice_figure(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str, float], path: Path) -> None:
+    """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
+    from models.drawing.figures import plt, save
+
+    names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
+    height = 1.6 + 0.3 * max(len(names) + 1, ELEMENTS)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, height), width_ratios=(1.6, 1))
+    y = np.arange(len(names) + 1)[::-1]
+    for i, name in enumerate(scene.quantities):
+        shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
+        for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
+            changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*alone, choice)]))
+            shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST), LOWEST, HIGHEST)
+            left.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
+    left.axvline(100 * (scene.tolerance or 0), color="#222222", ls="--", label="tolerance")
+    left.set(
+        xscale="log",
+        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        yticks=y,
+        yticklabels=[*names, "all that is left out"],
+        xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
+        title="What leaving out an effect changes",
+    )
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)
+    _activity(right, watts)
+    figure.suptitle(scene.title)
+    save(figure, path)
+
+
+def _activity(axis: Any, watts: dict[str, float]) -> None:
+    """Shares of the finite ones; an inertia under white noise has none."""
+    finite = {name: value for name, value in watts.items() if np.isfinite(value)}
+    total = sum(finite.values())
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
+    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
+    without = [name for name in watts if name not in finite]
+    note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
+    axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")
 
 
 def percent(value: float) -> str:

@@ -9,17 +9,14 @@ from pydantic import Field
 
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from models.ride.varying_speed import VaryingSpeed, quasi_stationary, varying_speed
-from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, told_by, vehicle_of
+from models.ride.varying_speed import VaryingSpeed
+from models.systems import run as run_scene
+from models.systems.ride.of_scene import check_linear, vehicle_of
+from models.systems.ride.readings import quasi_stationary_gaps
 from models.systems.ride.scene import RideScene
-from models.vehicles.spatial_linear import wheels
 
 SYSTEM = "ride"
 Progress = Callable[[str, float], None]
-SPEEDS = 90
-"""Speeds at which the quasi-stationary answer is computed, from standstill on; straight between them."""
-ANY = 1.0
-"""m/s: the matrices of vehicles that this study takes are the same at every speed."""
 
 
 class Options(Strict):
@@ -48,29 +45,21 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     from studies.ride_figures import drive_figure
 
     check(scene, engines)
-    assert scene.drive is not None
     vehicle, engine = vehicle_of(scene), engines[0]
-    progress(f"drive, linear vehicle of {engine}", 0.1)
-    linear, road = linear_vehicle(vehicle, engine)(ANY), excitation_of(scene, wheels(vehicle))
-    with told_by(scene):
-        first = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=scene.weighting)
-        progress("each speed by itself", 0.4)
-        speeds = np.linspace(0.0, first.speed.max(), SPEEDS)
-        each = quasi_stationary(linear, road, speeds, weightings=scene.weighting)
-    alone = np.column_stack([np.interp(first.speed, speeds, column) for column in each.T])
-    own = _units(scene)
-    units = [unit for _, unit in own] + ["m/s^2"] * len(scene.weighting)
-    _save(scene, first, alone, units, folder / "drive.nc")
-    names = [output.name for output in vehicle.outputs]
-    shown = [o.name for o in vehicle.outputs if o.kind in ("acceleration", "tyre force")]
-    shown = _options(scene).outputs or shown or names
-    drive_figure(first, alone, shown, {o.name: (o.kind, u) for o, u in own}, scene.title, folder / "drive.png")
+    progress(f"drive, linear vehicle of {engine}, and each speed by itself", 0.1)
+    result = run_scene(scene, engine)
+    result.save(folder / "drive.nc")
+    drive, alone, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
+    kinds = {output.name: (output.kind, unit) for output, unit in zip(vehicle.outputs, units, strict=False)}
+    shown = [name for name, (kind, _) in kinds.items() if kind in ("acceleration", "tyre force")]
+    shown = _options(scene).outputs or shown or list(kinds)
+    drive_figure(drive, alone, shown, kinds, scene.title, folder / "drive.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": _answer(first, alone),
-        "table": [f"  linear vehicle of {engine}", *_table(first, alone, units)],
+        "answer": _answer(drive, alone),
+        "table": [f"  linear vehicle of {engine}", *_table(drive, alone, units)],
     }
 
 
@@ -78,65 +67,31 @@ def _options(scene: RideScene) -> Options:
     return read(Options, scene.options, scene.file, "options")
 
 
-def _units(scene: RideScene) -> list[tuple[Any, str]]:
-    vehicle = vehicle_of(scene)
-    linear = linear_vehicle(vehicle)(ANY)
-    return [(output, own.unit) for output, own in zip(vehicle.outputs, linear.outputs, strict=True)]
-
-
-def _save(scene: RideScene, found: VaryingSpeed, alone: np.ndarray, units: list[str], path: Path) -> None:
-    import xarray as xr
-
-    from models.core.result import provenance, write
-
-    axes = ("time", "output")
-    data = xr.Dataset(
-        {
-            "deviation": (axes, found.deviation),
-            "quasi_stationary": (axes, alone),
-            "speed": ("time", found.speed, {"units": "m/s"}),
-            "path": ("time", found.path, {"units": "m"}),
-        },
-        {"time": ("time", found.time, {"units": "s"}), "output": list(found.names)},
-    )
-    data["unit"] = ("output", units)
-    data.attrs = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    write(data, path)
-
-
-def _gaps(found: VaryingSpeed, alone: np.ndarray) -> np.ndarray:
-    """Error (N, p) of the quasi-stationary answer by the largest deviation of the drive; 0 where there is none."""
-    both = np.isfinite(alone) & np.isfinite(found.deviation)
-    largest = np.where(both, found.deviation, 0.0).max(axis=0)
-    gaps = np.where(both, alone, 0.0) - np.where(both, found.deviation, 0.0)
-    return gaps / np.where(largest > 0, largest, 1.0)
-
-
-def _answer(found: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
-    gaps = _gaps(found, alone)
-    finite = np.isfinite(found.deviation).all(axis=0)
+def _answer(drive: VaryingSpeed, alone: np.ndarray) -> dict[str, Any]:
+    gaps = quasi_stationary_gaps(drive, alone)
+    finite = np.isfinite(drive.deviation).all(axis=0)
     worst = [float(gaps[np.abs(gaps[:, i]).argmax(), i]) if finite[i] else None for i in range(len(finite))]
     return {
         name: {"largest error of the quasi-stationary answer": value}
-        for name, value in zip(found.names, worst, strict=True)
+        for name, value in zip(drive.names, worst, strict=True)
     }
 
 
-def _table(found: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str]:
+def _table(drive: VaryingSpeed, alone: np.ndarray, units: list[str]) -> list[str]:
     """Largest deviation of each output, and where taking each speed by itself is most wrong."""
-    heads = [f"{name} [{unit}]" for name, unit in zip(found.names, units, strict=True)]
+    heads = [f"{name} [{unit}]" for name, unit in zip(drive.names, units, strict=True)]
     width = max(map(len, heads))
     lines = [f"    {'':<{width}}{'largest':>12}{'at [s]':>8}   each speed by itself is most wrong, % of the largest"]
-    gaps = _gaps(found, alone)
+    gaps = quasi_stationary_gaps(drive, alone)
     for i, name in enumerate(heads):
-        own = found.deviation[:, i]
-        if not np.isfinite(own).all():
-            lines.append(f"    {name:<{width}}{found.status[i]:>12}")
+        deviation = drive.deviation[:, i]
+        if not np.isfinite(deviation).all():
+            lines.append(f"    {name:<{width}}{drive.status[i]:>12}")
             continue
-        top, worst = int(own.argmax()), int(np.abs(gaps[:, i]).argmax())
+        top, worst = int(deviation.argmax()), int(np.abs(gaps[:, i]).argmax())
         lines.append(
-            f"    {name:<{width}}{own[top]:>12.4g}{found.time[top]:>8.2f}   by {100 * gaps[worst, i]:+.1f} % "
-            f"at {found.time[worst]:.2f} s, {found.speed[worst]:.1f} m/s"
+            f"    {name:<{width}}{deviation[top]:>12.4g}{drive.time[top]:>8.2f}   by {100 * gaps[worst, i]:+.1f} % "
+            f"at {drive.time[worst]:.2f} s, {drive.speed[worst]:.1f} m/s"
         )
     return lines
 

@@ -5,13 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drawing.figures import plt, save
+from models.drawing.figures import COLOURS as ENGINES
+from models.drawing.figures import LABELS, plt, save
+from models.ride.frequency import one_sided
+from models.ride.statistical_linearisation import GRADES
 from models.ride.sweep import Sweep
 from models.ride.varying_speed import VaryingSpeed
 from models.road.excitation import Excitation
 from models.road.fitted import FittedRoad
 from models.road.isotropic import isotropic_like
 from models.road.two_track import TwoTrackRoad
+from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
@@ -32,21 +36,12 @@ def along_figure(
             right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
-    left.set(
-        xlabel="x forward [m]  (grey: axles)",
-        ylabel="standard deviation [m/s²]",
-        ylim=(0, None),
-        title=f"Vertical acceleration along the body at {speed:g} m/s",
-    )
-    right.set(
-        xlabel="speed [m/s]",
-        ylabel="standard deviation [m/s²]",
-        ylim=(0, None),
-        title=f"At {name!r} over speed" if name else "",
-    )
+    left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body at {speed:g} m/s")
+    right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
+    for axis in (left, right):
+        axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
     left.legend(title="the axles' and tracks' roads")
-    figure.suptitle(f"{title}: which correlations of the road matter where", fontsize=11)
-    save(figure, path)
+    _save(figure, f"{title}: which correlations of the road matter where", path)
 
 
 def _middle(vehicle: SpatialVehicle) -> str:
@@ -59,8 +54,6 @@ def _middle(vehicle: SpatialVehicle) -> str:
 
 
 NONE = "\n(no finite variance)"
-PANELS = 2
-"""Side by side."""
 
 
 def outputs_figure(
@@ -68,10 +61,9 @@ def outputs_figure(
 ) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
     panels = list(dict.fromkeys(kinds))
-    rows = -(-len(panels) // PANELS)
-    figure, axes = plt.subplots(rows, PANELS, figsize=(12, 3.6 * rows), squeeze=False)
-    for axis, (kind, si) in zip(axes.ravel(), panels, strict=False):
-        unit, factor = ("mm", 1e3) if si == "m" else (_written(si), 1.0)
+    figure, axes = _panels(len(panels), 2, (6.0, 3.6))
+    for axis, (kind, si) in zip(axes, panels, strict=True):
+        unit, factor = _shown_unit(si)
         unit = "share of the static load" if kind == "tyre force" else unit
         names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
         curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
@@ -80,15 +72,17 @@ def outputs_figure(
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
-        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    for axis in axes.ravel()[len(panels) :]:
-        axis.remove()
-    figure.suptitle(f"{title}: standard deviations over speed", fontsize=11)
-    save(figure, path)
+        _name_beside(axis)
+    _save(figure, f"{title}: standard deviations over speed", path)
 
 
 def _written(unit: str) -> str:
     return unit.replace("^2", "²")
+
+
+def _shown_unit(unit: str) -> tuple[str, float]:
+    """A unit as it is drawn, and the factor of what is drawn in it."""
+    return ("mm", 1e3) if unit == "m" else (_written(unit), 1.0)
 
 
 def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -107,26 +101,23 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
-    from models.ride.frequency import spectra
-
     frequency = np.geomspace(0.1, 100.0, 800)
-    found = 4 * np.pi * spectra(linear, excitation, speed, 2 * np.pi * frequency)  # one-sided, over Hz
-    moved = {output.kind for i, output in enumerate(linear.outputs) if found[:, i].any()}
+    densities = one_sided(linear, excitation, speed, frequency)
+    moved = {output.kind for i, output in enumerate(linear.outputs) if densities[:, i].any()}
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
     if not shown:
         return
     figure, axes = plt.subplots(1, len(shown), figsize=(6.2 * len(shown), 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
-        curves = {output.name: found[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
+        curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
         for label, values in _distinct(curves).items():
             axis.loglog(frequency, values, label=label)
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
-        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.suptitle(f"{title}: spectra at {speed:g} m/s", fontsize=11)
-    save(figure, path)
+        _name_beside(axis)
+    _save(figure, f"{title}: spectra at {speed:g} m/s", path)
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: str, path: Path) -> None:
@@ -146,8 +137,7 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: 
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency", ylim=(0, 1.05), title="Left and right track")
     left.legend(), right.legend(fontsize=8)
-    figure.suptitle(f"{title}: the road", fontsize=11)
-    save(figure, path)
+    _save(figure, f"{title}: the road", path)
 
 
 def detail_figure(
@@ -200,8 +190,89 @@ def drive_figure(
             (line,) = axis.plot(found.time, exact, label=label)
             axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
-        axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        _name_beside(axis)
     axes[-1, 0].plot(found.time, found.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    figure.suptitle(f"{title}\nsolid: exact; dashed: each speed taken by itself", fontsize=11)
+    _save(figure, f"{title}\nsolid: exact; dashed: each speed taken by itself", path)
+
+
+MOST = 12
+"""Outputs that a figure shows."""
+
+
+def nonlinear_figure(answer: Nonlinear, title: str, path: Path) -> None:
+    """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
+    outputs = answer.shown.vehicle.outputs
+    figure, axes = _few(min(len(outputs), MOST))
+    left = answer.of("left_out")
+    for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
+        unit, factor = _shown_unit(output.unit)
+        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color="0.6", label="slopes at rest (small motion)")
+        told = "statistical linearisation" + (", tyres on the road" if answer.lifts else "")
+        deviation, poor = factor * answer.deviation[:, i], left[:, i] > GRADES[-1][0]
+        axis.plot(answer.speeds, deviation, color=COLOURS[1], label=told)
+        told = "no longer good by its own measure"
+        axis.plot(answer.speeds[poor], deviation[poor], "o", color=COLOURS[1], fillstyle="none", label=told)
+        for j, (speed, copies) in enumerate(answer.copies.items()):
+            spread = copies.error[i] / copies.deviation[i]  # two standard errors of the deviation
+            axis.errorbar(
+                [speed],
+                [factor * copies.deviation[i]],
+                [factor * spread],
+                fmt="s",
+                color="#d55e00",
+                markersize=4,
+                capsize=3,
+                label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.lifts else ""),
+            )
+        axis.set(
+            xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
+        )
+    axes[0].legend(fontsize=7.5)
+    _save(figure, f"{title}\nStandard deviations over speed", path)
+
+
+def engine_spectra_figure(
+    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, title: str, path: Path
+) -> None:
+    """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
+    frequency = np.geomspace(0.3, 40.0, 300)
+    expected = one_sided(linear, road, speed, frequency)
+    first = next(iter(runs.values()))
+    shown = [i for i in range(len(linear.outputs)) if np.isfinite(first.outputs[:, i]).all()][:MOST]
+    figure, axes = _few(len(shown))
+    for axis, i in zip(axes, shown, strict=True):
+        for (engine, run), (line, width) in zip(runs.items(), (("-", 2.2), ("--", 1.0)), strict=False):
+            f, density = run.densities(frequency[-1])
+            label = f"{LABELS[engine]}, nonlinear in time"
+            axis.loglog(f, density[:, i], line, linewidth=width, color=ENGINES[engine], label=label)
+        axis.loglog(frequency, expected[:, i], "k", label="statistical linearisation")
+        output, top = linear.outputs[i], expected[:, i].max()
+        unit = f"one-sided density [({_written(output.unit)})²/Hz]"
+        axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
+    axes[0].legend(fontsize=7.5)
+    _save(figure, f"{title}\nSpectra at {speed:g} m/s", path)
+
+
+def _panels(count: int, wide: int, size: tuple[float, float]) -> tuple[plt.Figure, list[plt.Axes]]:
+    """A figure of this many panels, ``wide`` of them beside each other, of a size (inches) each."""
+    high = -(-count // wide)
+    figure, axes = plt.subplots(high, wide, figsize=(size[0] * wide, size[1] * high), squeeze=False)
+    for axis in axes.ravel()[count:]:
+        axis.remove()
+    return figure, list(axes.ravel()[:count])
+
+
+def _few(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
+    """Two or three small panels beside each other."""
+    return _panels(count, 2 if count in (1, 2, 4) else 3, (4.6, 3.4))
+
+
+def _name_beside(axis: plt.Axes) -> None:
+    """The legend beside a panel."""
+    axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _save(figure: plt.Figure, title: str, path: Path) -> None:
+    figure.suptitle(title, fontsize=11)
     save(figure, path)

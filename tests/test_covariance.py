@@ -8,8 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.frequency import quadrature, spectra
 from models.ride.marginal import Unstable, parts
 from models.ride.sweep import ASKED, sweep
@@ -19,7 +18,7 @@ from models.road.two_track import CASES, excitation, road_of_level
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.ride_corners import corners
+from validation.ride.rides import corners
 
 CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
 Q = 1e-4

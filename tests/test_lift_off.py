@@ -24,7 +24,7 @@ from models.systems.pitch_plane.effects import lift_off
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.pitch_plane.scene import settings_of
-from models.systems.ride.in_engines import ridden
+from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import check_linear, excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
 from models.vehicles import pitch_plane_equations

@@ -21,9 +21,10 @@ from models.systems.contact.run import Built, contact
 from models.systems.contact.run import run as run_contact
 from models.systems.contact.scene import build as build_contact
 from models.systems.handling.in_engines import driven, unaccounted
-from models.systems.ride.in_engines import ridden
+from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
-from models.systems.ride.reduced_scene import Held, effects_of, illegal
+from models.systems.ride.omissions import effects_of
+from models.systems.ride.reduced_scene import ReducedScene, illegal
 from models.systems.ride.reduced_scene import without as without_effects
 from models.systems.ride.scene import build as build_ride
 from models.vehicles.spatial_linear import wheels
@@ -247,13 +248,13 @@ def test_new_effects_of_ride_are_priced_and_chosen_among(new_file, monkeypatch):
     new_file("ride", DAMPERS.name, DAMPERS.text)
     new_file("ride", "tread", NEW["ride"].text.replace("COST", 'NEEDS = ("delay", "dampers")\nCOST', 1))
     scene = load(SCENES / "ride_choice.toml")
-    held = Held(own := beside(scene, "dampers", "tread"), vehicle_of(own))
+    held = ReducedScene.whole(own := beside(scene, "dampers", "tread"))
     there = {effect.name: effect for effect in effects_of(held)}
     assert {"dampers", "tread"} <= there.keys() and there["delay front to rear"].needs == ("tread",)
     assert "cannot be left out alone: leave out tread, too, for it needs it" in illegal([there["dampers"]])
     whole = Whole(held, 20.0)
     rest = whole.reduced(without_effects(held, [there["dampers"], there["tyre damping"], there["tread"]]))
-    other = Held(scene, vehicle_of(scene))
+    other = ReducedScene.whole(scene)
     known = Whole(other, 20.0).reduced(without_effects(other, [there["tyre damping"]]))
     assert np.abs(rest.system.A - known.system.A).max() < 1e-12 * np.abs(known.system.A).max()
     monkeypatch.setattr(effects_of_ride, "STEPS", 20)

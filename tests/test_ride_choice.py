@@ -8,8 +8,7 @@ import pytest
 import xarray
 
 from models.advice.ride_choice.choose import Chooser
-from models.advice.ride_choice.cost import stable_step
-from models.advice.ride_choice.march import March
+from models.advice.ride_choice.march import March, stable_step
 from models.advice.ride_choice.marched import confirms, marched
 from models.advice.ride_choice.neighbourhood import Neighbourhood, changed
 from models.advice.ride_choice.reduced import Whole
@@ -18,13 +17,13 @@ from models.core.errors import InputError
 from models.engines.spatial_protocol import build as build_engine
 from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.systems.ride.of_scene import vehicle_of
-from models.systems.ride.reduced_scene import Held, effects_of, illegal, without
+from models.systems.ride.omissions import effects_of
+from models.systems.ride.reduced_scene import ReducedScene, illegal, without
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from studies.asked import SCENES
-from validation.choice.nearby import measured_step, worst_nearby
+from validation.choice.judged import measured_step, worst_nearby
 from validation.choice.sampled import Sampled
 from validation.ride.drawn_rides import drawn
 
@@ -37,7 +36,7 @@ def held(name="half_car", tyre_damping=0.0, **road):
     )
     vehicle = load_vehicle(name)
     tyres = tuple(replace(tyre, damping=tyre_damping) for tyre in vehicle.tyres)
-    return Held(scene, replace(vehicle, tyres=tyres))
+    return ReducedScene(scene, replace(vehicle, tyres=tyres))
 
 
 def named(scene):
@@ -74,16 +73,16 @@ def test_wheels_without_mass_are_the_limit_of_light_ones(name, small):
 
 def test_rigid_springs_and_locked_freedoms_are_limits():
     drew = drawn(2)  # a car with bushings; undamped tyres, for white noise never lets a stiff spring come to rest
-    tyres = tuple(replace(tyre, damping=0.0) for tyre in drew.held.vehicle.tyres)
-    one = replace(drew, held=replace(drew.held, vehicle=replace(drew.held.vehicle, tyres=tyres)))
-    own = named(one.held)
+    tyres = tuple(replace(tyre, damping=0.0) for tyre in drew.scene.vehicle.tyres)
+    one = replace(drew, scene=replace(drew.scene, vehicle=replace(drew.scene.vehicle, tyres=tyres)))
+    own = named(one.scene)
     bush = next(name for name in own if name.startswith("bushings"))
     stiff = tuple(
         replace(s, stiffness=1e4 * s.stiffness, damping=1e2 * s.damping) if "bush" in s.name else s
-        for s in one.held.vehicle.springs
+        for s in one.scene.vehicle.springs
     )
-    limit = of_vehicle(one.held, replace(one.held.vehicle, springs=stiff))
-    found = deviations(one.held, bush)
+    limit = of_vehicle(one.scene, replace(one.scene.vehicle, springs=stiff))
+    found = deviations(one.scene, bush)
     told = np.isfinite(limit) & (limit > 1e-6)
     assert found[told] == pytest.approx(limit[told], rel=2e-3)  # compliance 1e-4 of a few per cent's effect
     scene = held()
@@ -167,7 +166,7 @@ def test_a_quantity_that_symmetry_silences_is_refused_not_held_to_its_rounding()
         },
         "t",
     )
-    own = Held(scene, vehicle_of(scene))
+    own = ReducedScene.whole(scene)
     with pytest.raises(InputError, match="finite standard deviation above zero"):
         Chooser(own, [SPEED], ["pitch acceleration"], 0.02)
     assert Chooser(own, [SPEED], ["body centre"], 0.02).choose().kept
@@ -215,7 +214,7 @@ def test_a_quantity_that_is_none(twinrig, capsys):
 def test_rounding_is_not_taken_for_white_noise():
     """Wheels without mass on rigid bushings: no noise of the road reaches the body, but 1e-18 of it by rounding."""
     drew = drawn(38, 0.02)
-    own = Chooser(drew.held, [drew.speed], drew.quantities, drew.tolerance)
+    own = Chooser(drew.scene, [drew.speed], drew.quantities, drew.tolerance)
     choice = own.choose()
     assert {"mass of all wheels", "bushings: fl bush"} <= {effect.name for effect in choice.left_out}
     assert choice.predicted == pytest.approx(choice.confirmed, rel=0.2) and choice.kept
@@ -247,7 +246,7 @@ def test_a_choice_whose_identity_is_not_exact_is_not_taken(monkeypatch):
 def drawn_speeds(seed):
     """A scene of a detailed vehicle, with what its choice leaves out as far as the tolerance of 2 % allows."""
     drew = drawn(seed, 0.02)
-    chooser = Chooser(drew.held, [0.7 * drew.speed, drew.speed, 1.3 * drew.speed], drew.quantities, drew.tolerance)
+    chooser = Chooser(drew.scene, [0.7 * drew.speed, drew.speed, 1.3 * drew.speed], drew.quantities, drew.tolerance)
     return chooser, chooser.choose()
 
 
@@ -262,14 +261,14 @@ def test_the_tolerance_holds_between_speeds_and_with_parameters_off():
 
 def test_spectra_near_a_scene_are_those_of_the_exact_solve():
     drew = drawn(2)
-    rest = without(drew.held, [named(drew.held)["springs of part on body"]])
-    rows = [[output.name for output in drew.held.vehicle.outputs].index(name) for name in drew.quantities]
-    near = Neighbourhood(drew.held, np.array([10.0, 30.0]), [(row, "") for row in rows])
+    rest = without(drew.scene, [named(drew.scene)["springs of part on body"]])
+    rows = [[output.name for output in drew.scene.vehicle.outputs].index(name) for name in drew.quantities]
+    near = Neighbourhood(drew.scene, np.array([10.0, 30.0]), [(row, "") for row in rows])
     corner = near.corners(rest)[0]
     for factors in ({}, corner):
         found = near.changes(rest, factors)
         for i in (0, len(near.speeds) // 2):
-            full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (drew.held, rest))
+            full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (drew.scene, rest))
             whole = Whole(full, float(near.speeds[i]))
             exact = np.sqrt(confirmed(whole.reduced(left), rows) / confirmed(whole.full, rows)) - 1
             assert found[i] == pytest.approx(exact, abs=2e-4)  # what the panels leave
@@ -300,7 +299,7 @@ def test_two_closed_forms_of_runs_agree(road):
         step = share * march.longest
         assert Sampled(march).deviations(step) == pytest.approx(march.deviations(step), rel=1e-3)
     late = replace(march, reduced=replace(march.reduced, excitation=further(march.reduced.excitation)))
-    if scene.scene.road.front_rear == "delayed":
+    if scene.ride.road.front_rear == "delayed":
         assert Sampled(late).deviations(step) != pytest.approx(march.deviations(step), rel=3e-3)
 
 

@@ -17,11 +17,11 @@ from models.advice.price.effects_text import lines
 from models.advice.ride_choice.in_time import FEWEST, left
 from models.core.errors import InputError
 from models.ride.statistical_linearisation import bent
-from models.systems.ride.reduced_scene import Held
+from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.drawn_bent_rides import drawn_bent
+from validation.ride.drawn_rides import drawn_bent
 
 LAWS = ("curves over rate", "curves over travel", "friction")
 
@@ -85,7 +85,7 @@ def test_a_mount_that_is_left_out_seats_its_body_on_the_other():
     vehicle = load_vehicle("r19_ride")
     names = frozenset(spring.name for spring in vehicle.springs if spring.one == "engine")
     scene = quarter_car(vehicle={"file": "r19_ride"}, quantities=["body centre"])
-    found = left(Held(scene, vehicle, rigid=names), {})
+    found = left(ReducedScene(scene, vehicle, rigid=names), {})
     assert len(found.coordinates()) == len(vehicle.coordinates()) - 6
     before, after = (linearise(own) for own in (vehicle, found))
     mass = sum(body.mass for body in vehicle.bodies if body.name in ("engine", "body"))

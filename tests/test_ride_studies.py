@@ -11,11 +11,11 @@ import pytest
 from models.core.errors import InputError
 from models.ride.export import state_space
 from models.ride.measures import exceedances, share_beyond
+from models.systems.ride import nonlinear
 from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import build
 from models.vehicles.curve import Curve
 from models.vehicles.spatial_linear import wheels
-from studies import ride_nonlinear
 from studies.asked import load_scene
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
@@ -278,8 +278,16 @@ def test_engines_follow_springs_where_they_are_steep(monkeypatch):
     (spring,) = own.springs
     steep = replace(own, springs=(replace(spring, travel_force=Curve((0.04, 0.06, 0.061), (0.0, 0.0, 2e4))),))
     steps = []
-    monkeypatch.setattr(ride_nonlinear, "ridden", lambda engine, vehicle, path, *rest, **more: steps.append(path.step))
-    road = excitation_of(scene, wheels(own))
+
+    class Ridden(Exception):
+        """Enough is known."""
+
+    def ridden(engine, vehicle, path, *rest, **more):
+        steps.append(path.step)
+        raise Ridden
+
+    monkeypatch.setattr(nonlinear, "ridden", ridden)
     for vehicle in (own, steep):
-        ride_nonlinear._in_engines(vehicle, road, 20.0, ("mujoco",), ride_nonlinear.Options(), lambda text, part: None)
+        with pytest.raises(Ridden):
+            nonlinear.in_engine(scene, "mujoco", vehicle, nonlinear.Sampling(speed=20.0))
     assert steps[0] == pytest.approx(2e-3) and steps[1] * 834.0 == pytest.approx(0.5, rel=0.01)

@@ -9,17 +9,18 @@ from models.core.errors import InputError, RunFailed
 from models.ride.copies_kernel import TOGETHER, march, rates
 from models.ride.covariance import stationary
 from models.ride.excited import excited
+from models.ride.frequency import standard_errors
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time, laws_of
 from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import GRADES, bent, promised, statistically_linear
-from models.ride.time_averages import standard_errors
 from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
-from models.systems.ride.in_engines import ridden
+from models.systems.ride.nonlinear import ridden
 from models.vehicles.curve import Curve
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation.cases.ride_nonlinear import NONLINEAR, expected, ride
+from validation.cases.ride_nonlinear import expected
+from validation.ride.in_engines import NONLINEAR, ride
 
 SPEED = 20.0
 

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 
 from models.core.errors import InputError
 from models.ride.covariance import stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.weighting import HEALTH, WEIGHTINGS, total_value, weighted
 
 DELAY = 0.13

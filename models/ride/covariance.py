@@ -11,12 +11,13 @@ Delays of zero make the axles one input; those without end make them independent
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from models.core.errors import InputError
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.marginal import ACCURACY, TOLD, Growth, Parts, growth, parts
 
 FINITE, INFINITE, DIFFUSING = "finite", "infinite", "diffusing"
@@ -57,19 +58,20 @@ def stationary(system: DelayedSystem, accuracy: float = ACCURACY) -> Covariance:
     Raises Unstable, with growth rate and frequency, if the system leaves its equilibrium on its own, and InputError
     where a variance cannot be told to UNCERTAIN of itself.
     """
-    B, D, delays = hits(system)
+    met = hits(system)
     split = parts(system.A, accuracy)
-    P, correction, residual = _stable(split, B, delays, system.independent)
+    onto_stable = met._replace(B=[(split.W @ b).astype(float) for b in met.B])
+    P, correction, residual = lyapunov(split.S, intensity(split.S, onto_stable))
     V = split.V
     if split.marginal:
-        P, correction, V = _with_marginal(split, B, delays, system.independent, P, correction)
+        P, correction, V = _with_marginal(split, met, onto_stable, P, correction)
     C = system.C @ V
     floor, change = silence(C, P), _seen(C, correction)
     variance = _seen(C, P)
     variance = np.where(variance > floor, variance, 0.0)
-    grown = growth(split, B, delays, system.C, system.independent, variance + floor, accuracy)
-    status, reason = verdicts(D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
-    finite = np.array([found == FINITE for found in status])
+    grown = growth(split, met.B, met.delays, system.C, met.independent, variance + floor, accuracy)
+    status, reason = verdicts(met.D, variance, floor, grown, float(np.linalg.norm(split.S)), accuracy, split)
+    finite = np.array(status) == FINITE
     error = np.divide(abs(change), variance, out=np.zeros(len(variance)), where=finite & (variance > 0))
     error += split.neglected
     if (error[finite] > UNCERTAIN).any():
@@ -95,44 +97,46 @@ def silence(C: np.ndarray, P: np.ndarray) -> np.ndarray:
     return np.asarray(np.maximum(CANCELLED * terms, SILENT * most) ** 2, float)
 
 
-def hits(system: DelayedSystem) -> tuple[list[np.ndarray], list[np.ndarray], list[float]]:
-    """B, D and delays of the instants at which noise arrives: axles that meet the same noise at once are one."""
+class Hits(NamedTuple):
+    """B (n, k), D (p, k) and delays (s) of the instants at which noise arrives; ``independent``: of its own each."""
+
+    B: list[np.ndarray]
+    D: list[np.ndarray]
+    delays: list[float]
+    independent: bool
+
+
+def hits(system: DelayedSystem) -> Hits:
+    """When noise arrives: axles that meet the same noise at once are one."""
     if system.independent:
-        return list(system.B), list(system.D), [0.0] * len(system.B)
+        return Hits([*system.B], [*system.D], [0.0] * len(system.B), True)
     delays = sorted(set(system.delays))
     at = [[i for i, delay in enumerate(system.delays) if delay == hit] for hit in delays]
-    B, D = ([np.sum([each[i] for i in own], axis=0) for own in at] for each in (system.B, system.D))
-    return B, D, delays
+    B, D = ([np.sum([each[i] for i in together], axis=0) for together in at] for each in (system.B, system.D))
+    return Hits(B, D, delays, False)
 
 
-def _responses(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> list[np.ndarray]:
+def _responses(A: np.ndarray, met: Hits) -> list[np.ndarray]:
     """F_j, the response just before each hit: zero for noise that no axle has met before."""
-    before = [np.zeros_like(B[0])]
-    for j in range(1, len(B)):
-        none = independent or len(A) == 0
-        before.append(np.zeros_like(B[0]) if none else expm(A * (delays[j] - delays[j - 1])) @ (before[-1] + B[j - 1]))
+    before = [np.zeros_like(met.B[0])]
+    for j in range(1, len(met.B)):
+        none = met.independent or len(A) == 0
+        step = met.delays[j] - met.delays[j - 1]
+        before.append(np.zeros_like(met.B[0]) if none else expm(A * step) @ (before[-1] + met.B[j - 1]))
     return before
-
-
-def _stable(
-    split: Parts, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Covariance of the stable part, its last correction, and the residual that is left."""
-    return lyapunov(split.S, intensity(split.S, [(split.W @ b).astype(float) for b in B], delays, independent))
 
 
 def noise_of(system: DelayedSystem) -> np.ndarray:
     """``intensity`` of a system's own noise, in double precision."""
-    B, _, delays = hits(system)
-    return intensity(system.A, B, delays, system.independent).astype(float)
+    return intensity(system.A, hits(system)).astype(float)
 
 
-def intensity(A: np.ndarray, B: Sequence[np.ndarray], delays: Sequence[float], independent: bool) -> np.ndarray:
+def intensity(A: np.ndarray, met: Hits) -> np.ndarray:
     """Q (n, n) of A P + P A' + Q = 0: what the noise of all hits adds to the covariance per second, delays exact.
 
     Squares in extended precision: where two axles' noises cancel in an output, so do the squares of their rounding.
     """
-    before, at = ([each.astype(np.longdouble) for each in own] for own in (_responses(A, B, delays, independent), B))
+    before, at = ([each.astype(np.longdouble) for each in part] for part in (_responses(A, met), met.B))
     return np.asarray(sum(b @ b.T + f @ b.T + b @ f.T for f, b in zip(before, at, strict=True)))
 
 
@@ -190,30 +194,27 @@ is enough but where a motion hardly dies out; each takes as many digits off the 
 
 
 def _with_marginal(
-    split: Parts,
-    B: Sequence[np.ndarray],
-    delays: Sequence[float],
-    independent: bool,
-    P: np.ndarray,
-    correction: np.ndarray,
+    split: Parts, met: Hits, onto_stable: Hits, P: np.ndarray, correction: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same for the whole state (marginal first), its correction and basis, motions that diffuse left out.
 
     A motion that does not diffuse lives from the first hit to the last: integrals over that window.
     """
-    k = split.marginal
-    G, H = [split.W0 @ b for b in B], [(split.W @ b).astype(float) for b in B]
-    before = _responses(split.M, G, delays, independent), _responses(split.S, H, delays, independent)
-    after = [[f + g for f, g in zip(*pair, strict=True)] for pair in ((before[0], G), (before[1], H))]
-    own, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
-    for j in range(0 if independent else len(B) - 1):
-        own += _window(split.M, after[0][j], delays[j + 1] - delays[j])
+    k, onto_marginal = split.marginal, met._replace(B=[split.W0 @ b for b in met.B])
+    before = _responses(split.M, onto_marginal), _responses(split.S, onto_stable)
+    after = [
+        [f + g for f, g in zip(*pair, strict=True)]
+        for pair in zip(before, (onto_marginal.B, onto_stable.B), strict=True)
+    ]
+    within, cross = np.zeros((k, k)), np.zeros((k, len(split.S)))
+    for j in range(0 if met.independent else len(met.B) - 1):
+        within += _window(split.M, after[0][j], met.delays[j + 1] - met.delays[j])
         cross += after[0][j] @ after[1][j].T - before[0][j + 1] @ before[1][j + 1].T
     if len(split.S):
         from control import lyap
 
         cross = lyap(split.M, split.S.T, cross, method="scipy")
-    whole = np.block([[own.astype(np.longdouble), cross], [cross.T, P]])
+    whole = np.block([[within.astype(np.longdouble), cross], [cross.T, P]])
     changed = np.zeros_like(whole)
     changed[k:, k:] = correction
     return whole, changed, np.hstack([split.V0, split.V])
@@ -223,8 +224,8 @@ def _window(M: np.ndarray, R: np.ndarray, length: float) -> np.ndarray:
     """Integral of e^(M s) R R' e^(M' s) from 0 to ``length`` by van Loan's block; M neither grows nor decays."""
     k = len(M)
     block = expm(np.block([[-M, R @ R.T], [np.zeros((k, k)), M.T]]) * length)
-    found = block[k:, k:].T @ block[:k, k:]
-    return (found + found.T) / 2
+    integral = block[k:, k:].T @ block[:k, k:]
+    return (integral + integral.T) / 2
 
 
 def _seen(C: np.ndarray, P: np.ndarray) -> np.ndarray:
@@ -253,8 +254,8 @@ def verdicts(
     """
     direct = sum((d**2).sum(axis=1) for d in D) * fastest
     white = direct > (TOLD * accuracy) ** 2 * variance + floor
-    found = [_verdict(*each, split) for each in zip(white, grown.rate, grown.power, strict=True)]
-    return tuple(status for status, _ in found), tuple(reason for _, reason in found)
+    each = [_verdict(*output, split) for output in zip(white, grown.rate, grown.power, strict=True)]
+    return tuple(status for status, _ in each), tuple(reason for _, reason in each)
 
 
 def _verdict(white: bool, rate: float, power: int, split: Parts | None) -> tuple[str, str]:

@@ -1,14 +1,38 @@
-"""A linear vehicle behind its road filters at a constant speed, as a system of first order with delays."""
+"""A linear vehicle behind its road filters at a constant speed: x' = A x + sum_i B_i w(t - tau_i), of first order.
+
+The axles meet the same white noise w one after the other. Some of the bodies may have no mass: with r the coordinates,
+a combinations of them that are inert, b that only dampers hold back (a state each) and e that only springs hold (no
+state),
+
+    M a'' + (D q' + K q)_a = (R z + S z')_a,   (D q' + K q)_b = (R z + S z')_b,   (K q)_e = (R z)_e.
+"""
 
 import math
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.core.errors import InputError
-from models.ride.delayed_system import DelayedSystem
-from models.ride.massless import first_order, singular
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
+
+
+@dataclass(frozen=True)
+class DelayedSystem:
+    """State, noise and outputs y = C x + sum_i D_i w(t - tau_i), w of unit intensity with k channels.
+
+    A (n, n); B, one (n, k) per axle; delays tau_i in s, the first 0, none falling; C (p, n); D, one (p, k) per axle.
+    ``independent`` axles meet noises that know nothing of one another; the delays then have no meaning.
+    """
+
+    A: np.ndarray
+    B: tuple[np.ndarray, ...]
+    delays: tuple[float, ...]
+    C: np.ndarray
+    D: tuple[np.ndarray, ...]
+    names: tuple[str, ...]
+    independent: bool = False
 
 
 def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> DelayedSystem:
@@ -22,46 +46,108 @@ def excited(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> Del
         raise InputError("", "speed", speed, "must be above 0, in m/s: at standstill no noise arrives")
     if singular(vehicle.mass):
         return first_order(vehicle, excitation, speed)[0]
-    n, axles = len(vehicle.mass), len(excitation.heights)
-    m, k = excitation.G.shape
-    size = 2 * n + axles * m
-    own = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
-    forced = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
-    by_height, by_rate = np.split(forced, 2, axis=1)
-    A = np.zeros((size, size))
+    n, (m, k), axles = len(vehicle.mass), excitation.G.shape, len(excitation.heights)
+    by_motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
+    by_road = np.linalg.solve(vehicle.mass, np.hstack([vehicle.road_stiffness, vehicle.road_damping]))
+    by_height, by_rate = np.split(by_road, 2, axis=1)
+    read, root = vehicle.read, speed**0.5
+    A = np.zeros((2 * n + axles * m,) * 2)
     A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n, : 2 * n] = own
-    B = []
-    for i, H in enumerate(excitation.heights):
-        at = slice(2 * n + i * m, 2 * n + (i + 1) * m)
+    A[n : 2 * n, : 2 * n] = by_motion
+    filters = [slice(first, first + m) for first in range(2 * n, len(A), m)]
+    B = [np.zeros((len(A), k)) for _ in range(axles)]
+    for at, H, noise in zip(filters, excitation.heights, B, strict=True):
         A[n : 2 * n, at] = by_height @ H + by_rate @ H @ excitation.F * speed
         A[at, at] = speed * excitation.F
-        noise = np.zeros((size, k))
-        noise[n : 2 * n] = speed**0.5 * by_rate @ H @ excitation.G
-        noise[at] = speed**0.5 * excitation.G
-        B.append(noise)
-    C, D = _outputs(vehicle, excitation, speed, A, B)
-    delays = tuple(length / speed for length in excitation.lengths)
-    names = tuple(output.name for output in vehicle.outputs)
-    return DelayedSystem(A, tuple(B), delays, C, D, names, excitation.independent)
-
-
-def _outputs(
-    vehicle: LinearVehicle, excitation: Excitation, speed: float, A: np.ndarray, B: list[np.ndarray]
-) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """C (p, n) and one D (p, k) per axle; what the noise reaches at once stands in D."""
-    n = len(vehicle.mass)
-    m = len(excitation.F)
-    of = {
-        key: np.array([getattr(output, key) for output in vehicle.outputs])
-        for key in ("acceleration", "rate", "displacement", "road", "road_rate")
-    }
-    C = of["acceleration"] @ A[n : 2 * n]
-    C[:, :n] += of["displacement"]
-    C[:, n : 2 * n] += of["rate"]
+        noise[n : 2 * n] = root * by_rate @ H @ excitation.G
+        noise[at] = root * excitation.G
+    C = read.acceleration @ A[n : 2 * n]
+    C[:, :n] += read.displacement
+    C[:, n : 2 * n] += read.rate
     D = []
-    for i, H in enumerate(excitation.heights):
-        at = slice(2 * n + i * m, 2 * n + (i + 1) * m)
-        C[:, at] += of["road"] @ H + speed * of["road_rate"] @ H @ excitation.F
-        D.append(of["acceleration"] @ B[i][n : 2 * n] + speed**0.5 * of["road_rate"] @ H @ excitation.G)
-    return C, tuple(D)
+    for at, H, noise in zip(filters, excitation.heights, B, strict=True):
+        C[:, at] += read.road @ H + speed * read.road_rate @ H @ excitation.F
+        D.append(read.acceleration @ noise[n : 2 * n] + root * read.road_rate @ H @ excitation.G)
+    return _system(vehicle, excitation, speed, A, B, C, D)
+
+
+def _system(
+    vehicle: LinearVehicle,
+    excitation: Excitation,
+    speed: float,
+    A: np.ndarray,
+    B: Iterable[np.ndarray],
+    C: np.ndarray,
+    D: Iterable[np.ndarray],
+) -> DelayedSystem:
+    delays = tuple(length / speed for length in excitation.lengths)
+    return DelayedSystem(A, tuple(B), delays, C, tuple(D), vehicle.names, excitation.independent)
+
+
+NOTHING = 1e-10
+"""Share of the largest inertia, damping or stiffness, scaled to a unit diagonal, below which there is none."""
+
+
+def singular(mass: np.ndarray) -> bool:
+    """Whether nothing inert moves with some motion."""
+    return bool(_split(mass)[1].size)
+
+
+def first_order(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float
+) -> tuple[DelayedSystem, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """The system with state (a, a', b, f), r by its state (n, x), and a and b by r; the mass may be singular.
+
+    C and D are without rounding; what would see the derivative of white noise has infinite D.
+    """
+    Y, Z = _split(vehicle.mass)
+    V, E = (Z @ part for part in _split(Z.T @ vehicle.damping @ Z))
+    heights = np.hstack(excitation.heights)
+    a, b, k, axles = Y.shape[1], V.shape[1], excitation.G.shape[1], len(excitation.heights)
+    q_a, v_a, q_b, f = np.split(np.eye(2 * a + b + heights.shape[1]), [a, 2 * a, 2 * a + b])
+    path = speed * np.kron(np.eye(axles), excitation.F)
+    z, rate = heights @ f, heights @ path @ f
+    noise = [speed**0.5 * np.kron(np.eye(axles)[:, [i]], excitation.G) for i in range(axles)]
+    q = Y @ q_a + V @ q_b
+    if E.shape[1]:
+        elastic = E.T @ vehicle.stiffness
+        q = q + E @ _solved(elastic @ E, E.T @ vehicle.road_stiffness @ z - elastic @ q)
+    force: np.ndarray = vehicle.road_stiffness @ z + vehicle.road_damping @ rate - vehicle.stiffness @ q
+    direct = [vehicle.road_damping @ heights @ each for each in noise]
+    force = force - vehicle.damping @ Y @ v_a
+    damped, pull, inert = V.T @ vehicle.damping @ V, vehicle.damping @ V, Y.T @ vehicle.mass @ Y
+    slow, slow_noise = _solved(damped, V.T @ force), [_solved(damped, V.T @ each) for each in direct]
+    A = np.vstack([v_a, _solved(inert, Y.T @ (force - pull @ slow)), slow, path @ f])
+    B = [
+        np.vstack([np.zeros((a, k)), _solved(inert, Y.T @ (d - pull @ s)), s, w])
+        for d, s, w in zip(direct, slow_noise, noise, strict=True)
+    ]
+    back = np.linalg.inv(np.hstack([Y, V, E]))
+    read, v = vehicle.read, q @ A
+    C = read.displacement @ q + read.rate @ v + read.acceleration @ v @ A + read.road @ z
+    C = C + read.road_rate @ rate
+    D = []
+    for onto, w in zip(B, [heights @ each for each in noise], strict=True):
+        seen = read.rate @ q @ onto + read.acceleration @ v @ onto + read.road_rate @ w
+        size = abs(read.rate) @ abs(q) @ abs(onto) + abs(read.acceleration) @ abs(v) @ abs(onto)
+        told = abs(seen) > NOTHING * (size + abs(read.road_rate) @ abs(w))
+        worse = abs(read.acceleration @ (q @ onto)) > NOTHING * (abs(read.acceleration) @ abs(q) @ abs(onto))
+        D.append(np.where(worse, np.inf, np.where(told, seen, 0.0)))
+    return _system(vehicle, excitation, speed, A, B, C, D), q, (back[:a], back[a : a + b])
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """matrix^-1 right; InputError where nothing holds a body without mass."""
+    if len(matrix) and np.linalg.cond(matrix) > 1 / NOTHING:
+        raise InputError("", "effects", None, "nothing holds what is left without mass")
+    return np.linalg.solve(matrix, right)
+
+
+def _split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bases of what a symmetric matrix acts on and of what it does not; single coordinates where it is diagonal."""
+    scale = np.sqrt(np.where(matrix.diagonal() > 0, matrix.diagonal(), 1.0))
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2 / np.outer(scale, scale))
+    if len(values) == 0 or values[0] > NOTHING:
+        return np.eye(len(matrix)), np.zeros((len(matrix), 0))
+    on = values > NOTHING
+    return vectors[:, on] / scale[:, None], vectors[:, ~on] / scale[:, None]

@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.whole_files import whole_file
 from models.ride.covariance import Covariance
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 
 if TYPE_CHECKING:
     import control

@@ -4,18 +4,29 @@ Transfer functions come from the dynamic stiffness K + i w D - w^2 M, frequency 
 as a factor. The integrand of a delay, f(w) e^(i w tau), is smooth but for its oscillation: f is interpolated by
 Legendre polynomials on panels, and the product with the oscillation is integrated exactly (Filon's idea, through
 spherical Bessel functions), so that panels need not follow the delay. They are halved until halving changes nothing.
+
+Roads that no finite filter makes, isotropic or measured ones, are given by the densities of the heights under the
+wheels; between these and those of the outputs stand the transfer functions alone.
+
+Averages of one run over a time T lie from what they estimate as far as the densities S over the angular frequency say,
+for samples of a run know of each other, so that their number says nothing:
+
+    var(mean of y)   = integral of S(w) (sin(w T / 2) / (w T / 2))^2,
+    var(mean of y^2) = 4 pi / T integral of S^2,
+
+the second for a Gaussian output of zero mean and a time long beside its memory (M. S. Bartlett).
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from scipy.special import eval_legendre, spherical_jn
 
 from models.ride.marginal import Unstable
-from models.ride.operating_point import poles
 from models.road.excitation import Excitation
-from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle, poles
 
 POINTS = 16
 """Gauss points of a panel."""
@@ -49,12 +60,9 @@ def transfer(vehicle: LinearVehicle, omega: np.ndarray) -> np.ndarray:
     s = 1j * np.asarray(omega, float)[:, None, None]
     stiffness = vehicle.stiffness + s * vehicle.damping + s**2 * vehicle.mass
     motion = np.linalg.solve(stiffness, vehicle.road_stiffness + s * vehicle.road_damping)
-    of = {
-        key: np.array([getattr(output, key) for output in vehicle.outputs])
-        for key in ("acceleration", "rate", "displacement", "road", "road_rate")
-    }
-    rows = of["displacement"] + s * of["rate"] + s**2 * of["acceleration"]
-    return rows @ motion + of["road"] + s * of["road_rate"]
+    read = vehicle.read
+    rows = read.displacement + s * read.rate + s**2 * read.acceleration
+    return rows @ motion + read.road + s * read.road_rate
 
 
 def road(excitation: Excitation, speed: float, omega: np.ndarray) -> np.ndarray:
@@ -69,7 +77,7 @@ def spectra(
     vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights | None = None
 ) -> np.ndarray:
     """Two-sided densities (n, p) over the angular frequency (rad/s): a variance is the integral over both signs."""
-    parts = _parts(vehicle, excitation, speed, omega, weights or {})
+    parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
     if excitation.independent:
         return (abs(parts) ** 2).sum(axis=(0, 3)) / (2 * np.pi)
     delays = np.array(excitation.lengths) / speed
@@ -77,14 +85,13 @@ def spectra(
     return (abs(turned.sum(axis=0)) ** 2).sum(axis=2) / (2 * np.pi)
 
 
-def _parts(
-    vehicle: LinearVehicle, excitation: Excitation, speed: float, omega: np.ndarray, weights: Weights
-) -> np.ndarray:
-    """Outputs by the noise of each axle (a, n, p, k), smooth: without the delays."""
-    return _weighted(vehicle, omega, weights) @ road(excitation, speed, omega)
+def one_sided(vehicle: LinearVehicle, excitation: Excitation, speed: float, frequency: np.ndarray) -> np.ndarray:
+    """One-sided densities (n, p) over the frequency (Hz)."""
+    return 4 * np.pi * spectra(vehicle, excitation, speed, 2 * np.pi * frequency)
 
 
 def _weighted(vehicle: LinearVehicle, omega: np.ndarray, weights: Weights) -> np.ndarray:
+    """Outputs by heights (n, p, w), the weighted ones in place of their own."""
     whole = transfer(vehicle, omega)
     for i, output in enumerate(vehicle.outputs):
         if output.name in weights:
@@ -106,7 +113,8 @@ def quadrature(
     def over(edges: np.ndarray, vehicle: LinearVehicle = vehicle) -> np.ndarray:
         """Shares (panels, p) of the variances between the two frequencies of each row."""
         centre, half = edges.mean(axis=1), np.diff(edges, axis=1)[:, 0] / 2
-        parts = _parts(vehicle, excitation, speed, (centre[:, None] + half[:, None] * NODES).ravel(), weights or {})
+        omega = (centre[:, None] + half[:, None] * NODES).ravel()
+        parts = _weighted(vehicle, omega, weights or {}) @ road(excitation, speed, omega)
         parts = parts.reshape(len(parts), len(centre), POINTS, *parts.shape[2:])
         return _integrals(parts, centre, half, excitation, speed)
 
@@ -131,9 +139,9 @@ def quadrature(
 
 def _check_stable(vehicle: LinearVehicle) -> None:
     """Raise Unstable for a motion that grows faster than rounding makes a free one grow."""
-    own = poles(vehicle)
-    worst = own[own.real.argmax()]
-    if worst.real > GROWING * abs(own).max():
+    rates = poles(vehicle)
+    worst = rates[rates.real.argmax()]
+    if worst.real > GROWING * abs(rates).max():
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
 
 
@@ -156,7 +164,7 @@ def _halved(
     return variance, error, taken
 
 
-NODES, GAUSS = np.polynomial.legendre.leggauss(POINTS)
+NODES, GAUSS = leggauss(POINTS)
 DEGREES = np.arange(POINTS)
 TO_LEGENDRE = (DEGREES[:, None] + 0.5) * eval_legendre(DEGREES[:, None], NODES) * GAUSS
 """Coefficients of the Legendre polynomials (degree, node) by the values at the nodes."""
@@ -185,3 +193,57 @@ def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.
     low, high = LOW * marks.min(), HIGH * marks.max()
     doublings = np.geomspace(low, high, int(np.ceil(np.log2(high / low))))
     return np.unique(np.concatenate([[0.0], doublings, own]))
+
+
+Densities = Callable[[np.ndarray], np.ndarray]
+"""From wavenumbers (k,) in rad/m to the two-sided densities (k, w, w) of heights, see models/road/isotropic.py."""
+PER_PANEL = 10
+"""Gauss points per panel; a panel is at most a quarter of an octave wide and half a wave of the longest delay."""
+
+
+def output_densities(vehicle: LinearVehicle, heights: Densities, speed: float, wavenumber: np.ndarray) -> np.ndarray:
+    """Two-sided densities (k, p) of the outputs over the wavenumber (rad/m), in unit^2 m, at a speed in m/s."""
+    H = transfer(vehicle, speed * wavenumber)
+    return np.einsum("kpi,kij,kpj->kp", H.conj(), heights(wavenumber), H, optimize=True).real
+
+
+def variances(vehicle: LinearVehicle, heights: Densities, speed: float, low: float, high: float) -> np.ndarray:
+    """Variances (p,) in unit^2 of the outputs, from the wavenumbers ``low`` to ``high`` (rad/m) on both sides of 0.
+
+    What lies outside is left out: a band limit where that is wanted, an error where it is not.
+    """
+    wavenumber, weight = both_sides(vehicle, low, high)
+    return weight @ output_densities(vehicle, heights, speed, wavenumber)
+
+
+def both_sides(vehicle: LinearVehicle, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """Wavenumbers (k,) in rad/m from ``low`` to ``high`` and their weights in an integral over both sides of 0."""
+    behind = vehicle.axles[0] - vehicle.axles[-1]
+    longest = np.pi / behind if behind else np.inf
+    edges = [low]
+    while edges[-1] < high:
+        edges.append(min(edges[-1] + min(0.19 * edges[-1], longest), high))
+    nodes, weights = leggauss(PER_PANEL)
+    start, half = np.array(edges[:-1]), np.diff(edges) / 2.0
+    return ((start + half)[:, None] + half[:, None] * nodes).ravel(), (2.0 * half[:, None] * weights).ravel()
+
+
+HIGHEST = 60.0
+"""Hz up to which the densities are summed: beyond, the outputs of vehicles have next to nothing."""
+PER_LOBE = 8
+"""Frequencies for each lobe, 1 / T, of the first integral."""
+TOGETHER = 2000
+"""Frequencies whose densities are made at once."""
+
+
+def standard_errors(
+    vehicle: LinearVehicle, excitation: Excitation, speed: float, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard errors (p,) of an output's mean, and of its mean square, over a time of ``duration`` (s)."""
+    step = 2.0 * np.pi / duration / PER_LOBE
+    omega = step * (np.arange(int(2.0 * np.pi * HIGHEST / step)) + 0.5)
+    parts = np.array_split(omega, -(-len(omega) // TOGETHER))
+    density = np.concatenate([spectra(vehicle, excitation, speed, part) for part in parts])
+    mean = 2.0 * step * np.sinc(omega * duration / (2.0 * np.pi)) ** 2 @ density
+    square = 8.0 * np.pi / duration * step * (density**2).sum(axis=0)
+    return np.sqrt(mean), np.sqrt(square)

@@ -19,10 +19,9 @@ from scipy.linalg import expm
 from models.core.errors import InputError
 from models.core.noise import BLOCK, ROAD, normal
 from models.ride.covariance import FINITE, stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.marginal import ACCURACY
-from models.ride.responses import powers
-from models.ride.road_in_path import at_speed
+from models.ride.road_in_path import at_speed, powers
 from models.ride.speed_profile import SpeedProfile
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle

@@ -17,7 +17,7 @@ from models.ride.statistical_linearisation import bent, statistically_linear
 from models.road.excitation import Excitation
 from models.vehicles.curve import Curve
 from models.vehicles.kinematics import Kinematics
-from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.spatial import PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
 from models.vehicles.spatial_linear import Gains, linearise, preloads
 
@@ -114,7 +114,7 @@ def copies_in_time(
         if left <= BLOCK:
             break
     return Copies(
-        march.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
+        march.plain.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
     )
 
 
@@ -125,8 +125,7 @@ class March:
         springs = bent(vehicle)
         self.plain = linearise(vehicle, speed, {s.name: (s.stiffness, s.damping) for s in springs})
         self.laws, self.step = laws_of(vehicle, self.plain, springs, speed), step
-        self.names = tuple(output.name for output in self.plain.outputs)
-        self.sums = np.zeros((POWERS, len(self.names), copies))
+        self.sums = np.zeros((POWERS, len(self.plain.outputs), copies))
         self.states: np.ndarray | None = None
 
     def over(self, roads: np.ndarray, first: int, every: int = EVERY) -> None:
@@ -139,19 +138,19 @@ class March:
 
 def usual_step(vehicle: SpatialVehicle, speed: float, replaced: LinearVehicle) -> float:
     """Step (s) for a vehicle that ``replaced`` stands for, by statistical linearisation."""
-    return min(REACH / float(abs(_rates(replaced)).max()), followed(vehicle, speed))
+    return min(REACH / float(abs(poles(replaced)).max()), followed(vehicle, speed))
 
 
 def forgotten(replaced: LinearVehicle) -> float:
     """Time (s) after which copies have forgotten their beginning."""
-    decay = abs(_rates(replaced).real)
+    decay = abs(poles(replaced).real)
     return SETTLE / float(decay[decay > HELD * decay.max()].min())
 
 
 def followed(vehicle: SpatialVehicle, speed: float) -> float:
     """Longest step (s) that follows the vehicle with its springs as steep as they get."""
     steepest = linearise(vehicle, speed, {s.name: _steepest(s) for s in bent(vehicle)})
-    return STEEPEST / float(abs(_rates(steepest)).max())
+    return STEEPEST / float(abs(poles(steepest)).max())
 
 
 def _first(settling: int, done: int) -> int:
@@ -163,13 +162,6 @@ def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:
     """Positions (n, copies) at rest on a road (2 w, copies): vehicles dropped onto it from metres ring for long."""
     heights = road[: plain.road_stiffness.shape[1]]
     return np.linalg.lstsq(plain.stiffness, plain.road_stiffness @ heights, rcond=1e-12)[0]
-
-
-def _rates(linear: LinearVehicle) -> np.ndarray:
-    """Eigenvalues (1/s)."""
-    n = len(linear.mass)
-    own = np.linalg.solve(linear.mass, np.hstack([-linear.stiffness, -linear.damping]))
-    return np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), own]))
 
 
 def _steepest(spring: SpringDamper) -> Gains:

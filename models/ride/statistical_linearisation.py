@@ -17,8 +17,7 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.ride.covariance import Covariance, stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.excited import DelayedSystem, excited
 from models.ride.gaussian_laws import of_rate, of_travel
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
@@ -93,7 +92,7 @@ class StatisticallyLinear:
 
 def bent(vehicle: SpatialVehicle) -> tuple[SpringDamper, ...]:
     """The springs that have curves or friction."""
-    return tuple(s for s in vehicle.springs if s.travel_force or s.rate_force or s.friction)
+    return tuple(spring for spring in vehicle.springs if spring.bent)
 
 
 def statistically_linear(
@@ -114,6 +113,10 @@ def statistically_linear(
             "may lift, and no linear vehicle stands for that: take copies in time, or tyres that stay on the road",
         )
     return _Search(vehicle, excitation, speed).found(scale)
+
+
+Law = tuple[float, float, float]
+"""What ``gaussian_laws`` says of a law."""
 
 
 @dataclass
@@ -162,9 +165,14 @@ class _Search:
 
     def _gains(self, moments: _Moments) -> np.ndarray:
         """Stiffness and damping (springs, 2) that stand for springs which move like this."""
-        moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
-        rows = [(s.stiffness + of_travel(s, m, d)[1], s.damping + of_rate(s, r)[1]) for s, m, d, r in moved]
+        laws = zip(self.springs, self._laws(moments), strict=True)
+        rows = [(s.stiffness + travel[1], s.damping + rate[1]) for s, (travel, rate) in laws]
         return np.array(rows).reshape(-1, 2)
+
+    def _laws(self, moments: _Moments) -> list[tuple[Law, Law]]:
+        """Of every spring's travel and rate: mean force, gain and variance that the gain leaves out."""
+        moved = zip(self.springs, moments.mean, moments.travel, moments.rate, strict=True)
+        return [(of_travel(s, mean, travel), of_rate(s, rate)) for s, mean, travel, rate in moved]
 
     def _replaced(self, gains: np.ndarray, vehicle: SpatialVehicle) -> LinearVehicle:
         named = {s.name: (float(k), float(c)) for s, (k, c) in zip(self.springs, gains, strict=True)}
@@ -199,7 +207,7 @@ class _Search:
         linear = self._replaced(gains, self.vehicle)
         system = excited(linear, self.excitation, self.speed)
         covariance = stationary(system)
-        left = self._left_out(gains, linear, moments, system, covariance)
+        left = self._left_out(linear, moments, system, covariance)
         springs = {s.name: self._spring(i, gains[i], moments) for i, s in enumerate(self.springs)}
         told = zip(covariance.names, left, covariance.status, strict=True)
         sentences = tuple(_sentence(*each) for each in told)
@@ -209,7 +217,7 @@ class _Search:
 
     def _spring(self, i: int, gains: np.ndarray, moments: _Moments) -> BentSpring:
         s, mean, d, r = self.springs[i], float(moments.mean[i]), float(moments.travel[i]), float(moments.rate[i])
-        travel, rate = of_travel(s, mean, d), of_rate(s, r)
+        travel, rate = self._laws(moments)[i]
         lost = travel[2] + rate[2]
         total = lost + (gains[0] * d) ** 2 + (gains[1] * r) ** 2
         return BentSpring(
@@ -230,7 +238,7 @@ class _Search:
         return means
 
     def _left_out(
-        self, gains: np.ndarray, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: Covariance
+        self, linear: LinearVehicle, moments: _Moments, system: DelayedSystem, covariance: Covariance
     ) -> np.ndarray:
         """Shares (p,) of the outputs' variances that the left-out forces would add, each law's by itself."""
         if not self.springs:
@@ -239,10 +247,9 @@ class _Search:
         jerk = self.rows @ system.A[n : 2 * n]
         change = np.sqrt(np.einsum("si,ij,sj->s", jerk, covariance.P, jerk).clip(0.0))
         corners = np.concatenate([_ratio(moments.rate, moments.travel), _ratio(change, moments.rate)])
-        lost = [of_travel(s, m, d)[2] for s, m, d in zip(self.springs, moments.mean, moments.travel, strict=True)]
-        lost += [of_rate(s, r)[2] for s, r in zip(self.springs, moments.rate, strict=True)]
+        lost = np.array([[law[2] for law in laws] for laws in self._laws(moments)]).T.ravel()
         forced = _forced(linear, np.vstack([self.rows, self.rows]), self._own_forces())
-        noise = np.diag(np.sqrt(2.0 * corners * np.array(lost)))
+        noise = np.diag(np.sqrt(2.0 * corners * lost))
         added = stationary(excited(forced, Excitation(-np.diag(corners), noise, (np.eye(len(corners)),), (0.0,)), 1.0))
         usable = np.isfinite(covariance.variance) & (covariance.variance > 0) & np.isfinite(added.variance)
         return np.divide(added.variance, covariance.variance, out=np.zeros(len(usable)), where=usable)

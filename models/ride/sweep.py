@@ -1,15 +1,25 @@
-"""Variances of all outputs over cases of correlation and speeds, by the fast route where it is exact enough."""
+"""Variances of all outputs over cases of correlation and speeds, by the fast route where it is exact enough.
 
+The fast route is the covariance in closed form from eigenvectors. A vehicle behind road filters, with weightings behind
+it, has a block triangular matrix. Each block is diagonalised on its own (the vehicle's and the weightings' once for all
+roads and speeds, a road's in path), and divisions by differences of eigenvalues join them. Every covariance then is a
+sum over pairs, -Q_mn / (s_m + s_n*).
+
+Digits are lost where eigenvectors are nearly parallel, where two eigenvalues of different blocks nearly meet and
+where terms of a sum cancel. ``loss`` estimates how many; beyond LOSS the direct way is taken instead.
+"""
+
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import matrix_balance
+from scipy.sparse.csgraph import connected_components
 
-from models.ride.covariance import FINITE, Covariance, hits, stationary, verdicts
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
+from models.ride.covariance import FINITE, hits, silence, stationary, verdicts
+from models.ride.excited import DelayedSystem, excited
 from models.ride.marginal import ACCURACY, Growth, Unstable
-from models.ride.modal import Shared, modal
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -20,7 +30,7 @@ LOSS = 1e-9
 
 @dataclass(frozen=True)
 class Sweep:
-    """variance (cases, speeds, outputs), inf where there is none, with status and reason for each.
+    """variance (cases, speeds, outputs), inf where there is none, with status and reason for each; units (outputs,).
 
     ``direct``: how many of the points went the direct way, by the reason for which the fast one was not taken.
     """
@@ -28,6 +38,7 @@ class Sweep:
     cases: tuple[str, ...]
     speeds: np.ndarray
     outputs: tuple[str, ...]
+    units: tuple[str, ...]
     variance: np.ndarray
     status: np.ndarray
     reason: np.ndarray
@@ -56,50 +67,175 @@ def sweep(
     filters : weightings by output, as ``weighted`` takes them. fast : False sends every point the direct way.
     Raises Unstable.
     """
-    shared = Shared()
-    direct: dict[str, int] = {}
-    names: tuple[str, ...] = ()
-    shape = (len(excitations), len(speeds))
-    found = np.empty(shape, object)
-    for j, speed in enumerate(speeds):
-        at_speed = vehicle(speed)
-        for i, excitation in enumerate(excitations.values()):
-            plain = excited(at_speed, excitation, speed)
+    shared, direct, points = Shared(), Counter[str](), []
+    for speed in speeds:
+        linear = vehicle(speed)
+        for excitation in excitations.values():
+            plain = excited(linear, excitation, speed)
             system = weighted(plain, filters or {})
             states = len(plain.A) - len(plain.B) * len(excitation.F)
             point = _quick(system, states, excitation, speed, shared, accuracy) if fast else ASKED
             if isinstance(point, str):
-                direct[point] = direct.get(point, 0) + 1
-                exact = _stationary(system, speed, accuracy)
-                point = exact.variance, exact.status, exact.reason
-            found[i, j], names = point, system.names
-    variance, status, reason = (np.array([[point[part] for point in row] for row in found]) for part in range(3))
-    return Sweep(tuple(excitations), np.array(speeds), names, variance, status, reason, direct)
-
-
-def _stationary(system: DelayedSystem, speed: float, accuracy: float) -> Covariance:
-    """The direct answer; a vehicle that is unstable is told with its speed."""
-    try:
-        return stationary(system, accuracy)
-    except Unstable as error:
-        raise Unstable(error.growth, error.frequency, speed) from None
+                direct[point] += 1
+                point = _direct(system, speed, accuracy)
+            points.append(point)
+    shape = (len(speeds), len(excitations), -1)
+    variance, status, reason = (
+        np.array(each).reshape(shape).swapaxes(0, 1).copy() for each in zip(*points, strict=True)
+    )
+    units = *(output.unit for output in linear.outputs), *["m/s^2"] * len(filters or {})
+    return Sweep(tuple(excitations), np.array(speeds), system.names, units, variance, status, reason, direct)
 
 
 ASKED = "asked for"
 """Reason of a direct answer that was wanted."""
+Answer = tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]
+"""Variance, status and reason of every output."""
+
+
+def _direct(system: DelayedSystem, speed: float, accuracy: float) -> Answer:
+    """By the covariance itself; a vehicle that is unstable is told with its speed."""
+    try:
+        exact = stationary(system, accuracy)
+    except Unstable as error:
+        raise Unstable(error.growth, error.frequency, speed) from None
+    return exact.variance, exact.status, exact.reason
 
 
 def _quick(
-    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: Shared, accuracy: float
-) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]] | str:
-    """Variance, status and reason of every output by the fast route, or why it cannot be trusted here."""
+    system: DelayedSystem, states: int, excitation: Excitation, speed: float, shared: "Shared", accuracy: float
+) -> Answer | str:
+    """By the fast route, or why it cannot be trusted here."""
     quick = modal(system, states, excitation.F, speed, shared)
     if isinstance(quick, str):
         return quick
-    D = hits(system)[1]
     none = Growth(np.zeros(len(system.C)), np.zeros(len(system.C), int))
-    status, reason = verdicts(D, quick.variance, quick.floor, none, quick.fastest, accuracy)
-    finite = np.array([found == FINITE for found in status])
+    status, reason = verdicts(hits(system).D, quick.variance, quick.floor, none, quick.fastest, accuracy)
+    finite = np.array(status) == FINITE
     if (quick.loss[finite] > LOSS).any():
         return "terms cancel"
     return np.where(finite, quick.variance, np.inf), status, reason
+
+
+@dataclass(frozen=True)
+class Modes:
+    """A = V diag(values) V^-1, and the condition of V as it was balanced."""
+
+    A: np.ndarray
+    values: np.ndarray
+    V: np.ndarray
+    inverse: np.ndarray
+    condition: float
+
+    @property
+    def blurred(self) -> float:
+        """Relative rounding of the slowest decay: the fastest motion's, times the condition."""
+        return EPS * self.condition * float(abs(self.values).max(initial=0.0) / abs(self.values.real).min(initial=1.0))
+
+
+def modes(A: np.ndarray) -> Modes:
+    """Eigenvalues and vectors of A (n, n), of every part that stands alone for itself: equal parts stay exact."""
+    count, label = connected_components(A != 0, directed=False)
+    values, V, inverse = (np.zeros(shape, complex) for shape in (len(A), A.shape, A.shape))
+    worst = 1.0
+    for part in range(count):
+        at = np.flatnonzero(label == part)
+        balanced, (scale, _) = matrix_balance(A[np.ix_(at, at)], permute=False, separate=True)
+        values[at], own = np.linalg.eig(balanced)
+        worst = max(worst, np.linalg.cond(own))
+        if not np.isfinite(worst) or worst * EPS > 1:
+            return Modes(A, values, V, inverse, np.inf)
+        V[np.ix_(at, at)], inverse[np.ix_(at, at)] = scale[:, None] * own, np.linalg.inv(own) / scale
+    return Modes(A, values, V, inverse, worst)
+
+
+EPS = float(np.finfo(float).eps)
+BLURRED = 1e-11
+"""Largest relative rounding of the slowest decay with which the sums are still made."""
+
+
+class Shared:
+    """Eigen-decompositions of the blocks met so far: roads and speeds that share a block share its modes."""
+
+    def __init__(self) -> None:
+        self.known: dict[bytes, Modes] = {}
+
+    def of(self, A: np.ndarray) -> Modes:
+        """Modes of a block."""
+        if (key := A.tobytes()) not in self.known:
+            self.known[key] = modes(A)
+        return self.known[key]
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Per output (p,): variance, ``floor`` that rounding makes of zero, relative error it may have left (``loss``).
+
+    fastest : rate of the system in 1/s
+    """
+
+    variance: np.ndarray
+    floor: np.ndarray
+    loss: np.ndarray
+    fastest: float
+
+
+def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, shared: Shared) -> Modal | str:
+    """Variances of a system as ``excited`` and ``weighted`` build it, or the reason in words why there are none here.
+
+    vehicle : number of its states, which stand first; road : the filter F (m, m) in path, one per axle behind them;
+    the states of weightings stand last.
+    """
+    axles = len(system.B)
+    last = vehicle + axles * len(road)
+    A = system.A
+    own = shared.of(A[:vehicle, :vehicle])
+    path = shared.of(road)
+    behind = shared.of(A[last:, last:])
+    if max(each.condition for each in (own, path, behind)) * EPS > 1e-6:
+        return "eigenvectors are nearly parallel"
+    values = [own.values, np.tile(speed * path.values, axles), behind.values]
+    if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
+        return "a motion does not die out"
+    if max(each.blurred for each in (own, path, behind)) > BLURRED:
+        return "rates lie too far apart"
+    V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        met = _joined(own, A[:vehicle, vehicle:last] @ V, values[1])
+        felt = _joined(behind, A[last:, :vehicle] @ own.V, values[0])
+        heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
+    C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
+    C = np.hstack([C0 @ own.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
+    arrivals, inputs = hits(system), []
+    for b in arrivals.B:
+        of_road = back @ b[vehicle:last]
+        of_vehicle = own.inverse @ (b[:vehicle] - met @ of_road)
+        of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
+        inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
+    condition = own.condition * path.condition * behind.condition
+    return _summed(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
+
+
+def _joined(block: Modes, coupling: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """X of A X + coupling = X diag(values) for a diagonalised A."""
+    return block.V @ ((block.inverse @ coupling) / (values - block.values[:, None]))
+
+
+def _summed(
+    s: np.ndarray, C: np.ndarray, inputs: list[np.ndarray], delays: list[float], independent: bool, condition: float
+) -> Modal | str:
+    """Variances of y = C x, x_m' = s_m x_m + noise through the inputs, hit after hit."""
+    before = np.zeros_like(inputs[0])
+    Q = np.zeros((len(s), len(s)), complex)
+    for j, b in enumerate(inputs):
+        if j and not independent:
+            before = np.exp(s * (delays[j] - delays[j - 1]))[:, None] * (before + inputs[j - 1])
+        Q += b @ b.conj().T + before @ b.conj().T + b @ before.conj().T
+    P = -Q / (s[:, None] + s.conj())
+    variance = ((C @ P) * C.conj()).sum(axis=1).real
+    size = ((abs(C) @ abs(P)) * abs(C)).sum(axis=1)
+    if not np.isfinite(size).all():
+        return "two eigenvalues of vehicle, road and weighting meet"
+    floor = silence(C, P)
+    loss = EPS * condition * np.divide(size, abs(variance), out=np.full(len(C), np.inf), where=variance != 0)
+    return Modal(variance.clip(0.0), floor, np.where(size > floor, loss, 0.0), float(abs(s).max()))

@@ -23,10 +23,8 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from models.core.errors import InputError
 from models.ride.covariance import DIFFUSING, FINITE, INFINITE, stationary
 from models.ride.marginal import ACCURACY
-from models.ride.noise_cells import nodes, steps
-from models.ride.responses import Responses
-from models.ride.road_in_path import RoadInPath, at_speed, road_in_path
-from models.ride.speed_profile import SpeedProfile
+from models.ride.road_in_path import Responses, RoadInPath, at_speed, road_in_path
+from models.ride.speed_profile import SpeedProfile, nodes, steps
 from models.ride.sweep import sweep
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle

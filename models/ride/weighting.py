@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from models.core.errors import InputError
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 
 
 @dataclass(frozen=True)
@@ -127,4 +127,4 @@ def total_value(accelerations: Mapping[str, float], factors: Mapping[str, float]
 
 def _columns(parts: Sequence[np.ndarray]) -> np.ndarray:
     """Each vector in a column and in rows of its own."""
-    return np.asarray(block_diag(*(part[:, None] for part in parts)))
+    return block_diag(*(part[:, None] for part in parts))

@@ -82,7 +82,7 @@ def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: f
         raise InputError(name, "bands to fit", len(middle), allowed)
 
     def error(p: np.ndarray) -> np.ndarray:
-        return np.asarray(p[1] - np.log(2.0 * math.pi * (np.exp(2.0 * p[0]) + middle**2)) - mean)
+        return p[1] - np.log(2.0 * math.pi * (np.exp(2.0 * p[0]) + middle**2)) - mean
 
     start = np.array([math.log(low), math.log(2.0 * math.pi) + float(np.mean(mean + 2.0 * np.log(middle)))])
     bounds = ([math.log(low / 10.0), -np.inf], [math.log(high), np.inf])

@@ -55,7 +55,7 @@ class Part:
         coherency = np.ones(x.shape)
         apart = x > 1e-8  # below, the coherency is 1 to rounding
         coherency[apart] = 2.0 * (x[apart] / 2.0) ** order * kv(order, x[apart]) / gamma(order)
-        return np.asarray(track * coherency)
+        return track * coherency
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class ShapeFilter:
         """Two-sided spectral density over the wavenumber in rad/m."""
         square = np.square(wavenumber)
         low_pass = 1.0 if self.cutoff is None else self.cutoff**2 / (self.cutoff**2 + square)
-        return np.asarray(self.intensity / (2.0 * math.pi) / (self.corner**2 + square) * low_pass)
+        return self.intensity / (2.0 * math.pi) / (self.corner**2 + square) * low_pass
 
     def covariance(self, distance: np.ndarray) -> np.ndarray:
         """Covariance E[f(s) f(s + distance)], distance in m; infinite for a random walk."""
@@ -52,6 +52,6 @@ class ShapeFilter:
             return np.full(np.shape(gap), math.inf if self.intensity else 0.0)
         first = np.exp(-self.corner * gap) / (2.0 * self.corner)
         if self.cutoff is None:
-            return np.asarray(self.intensity * first)
+            return self.intensity * first
         second = np.exp(-self.cutoff * gap) / (2.0 * self.cutoff)
-        return np.asarray(self.intensity * (first - second) / (1.0 - (self.corner / self.cutoff) ** 2))
+        return self.intensity * (first - second) / (1.0 - (self.corner / self.cutoff) ** 2)

@@ -1,7 +1,7 @@
 """What a reduced vehicle is the limit of: bodies without mass, rigid springs, locked freedoms; for small motion only.
 
 Rigid springs and locked freedoms leave q = N r with fewer coordinates r. Bodies without mass leave a mass matrix that
-may be singular (see ``models.ride.massless``): nothing is taken to a limit with large numbers.
+may be singular (see ``models.ride.excited``): nothing is taken to a limit with large numbers.
 """
 
 from dataclasses import dataclass, replace

@@ -1,6 +1,8 @@
 """The linear vehicle that every ride analysis starts from, whoever has linearised it."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +35,16 @@ class Output:
     road_rate: np.ndarray
 
 
+class Rows(NamedTuple):
+    """What ``Output`` has, of all outputs: (p, n), those by the road (p, w)."""
+
+    acceleration: np.ndarray
+    rate: np.ndarray
+    displacement: np.ndarray
+    road: np.ndarray
+    road_rate: np.ndarray
+
+
 @dataclass(frozen=True)
 class LinearVehicle:
     """M q'' + D q' + K q = R z + S z', with road heights z (w,) under the wheels (m, up).
@@ -56,3 +68,33 @@ class LinearVehicle:
         """Places x (m) of the axles, from the front."""
         places = {wheel.axle: wheel.x for wheel in self.wheels}
         return tuple(places[i] for i in sorted(places))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(output.name for output in self.outputs)
+
+    @cached_property
+    def read(self) -> Rows:
+        """Factors of all outputs."""
+        return Rows(*(np.array([getattr(output, factor) for output in self.outputs]) for factor in Rows._fields))
+
+
+def poles(vehicle: LinearVehicle) -> np.ndarray:
+    """Eigenvalues (2 n,) in 1/s, slow ones first; of a pair the one with the negative imaginary part first."""
+    n = len(vehicle.mass)
+    motion = np.linalg.solve(vehicle.mass, np.hstack([-vehicle.stiffness, -vehicle.damping]))
+    values = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), motion]))
+    return values[np.lexsort((values.imag, np.round(np.abs(values), 6)))]
+
+
+def shift(unloaded: LinearVehicle, loaded: LinearVehicle) -> np.ndarray:
+    """How far every eigenvalue (2 n,) of the unloaded vehicle moves, complex, in 1/s.
+
+    The eigenvalues of the two are paired so that the sum of all distances is the least.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    before, after = poles(unloaded), poles(loaded)
+    rows, columns = linear_sum_assignment(np.abs(before[:, None] - after[None, :]))
+    return after[columns] - before[rows]

@@ -69,6 +69,11 @@ class SpringDamper:
     friction: float = 0.0
     friction_rate: float = 0.01
 
+    @property
+    def bent(self) -> bool:
+        """Whether it has curves or friction."""
+        return bool(self.travel_force or self.rate_force or self.friction)
+
 
 @dataclass(frozen=True)
 class AntiRollBar:

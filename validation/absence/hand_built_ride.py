@@ -120,28 +120,17 @@ def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
     from mujoco import rollout
 
     wheels = np.add(car.centre, car.corners[:, :3])
-    parts = [
-        MJCF.format(i=i, strut=_text(corner[:3]), wheel=_text(place), mass=car.wheel, tyre=car.tyre)
-        for i, (corner, place) in enumerate(zip(car.corners, wheels, strict=True))
+    corners = [
+        {"i": i, "strut": _text(corner), "wheel": _text(wheel), "k": corner[3], "d": corner[4]}
+        for i, (corner, wheel) in enumerate(zip(car.corners.tolist(), wheels, strict=True))
     ]
-    site, wheel, actuator = (
-        "".join(
-            part.split("----\n")[k].format(k=corner[3], d=corner[4])
-            for part, corner in zip(parts, car.corners.tolist(), strict=True)
-        )
-        for k in range(3)
-    )
-    model = mujoco.MjModel.from_xml_string(
-        WHOLE.format(
-            step=step,
-            centre=_text(np.array(car.centre)),
-            mass=car.mass,
-            site=site,
-            wheel=wheel,
-            actuator=actuator,
-            size=2 + road.size,
-        )
-    )
+    parts = {
+        name: "".join(part.format(**corner, mass=car.wheel, tyre=car.tyre) for corner in corners)
+        for name, part in CORNERS.items()
+    }
+    centre, size = _text(np.array(car.centre)), 2 + road.size
+    whole = WHOLE.format(step=step, centre=centre, mass=car.mass, size=size, **parts)
+    model = mujoco.MjModel.from_xml_string(whole)
     model.body_inertia[1] = car.inertia  # no distribution of mass has these, and the compiler says so
     model.numeric_data[:] = [2.0 / step, car.tyre, *road.ravel()]
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -228,21 +217,23 @@ def numbers(car: Car) -> np.ndarray:
     return np.concatenate([[car.mass, car.wheel, car.inertia[0], car.inertia[1]], corners.ravel()])
 
 
-def _text(values: np.ndarray) -> str:
-    return " ".join(repr(float(value)) for value in values)
+def _text(point: Any) -> str:
+    return " ".join(repr(float(value)) for value in point[:3])
 
 
-MJCF = """<site name="top {i}" pos="{strut}"/>
-----
-<body pos="{wheel}">
+CORNERS = {
+    "site": """<site name="top {i}" pos="{strut}"/>
+""",
+    "wheel": """<body pos="{wheel}">
   <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
   <joint type="slide" axis="0 0 1" stiffness="{tyre!r}"/>
   <site name="wheel {i}"/>
 </body>
-----
-<general site="top {i}" refsite="wheel {i}" gear="0 0 1 0 0 0"
-         gainprm="0" biastype="affine" biasprm="0 -{{k!r}} -{{d!r}}"/>
-"""
+""",
+    "actuator": """<general site="top {i}" refsite="wheel {i}" gear="0 0 1 0 0 0"
+         gainprm="0" biastype="affine" biasprm="0 -{k!r} -{d!r}"/>
+""",
+}
 """What each corner adds to the body's sites, to the world and to the actuators."""
 WHOLE = """
 <mujoco>

@@ -17,16 +17,16 @@ import numpy as np
 from models.core.tables import write_table
 from models.engines.spatial_protocol import build
 from models.ride.excited import excited
-from models.ride.sweep import sweep
 from models.ride.weighting import weighted
-from models.road.two_track import excitation, half_track, on_track, road_of_level
 from models.systems.ride import of_scene
+from models.systems.ride.run import run
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
 from validation.common.rows import Row, System, at_most, behaves
+from validation.ride.rides import paper_road
 
 SYSTEM: System = "effects"
 SPEEDS = (10.0, 20.0, 30.0)
@@ -48,6 +48,7 @@ FOREIGN = (
 )
 """What a linear ride of the reference at constant speeds does without."""
 
+FILTERS = (("body centre", "Wk"), ("left occupant", "Wd"))
 ENGINES = ("reference",)
 SPEED = 20.0
 BARE: dict[str, Any] = {
@@ -82,8 +83,8 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
     vehicle = of_scene.vehicle_of(scene)
     with mock.patch.object(of_scene, "fitted_road", wraps=of_scene.fitted_road) as fitted:
         road = of_scene.excitation_of(scene, wheels(vehicle))
-    linear = of_scene.linear_vehicle(vehicle, engine)
-    system = weighted(excited(linear(SPEED), road, SPEED), scene.weighting)
+    system = weighted(excited(of_scene.linear_vehicle(vehicle, engine)(SPEED), road, SPEED), scene.weighting)
+    in_time = of_scene.goes_in_time(scene)
     counts = {
         "states": len(system.A),
         "preloads": int(vehicle.gravity > 0.0),
@@ -91,40 +92,26 @@ def seen(scene: RideScene, engine: str) -> tuple[dict[str, int], bytes]:
         "delays": sum(length > 0.0 for length in road.lengths),
         "drives": int(scene.drive is not None),
         "heights": len(np.unique(sum(road.heights), axis=0)),
-        "bent springs": 0,
+        "bent springs": sum(spring.bent for spring in vehicle.springs) if in_time else 0,
+        "tyres that lift": sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
-    if scene.drive is not None:
-        from models.ride.varying_speed import varying_speed
+    result = run(scene, engine, **({"sampling": _few()} if in_time else {}))
+    return counts, result["deviation"].tobytes()
 
-        return counts, varying_speed(linear(SPEED), road, scene.drive.profile()).deviation.tobytes()
-    from models.systems.ride.effects import curves
 
-    counts["tyres that lift"] = sum(tyre.pushes_only for tyre in vehicle.tyres)
-    if vehicle.lifts:
-        from models.ride.nonlinear_copies import copies_in_time
+def _few() -> Any:
+    """As few copies as there may be, for a moment."""
+    from models.systems.ride.nonlinear import Sampling
 
-        return counts, copies_in_time(vehicle, road, SPEED, 0.1, copies=2).variance.tobytes()
-    if curves.named(scene):
-        from models.ride.statistical_linearisation import bent, statistically_linear
-
-        counts["bent springs"] = len(bent(vehicle))
-        return counts, statistically_linear(vehicle, road, SPEED).covariance.variance.tobytes()
-    assert scene.speeds is not None
-    return counts, sweep(linear, {"own": road}, scene.speeds.all(), scene.weighting).variance.tobytes()
+    return Sampling(copies=2, lasting=0.1)
 
 
 PROBE = """
 import json, sys
-from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.run import run
 from models.systems.ride.scene import build
-from models.ride.sweep import sweep
-from models.core.tables import write_table
-from models.vehicles.spatial_linear import wheels
-scene = build({"title": "probe", "system": "ride", "vehicle": {"file": "r19_ride"},
-               "speeds": {"start": 10.0, "stop": 20.0, "count": 2}})
-vehicle = vehicle_of(scene)
-linear = linear_vehicle(vehicle, sys.argv[1])
-sweep(linear, {"own": excitation_of(scene, wheels(vehicle))}, scene.speeds.all(), scene.weighting)
+run(build({"title": "probe", "system": "ride", "vehicle": {"file": "r19_ride"},
+           "speeds": {"start": 10.0, "stop": 20.0, "count": 2}}), sys.argv[1])
 print(json.dumps(sorted(sys.modules)))
 """
 """Runs a linear ride by an engine in a process of its own and says what it imported."""
@@ -141,8 +128,7 @@ def imported(engine: str) -> list[str]:
 def states(filters: dict[str, str]) -> int:
     """States of R19-ride behind two road filters, with weightings."""
     vehicle = _linear("r19_ride")
-    road = excitation(road_of_level(half_track(vehicle.wheels)), vehicle.wheels)
-    return len(weighted(excited(vehicle, road, SPEEDS[0]), filters).A)
+    return len(weighted(excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0]), filters).A)
 
 
 def linearised(name: str) -> int:
@@ -159,7 +145,7 @@ def noisy(damping: float) -> int:
     own = load_vehicle("half_car")
     damped = replace(own, tyres=tuple(replace(tyre, damping=damping) for tyre in own.tyres))
     vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
-    system = excited(vehicle, excitation(road_of_level(1.0), on_track(vehicle.wheels, 1.0)), SPEEDS[0])
+    system = excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0])
     return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
 
 
@@ -184,31 +170,15 @@ def rows(quick: bool = False) -> list[Row]:
     names = ("quarter_car", "quarter_car_nonlinear")
     bare, curved = (callbacks(name) for name in names)
     why = "counted from outside, in the modules of a fresh process, in the engine's items, in the system's size"
-    process = (
-        []
-        if quick
-        else [
-            at_most(
-                "absent.ride.imports",
-                SYSTEM,
-                "modules of engines, of the compiler and of other routes that a linear ride of the reference imports",
-                len(imported("reference")),
-                "",
-                0,
-                why,
-                "none",
-            )
-        ]
-    )
+    told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
+    counted = () if quick else (len(imported("reference")),)
     return [
-        *process,
+        *(at_most("absent.ride.imports", SYSTEM, told, count, "", 0, why, "none") for count in counted),
         behaves(
             "absent.ride.states",
             SYSTEM,
             "states of R19-ride: alone, with Wk, with Wk and Wd",
-            ", ".join(
-                str(states(f)) for f in ({}, {"body centre": "Wk"}, {"body centre": "Wk", "left occupant": "Wd"})
-            ),
+            ", ".join(str(states(dict(FILTERS[:count]))) for count in range(3)),
             "42, 50, 56",
             "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6",
         ),

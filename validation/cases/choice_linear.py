@@ -7,32 +7,29 @@ from typing import Any
 import numpy as np
 
 from models.advice.ride_choice.activity import activity
-from models.advice.ride_choice.choose import WORTH, Choice, Chooser, largest
-from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.choose import WORTH, Choice, Chooser
 from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.systems import load
-from models.ride.frequency import road, transfer
-from models.systems.ride.of_scene import vehicle_of
-from models.systems.ride.reduced_scene import Effect, Held, without
-from studies.asked import SCENES
-from validation.choice.nearby import measured_step, worst_nearby
+from models.systems.ride.reduced_scene import Effect, without
+from validation.choice.judged import asked, changes_by_frequency, measured_step, worst_nearby
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
 from validation.ride.drawn_rides import Drawn, drawn
 
+SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
+"""The published half car."""
 TITLE = "Effects that a ride scene calls for, chosen with a certificate"
 SYSTEM: System = "effects"
 SCENES_DRAWN, SECOND_ROUTE = 40, 10
 """Scenes, three of four of detailed vehicles; how many are judged by the frequency route, too."""
-RANGE, DRAWS = (0.7, 1.0, 1.3), 8
-"""Speeds of a scene by the one that is drawn; random speeds and parameters at which its choice is looked at."""
+DRAWS = 8
+"""Random speeds and parameters at which a choice is looked at."""
 TOLERANCE = 0.02
 """Of every other scene; the others have their own, from 0.5 to 10 %."""
 FIRST = (2, 5)
 """Seeds of the quick share, in both of which effects are left out."""
+PARTS = ("predicted", "confirmed")
 TOLD = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: larger than rounding could be blamed for, below 5 %."""
-OMEGA = np.geomspace(1e-2, 3e5, 3000)
-"""rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
 
 
 @dataclass(frozen=True)
@@ -51,56 +48,32 @@ class Judged:
     measured: float
 
     @property
+    def saving(self) -> float:
+        """Calls at equal accuracy of the whole scene by those of what is left."""
+        return self.choice.before.calls / self.choice.after.calls
+
+    @property
     def honest(self) -> bool:
         """Whether no route finds a tolerance broken that was reported as kept."""
-        found = self.choice.confirmed if self.by_frequency is None else self.by_frequency
-        return not self.choice.kept or bool((abs(found) <= self.scene.tolerance * (1 + 1e-2)).all())
-
-
-def asked(scene: Drawn) -> Chooser:
-    """Of a range of speeds about that of the scene."""
-    return Chooser(scene.held, [share * scene.speed for share in RANGE], scene.quantities, scene.tolerance)
-
-
-def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
-    """Changes (quantities,) of the worst listed speed."""
-    left = without(chooser.held, choice.left_out)
-    ratios = [
-        _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.held, chooser.rows)
-        for whole in chooser.wholes
-    ]
-    return largest(np.sqrt(ratios) - 1)
+        changes = self.choice.confirmed if self.by_frequency is None else self.by_frequency
+        return not self.choice.kept or bool((abs(changes) <= self.scene.tolerance * (1 + 1e-2)).all())
 
 
 def judged(scene: Drawn, second: bool) -> Judged:
     """Choose, then certify by the identity and, where asked, by frequency."""
     chooser = asked(scene)
     choice, whole = chooser.choose(), chooser.wholes[0]
-    rest = whole.reduced(without(scene.held, choice.left_out))
+    rest = whole.reduced(without(scene.scene, choice.left_out))
     two, one = Screen(whole.full, chooser.rows).identity(rest)
-    changes = changes_by_frequency(chooser, choice) if second else None
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
-    measured = 1.0
-    if chosen:
-        measured = measured_step(chooser, chosen) / measured_step(chooser, none)
     return Judged(
         scene,
         choice,
         float(abs(two / one - 1).max()),
-        changes,
+        changes_by_frequency(chooser, choice) if second else None,
         worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS),
-        measured,
+        measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
     )
-
-
-def _by_frequency(whole: Whole, held: Held, rows: list[int]) -> np.ndarray:
-    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
-    rest = whole.reduced(held)
-    parts = transfer(rest.vehicle, OMEGA) @ road(rest.excitation, whole.speed, OMEGA)
-    delays = np.array(rest.excitation.lengths) / whole.speed
-    turn = np.exp(-1j * delays[:, None] * OMEGA)[:, :, None, None]
-    seen = (parts * turn).sum(axis=0)
-    return np.asarray(2 * np.trapezoid((abs(seen[:, rows]) ** 2).sum(axis=2) / (2 * np.pi), OMEGA, axis=0))
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -114,7 +87,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ]
     rows = [*_kept_rows(found), _identity_row(found), *_equal_rows(found)]
     if not quick:
-        rows += [*_prediction_rows(found), *_saving_rows(found)]
+        rows += [_prediction_row(found), _saving_row(found)]
     pair_rows, pair = _pair()
     return [*rows, *pair_rows, *_activity_rows()], {"scenes": [_shown(one) for one in found], "pair": pair}
 
@@ -158,33 +131,23 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
     ]
 
 
-def _ratios(found: list[Judged]) -> np.ndarray:
+def _prediction_row(found: list[Judged]) -> Row:
     """Predicted by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
-    pairs = [
-        (p, c)
-        for one in found
-        for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True)
-        if TOLD[0] < abs(c) < TOLD[1]
-    ]
-    return np.array([p / c for p, c in pairs])
-
-
-def _prediction_rows(found: list[Judged]) -> list[Row]:
-    ratios = _ratios(found)
+    predicted, confirmed_ = (np.concatenate([getattr(one.choice, part) for one in found]) for part in PARTS)
+    told = (abs(confirmed_) > TOLD[0]) & (abs(confirmed_) < TOLD[1])
+    ratios = predicted[told] / confirmed_[told]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
-    return [
-        within(
-            "choice_linear.predictions",
-            SYSTEM,
-            f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones",
-            share,
-            "",
-            1.0,
-            0.05,
-            "asked: within a factor of 2; where two larger changes cancel, what is left cannot be told that well",
-            "none",
-        )
-    ]
+    return within(
+        "choice_linear.predictions",
+        SYSTEM,
+        f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones",
+        share,
+        "",
+        1.0,
+        0.05,
+        "asked: within a factor of 2; where two larger changes cancel, what is left cannot be told that well",
+        "none",
+    )
 
 
 def _identity_row(found: list[Judged]) -> Row:
@@ -204,7 +167,7 @@ def _identity_row(found: list[Judged]) -> Row:
 def _equal_rows(found: list[Judged]) -> list[Row]:
     """Of all scenes: the tolerance nearby, and what is saved, by routes that the choice does not go."""
     told = sum(bool(one.choice.said) and not one.choice.left_out for one in found)
-    gaps = [abs(_saving(one) / one.measured - 1.0) for one in found]
+    gaps = [abs(one.saving / one.measured - 1.0) for one in found]
     saving = [one for one in found if one.choice.left_out]
     return [
         at_most(
@@ -246,7 +209,7 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(_saving(one) < 1.0 + WORTH for one in saving)),
+            str(sum(one.saving < 1.0 + WORTH for one in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -254,30 +217,23 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
     ]
 
 
-def _saving_rows(found: list[Judged]) -> list[Row]:
-    saved = [_saving(one) for one in found if one.scene.tolerance == TOLERANCE]
-    return [
-        finding(
-            "choice_linear.saving",
-            SYSTEM,
-            "calls at equal accuracy, whole scene by what is left, median of "
-            f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
-            float(np.median(saved)),
-            "times",
-            "",
-            "it depends on what is asked of which vehicle: a wheel's force needs the wheel",
-            "none",
-        )
-    ]
-
-
-def _saving(one: Judged) -> float:
-    return one.choice.before.calls / one.choice.after.calls
+def _saving_row(found: list[Judged]) -> Row:
+    saved = [one.saving for one in found if one.scene.tolerance == TOLERANCE]
+    return finding(
+        "choice_linear.saving",
+        SYSTEM,
+        "calls at equal accuracy, whole scene by what is left, median of "
+        f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
+        float(np.median(saved)),
+        "times",
+        "",
+        "it depends on what is asked of which vehicle: a wheel's force needs the wheel",
+        "none",
+    )
 
 
 def _paper() -> Chooser:
-    scene = load(SCENES / "ride_choice.toml")
-    return Chooser(Held(scene, vehicle_of(scene)), scene.speeds.all(), scene.quantities, scene.tolerance)
+    return Chooser.of(load(SCENE))
 
 
 def _pair() -> tuple[list[Row], dict[str, Any]]:
@@ -328,7 +284,7 @@ def _activity_rows() -> list[Row]:
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     share = finite["inertia body ry"] / sum(finite.values())
     locked = next(effect for effect in chooser.effects if effect.name == "body ry")
-    rest = chooser.wholes[0].reduced(without(chooser.held, [locked]))
+    rest = chooser.wholes[0].reduced(without(chooser.scene, [locked]))
     change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
         finding(
@@ -359,7 +315,7 @@ def _shown(one: Judged) -> dict[str, Any]:
         "tolerance": one.scene.tolerance,
         "predicted": choice.predicted.tolist(),
         "confirmed": choice.confirmed.tolist(),
-        "saving": _saving(one),
+        "saving": one.saving,
         "kept": choice.kept,
         "nearby": one.nearby,
         "measured": one.measured,
@@ -387,9 +343,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from models.drawing.figures import plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
-    predicted, confirmed_ = (
-        100 * abs(np.array([v for one in data["scenes"] for v in one[key]])) for key in ("predicted", "confirmed")
-    )
+    predicted, confirmed_ = (100 * abs(np.array([v for one in data["scenes"] for v in one[key]])) for key in PARTS)
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color="#0072b2", label="a quantity")

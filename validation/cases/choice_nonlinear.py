@@ -1,18 +1,18 @@
 """Effects of scenes that are run in time, chosen within a tolerance: is the choice right, and what does it save?"""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from models.advice.choice.choose import Choice, Chooser
+from models.advice.choice.choose import Chooser
 from models.advice.choice.variants import Variants
 from models.advice.ride_choice.in_time import FEWEST
 from models.core.errors import InputError
-from validation.choice.drawn_scenes import Asked, drawn
+from validation.choice.drawn_scenes import drawn
+from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
-from validation.ride.drawn_bent_rides import COPIES, Bent, drawn_bent
+from validation.ride.drawn_rides import COPIES, Bent, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
 SYSTEM: System = "effects"
@@ -37,50 +37,23 @@ TOLD = (1e-4, 0.05)
 """Confirmed changes whose predictions are judged: as for linear scenes."""
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice; of rides, on
-    fresh roads and less what chance may add there."""
-
-    system: str
-    engine: str
-    asked: Asked | Bent
-    choice: Choice
-    again: np.ndarray
-
-    @property
-    def honest(self) -> bool:
-        """Whether no tolerance is broken that was reported as kept."""
-        return not self.choice.kept or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
-
-
-def judged(system: str, seed: int) -> Judged:
+def judged(system: str, seed: int) -> JudgedByRuns:
     """The scene of a seed."""
     if system == "ride":
         return judged_ride(drawn_bent(seed))
     return judged_of(drawn(system, seed), system, ENGINES[system][seed % len(ENGINES[system])])
 
 
-def judged_of(asked: Asked, system: str, engine: str) -> Judged:
-    """Choose, and run the scene and what is left once more."""
-    chooser = Chooser(asked.scene(), engine, list(asked.quantities), asked.tolerance)
-    choice, runs = chooser.choose(), chooser.whole.variants
-    whole = runs.system.answer(asked.scene(), engine)
-    rest = runs.system.answer(runs.changed(frozenset(choice.left_out), choice.times), engine)
-    again = [_change(whole.of(name).cases, rest.of(name).cases) for name in asked.quantities]
-    return Judged(system, engine, asked, choice, np.array(again))
-
-
-def judged_ride(asked: Bent) -> Judged:
+def judged_ride(asked: Bent) -> JudgedByRuns:
     """Choose, and run the vehicle and what is left on roads that the choice has not seen."""
     engine = ENGINES["ride"][0]
     choice = Chooser(asked.opened(), engine, list(asked.quantities), asked.tolerance).choose()
     fresh = Variants(asked.opened(FRESH * COPIES, AGAIN), engine)
     whole, rest = fresh.of(), fresh.of(choice.left_out, choice.times)
     if whole is None or rest is None:
-        return Judged("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
+        return JudgedByRuns("ride", engine, asked, choice, np.full(len(asked.quantities), np.inf))
     again = [_sure(whole.of(name).cases[0], rest.of(name).cases[0]) for name in asked.quantities]
-    return Judged("ride", engine, asked, choice, np.array(again))
+    return JudgedByRuns("ride", engine, asked, choice, np.array(again))
 
 
 def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
@@ -88,17 +61,6 @@ def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
     picked = np.random.default_rng(AGAIN).integers(len(whole), size=(RESAMPLED, len(whole)))
     changes = np.abs(np.sqrt(rest[picked].mean(axis=1) / whole[picked].mean(axis=1)) - 1.0)
     return float(np.quantile(changes, UNSURE))
-
-
-def _change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float:
-    """Worst case: rms of the difference where both have a row, by the path's deviation, or a number's by its size."""
-    worst = 0.0
-    for full, left in zip(whole, rest, strict=True):
-        rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)
-        size = full.std() if len(full) > 1 else abs(full[0])
-        largest = max(one.std() if len(one) > 1 else abs(one[0]) for one in whole)
-        worst = max(worst, float(np.sqrt(np.mean((left - full[rows]) ** 2)) / max(size, 1e-3 * largest)))
-    return worst
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -110,7 +72,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"scenes": [_shown(one) for one in found], "systems": list(seeds)}
 
 
-def _kept(found: list[Judged]) -> list[Row]:
+def _kept(found: list[JudgedByRuns]) -> list[Row]:
     kept = float(np.mean([one.choice.kept and one.honest for one in found]))
     return [
         within(
@@ -154,13 +116,13 @@ def _refused() -> Row:
     )
 
 
-def _pairs(found: list[Judged]) -> np.ndarray:
+def _pairs(found: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is told from zero and below 5 %."""
     pairs = [(p, c) for one in found for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True)]
     return np.array([pair for pair in pairs if TOLD[0] < pair[1] < TOLD[1]]).reshape(-1, 2)
 
 
-def _predictions(found: list[Judged], quick: bool) -> Row:
+def _predictions(found: list[JudgedByRuns], quick: bool) -> Row:
     ratios = np.divide(*_pairs(found).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
@@ -170,7 +132,7 @@ def _predictions(found: list[Judged], quick: bool) -> Row:
     return within(name, SYSTEM, said, share, "", 1.0, 0.05, asked, "none")
 
 
-def _saving(found: list[Judged], system: str) -> list[Row]:
+def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
     own = [one for one in found if one.system == system]
     calls = np.array([one.choice.calls for one in own], float)
     seconds = np.array([one.choice.seconds for one in own])
@@ -210,7 +172,7 @@ def _saving(found: list[Judged], system: str) -> list[Row]:
     ]
 
 
-def _shown(one: Judged) -> dict[str, Any]:
+def _shown(one: JudgedByRuns) -> dict[str, Any]:
     choice = one.choice
     return {
         "system": one.system,

@@ -18,7 +18,7 @@ from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.ride.in_engines import ridden
+from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride
 from models.vehicles.cut_vehicle import cut

@@ -4,38 +4,34 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from models.ride.closed_forms import QuarterCar, half_car_acceleration, split_half_car
-from models.ride.covariance import FINITE, Covariance, stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.closed_forms import half_car_acceleration, split_half_car
+from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.ride.frequency import quadrature, spectra
-from models.ride.marginal import Unstable, parts
+from models.ride.frequency import quadrature
 from models.ride.sweep import sweep
-from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
 from models.road.shape_filter import ShapeFilter
-from models.road.two_track import CASES, TwoTrackRoad, excitation, half_track, input_covariance, road_of_level
+from models.road.two_track import CASES, TwoTrackRoad, input_covariance, road_of_level
 from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
-from validation.ride.ride_corners import corners
-from validation.ride.ride_twins import twin
+from validation.common.rows import Row, System, Table, aim, at_most, behaves
+from validation.ride.no_variance import CORNER, weighting_rows, without_variance
+from validation.ride.rides import INTENSITY, corners, five_cases, off, one_track, paper_road, twin
 
 TITLE = "Ride: stationary covariance with exact delays"
 SYSTEM: System = "ride"
 SEED = 5
 """Of the asymmetric twins, and of the roads and speeds they run at."""
-CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
-INTENSITY = 1e-4
-"""Of the walking road, m^2 per m."""
 SHIPPED = ("r19_ride", "r19_free", "seven_freedoms", "three_axle_truck")
 TWINS = ("r19_ride", "r19_free", "three_axle_truck")
 FILTERS = {"left occupant": "Wk", "right occupant": "Wk", "body centre": "Wk"}
@@ -47,15 +43,7 @@ LEAST = 1e-20
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All but the engines' own linearisations in quick; there, of the vehicles, two at one speed."""
     routes = [_by_quadrature(*job) for job in _jobs(quick)]
-    rows = [
-        *_closed_rows(),
-        *_route_rows(routes),
-        *_limit_rows(),
-        *_weighting_rows(),
-        *_white_rows(),
-        *_free_rows(),
-        _unstable_row(),
-    ]
+    rows = [*_closed_rows(), *_route_rows(routes), *_limit_rows(), *weighting_rows(SEED), *without_variance()]
     engines = () if quick else ("exudyn", "mujoco")
     rows += [_engine_row(engine) for engine in engines]
     speeds = SPEEDS[::20] if quick else SPEEDS
@@ -67,11 +55,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _vehicle(name: str, seed: int = 0) -> SpatialVehicle:
     vehicle = load_vehicle(name)
     return twin(vehicle, seed) if seed else vehicle
-
-
-def _cases(vehicle: LinearVehicle, road: TwoTrackRoad | None = None) -> dict[int, Excitation]:
-    road = road or road_of_level(half_track(vehicle.wheels))
-    return {number: excitation(road, vehicle.wheels, *case) for number, case in CASES.items()}
 
 
 def _jobs(quick: bool) -> Iterator[tuple[str, int, TwoTrackRoad | None, float]]:
@@ -97,45 +80,39 @@ def _random_road(seed: int) -> TwoTrackRoad:
 def _by_quadrature(name: str, seed: int, road: TwoTrackRoad | None, speed: float) -> dict[str, Any]:
     """Largest relative difference of standard deviations, of all outputs in all five cases, and both own errors."""
     vehicle = linearise(_vehicle(name, seed), speed)
-    worst, errors, count = 0.0, [0.0, 0.0], 0
-    for one in _cases(vehicle, road).values():
-        found, other = stationary(excited(vehicle, one, speed)), quadrature(vehicle, one, speed)
-        told = _told(found)
-        worst = max(worst, _worst(found.deviation[told], np.sqrt(other.variance[told])))
-        errors = [max(errors[0], found.error[told].max()), max(errors[1], other.error[told].max())]
-        count += int(told.sum())
-    label = name + (f", twin {seed}" if seed else "")
-    return {"vehicle": label, "speed": speed, "values": count, "worst": worst, "errors": errors}
+    compared = [
+        _compared(vehicle, vehicle, excitation, speed) for excitation in five_cases(vehicle.wheels, road).values()
+    ]
+    worst, by_covariance, by_quadrature, counts = zip(*compared, strict=True)
+    return {
+        "vehicle": name + (f", twin {seed}" if seed else ""),
+        "speed": speed,
+        "values": sum(counts),
+        "worst": max(worst),
+        "errors": [max(by_covariance), max(by_quadrature)],
+    }
 
 
-def _told(found: Covariance) -> np.ndarray:
-    """Outputs that are not zero by symmetry."""
-    return found.variance > LEAST * found.variance.max()
-
-
-def _worst(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.abs(found / expected - 1.0).max())
-
-
-def _walk(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
-    """One track under axles at ``places``, z' = -corner z + w."""
-    heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
-    filter_ = np.array([[-corner]]), np.array([[INTENSITY**0.5]])
-    return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
+def _compared(
+    vehicle: LinearVehicle, analytic: LinearVehicle, road: Excitation, speed: float
+) -> tuple[float, float, float, int]:
+    """Largest relative difference of the covariance of a vehicle from quadrature of the analytic one, what each says of
+    its own error, and how many outputs are not zero by symmetry."""
+    covariance, integrals = stationary(excited(vehicle, road, speed)), quadrature(analytic, road, speed)
+    told = covariance.variance > LEAST * covariance.variance.max()
+    worst = off(covariance.deviation[told], np.sqrt(integrals.variance[told]))
+    return worst, covariance.error[told].max(), integrals.error[told].max(), int(told.sum())
 
 
 def _closed_rows() -> list[Row]:
     """Quarter car and half car against their formulas."""
     worst = {"acceleration": 0.0, "travel": 0.0, "deflection": 0.0}
     for corner in (0.0, 1e-6, 1e-3, 0.3, 3.0):
-        found = stationary(excited(corners([(0.0, CORNER)]), _walk((0.0,), corner), 20.0)).variance
+        variance = stationary(excited(corners([(0.0, CORNER)]), one_track((0.0,), corner), 20.0)).variance
         q, w = 20.0 * INTENSITY, 20.0 * corner
-        pairs = {
-            "acceleration": (found[0], CORNER.body_acceleration(q, w)),
-            "travel": (found[1], CORNER.suspension_travel(q, w)),
-        }
-        pairs |= {"deflection": (found[2], CORNER.tyre_deflection(q))} if corner == 0.0 else {}
-        worst |= {key: max(worst[key], abs(a / b - 1)) for key, (a, b) in pairs.items()}
+        exact = [CORNER.body_acceleration(q, w), CORNER.suspension_travel(q, w), CORNER.tyre_deflection(q)]
+        for key, value, expected in zip(worst, variance[:3], exact if corner == 0.0 else exact[:2], strict=False):
+            worst[key] = max(worst[key], off(value, expected))
     rows = [
         at_most(
             f"ride_covariance.quarter.{key}",
@@ -149,40 +126,38 @@ def _closed_rows() -> list[Row]:
         )
         for key, value in worst.items()
     ]
-    a, b = 1.2, 1.5
+    a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
     front, rear, inertia = split_half_car(CORNER, a, b)
     vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
-    half = [stationary(excited(vehicle, _walk((a, -b)), v)).variance[0] for v in (3.0, 17.0, 50.0)]
-    formula = [half_car_acceleration(CORNER, v * INTENSITY, a, b, v) for v in (3.0, 17.0, 50.0)]
-    off = _worst(np.array(half), np.array(formula))
+    half = [stationary(excited(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
+    formula = [half_car_acceleration(CORNER, v * INTENSITY, a, b, v) for v in speeds]
     what = "half car that splits into quarter cars, variance at its centre of gravity, delay exact, 3 to 50 m/s"
-    return [*rows, at_most("ride_covariance.half", SYSTEM, what, off, "", 1e-10, "asked", "closed form")]
+    worst_half = off(np.array(half), np.array(formula))
+    return [*rows, at_most("ride_covariance.half", SYSTEM, what, worst_half, "", 1e-10, "asked", "closed form")]
 
 
 def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
-    rows = []
-    for name in dict.fromkeys(route["vehicle"] for route in routes):
-        own = [route for route in routes if route["vehicle"] == name]
-        what = f"standard deviations of {name}, {sum(route['values'] for route in own)} values, five cases"
-        rows.append(
-            at_most(
-                f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
-                SYSTEM,
-                f"{what}: against quadrature of spectra by dynamic stiffness",
-                max(route["worst"] for route in own),
-                "",
-                1e-6,
-                "asked; both routes claim better than 1e-9",
-                "native",
-            )
+    by_vehicle = {name: [*group] for name, group in groupby(routes, key=itemgetter("vehicle"))}
+    return [
+        at_most(
+            f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
+            SYSTEM,
+            f"standard deviations of {name}, {sum(route['values'] for route in group)} values, five cases: "
+            "against quadrature of spectra by dynamic stiffness",
+            max(route["worst"] for route in group),
+            "",
+            1e-6,
+            "asked; both routes claim better than 1e-9",
+            "native",
         )
-    return rows
+        for name, group in by_vehicle.items()
+    ]
 
 
 def _limit_rows() -> list[Row]:
     """Delays of zero and without end, and the road's own covariances."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
-    road = _cases(vehicle)[3]
+    road = paper_road(vehicle.wheels)
     one = excited(vehicle, road, 20.0)
     at_once = stationary(replace(one, delays=(0.0,) * 3)).deviation
     joined = stationary(replace(one, B=(sum(one.B),), D=(sum(one.D),), delays=(0.0,))).deviation  # type: ignore[arg-type]
@@ -193,7 +168,7 @@ def _limit_rows() -> list[Row]:
             "ride_covariance.delay.zero",
             SYSTEM,
             "three axles at delay 0 against one input, worst output",
-            _worst(at_once, joined),
+            off(at_once, joined),
             "",
             0.0,
             "exact: they are the same equation",
@@ -203,7 +178,7 @@ def _limit_rows() -> list[Row]:
             "ride_covariance.delay.long",
             SYSTEM,
             "delays of 1e6 s against independent axles, worst output",
-            _worst(late, apart),
+            off(late, apart),
             "",
             1e-14,
             "exact but for rounding: the response has died out",
@@ -217,12 +192,11 @@ def _inputs_row() -> Row:
     """What the system says of the heights under its own wheels."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road, worst = road_of_level(1.0), 0.0
-    for number, case in CASES.items():
-        system = excited(vehicle, _cases(vehicle, road)[number], 13.0)
-        states = 2 * len(vehicle.mass)
-        H = np.hstack([np.zeros((len(vehicle.wheels), states)), *_cases(vehicle, road)[number].heights])
-        found, wanted = H @ stationary(system).P @ H.T, input_covariance(road, vehicle.wheels, *case)
-        worst = max(worst, float(np.abs(found - wanted).max() / np.abs(wanted).max()))
+    for met, case in zip(five_cases(vehicle.wheels, road).values(), CASES.values(), strict=True):
+        H = np.hstack([np.zeros((len(vehicle.wheels), 2 * len(vehicle.mass))), *met.heights])
+        heights = H @ stationary(excited(vehicle, met, 13.0)).P @ H.T
+        expected = input_covariance(road, vehicle.wheels, *case)
+        worst = max(worst, float(np.abs(heights - expected).max() / np.abs(expected).max()))
     return at_most(
         "ride_covariance.inputs",
         SYSTEM,
@@ -235,176 +209,6 @@ def _inputs_row() -> Row:
     )
 
 
-def _weighting_rows() -> list[Row]:
-    vehicle = linearise(_vehicle("r19_ride", SEED))
-    road, rows = _cases(vehicle)[3], []
-    for name in ("Wk", "Wd"):
-        found = stationary(weighted(excited(vehicle, road, 20.0), {"left occupant": name})).deviation[-1]
-        other = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
-        at = [output.name for output in vehicle.outputs].index("left occupant")
-        rows.append(
-            at_most(
-                f"ride_covariance.weighting.{name}",
-                SYSTEM,
-                f"{name} of a seat as states behind the vehicle, against its frequency response in the quadrature",
-                found / other.variance[at] ** 0.5 - 1,
-                "",
-                1e-8,
-                "asked of the cascade; as one polynomial it is 2e-4 off",
-                "native",
-            )
-        )
-    return rows
-
-
-def _white_rows() -> list[Row]:
-    """Tyre damping: what has no variance is said, with its reason, and what has one is right."""
-    vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
-    found = stationary(excited(vehicle, _walk((0.0,), 0.3), 20.0))
-    other = quadrature(vehicle, _walk((0.0,), 0.3), 20.0)
-    rows = [
-        behaves(
-            f"ride_covariance.white.{name}",
-            SYSTEM,
-            f"tyre damping under a road of first order: {what}",
-            found.status[i],
-            expected,
-            found.reason[i],
-        )
-        for name, what, i, expected in (
-            ("body", "body acceleration", 0, "finite"),
-            ("load", "wheel load", 4, "infinite"),
-            ("wheel", "wheel acceleration", 5, "infinite"),
-        )
-    ]
-    return [
-        *rows,
-        at_most(
-            "ride_covariance.white.value",
-            SYSTEM,
-            "the outputs that stay finite, against quadrature",
-            _worst(found.variance[:4], other.variance[:4]),
-            "",
-            1e-10,
-            "both routes at their best",
-            "native",
-        ),
-    ]
-
-
-def _free_rows() -> list[Row]:
-    """Three zero eigenvalues: found, harmless, the same with slycot, and a heading that roll steer lets walk."""
-    free = _vehicle("r19_free")
-    vehicle = linearise(free, 20.0)
-    road = _cases(vehicle)[3]
-    system = excited(vehicle, road, 20.0)
-    split, found = parts(system.A), stationary(system)
-    same = np.array_equal(_with_slycot(system), found.variance)
-    steer = {"fl": 0.05, "fr": 0.05}
-    forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)
-    turning = linearise(replace(free, side_forces=forces), 20.0)
-    walking = stationary(excited(turning, road, 20.0))
-    side = walking.names.index("lateral position")
-    others = {status for i, status in enumerate(walking.status) if i != side}
-    after = float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
-    return [
-        within(
-            "ride_covariance.free.zeros",
-            SYSTEM,
-            "zero eigenvalues that are found in R19-free",
-            split.zeros,
-            "",
-            3,
-            0,
-            "place along and across, heading",
-            "closed form",
-        ),
-        behaves(
-            "ride_covariance.free.status",
-            SYSTEM,
-            "all outputs of R19-free",
-            " and ".join(set(found.status)),
-            FINITE,
-            found.reason[0],
-        ),
-        behaves(
-            "ride_covariance.free.slycot",
-            SYSTEM,
-            "R19-free where slycot seems installed, bit by bit",
-            "same" if same else "different",
-            "same",
-            "the method is named; its routines would raise here",
-        ),
-        behaves(
-            "ride_covariance.free.steered",
-            SYSTEM,
-            "front roll steer 0.05: lateral position",
-            walking.status[side] if others == {FINITE} else "others too",
-            "diffusing",
-            walking.reason[side],
-        ),
-        within(
-            "ride_covariance.free.walk",
-            SYSTEM,
-            "its standard deviation after 100 s",
-            after,
-            "m",
-            7.0,
-            0.5,
-            "known to one digit, from the same law worked out beforehand",
-            "closed form",
-        ),
-        _walk_row(turning, road, float(walking.rate[side]), side),
-    ]
-
-
-def _walk_row(vehicle: LinearVehicle, road: Excitation, rate: float, side: int) -> Row:
-    """A place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies."""
-    omega = np.array([1e-3])
-    density = spectra(vehicle, road, 20.0, omega)[0, side]
-    return at_most(
-        "ride_covariance.free.rate",
-        SYSTEM,
-        "growth of its variance, rate t^3, against 2 pi w^4 / 3 times its density at 0.001 rad/s",
-        rate / (2 * np.pi * omega[0] ** 4 * density / 3) - 1,
-        "",
-        1e-4,
-        "the next term is smaller by the square of frequency over the slowest pole",
-        "native",
-    )
-
-
-def _with_slycot(system: DelayedSystem) -> np.ndarray:
-    """Variances where python-control believes that slycot is installed, with routines that cannot be called."""
-    import control.exception as installed
-    import control.mateqn as solvers
-
-    kept = installed.slycot_installed, solvers.sb03md, solvers.sb04md
-    installed.slycot_installed, solvers.sb03md, solvers.sb04md = True, None, None
-    try:
-        return stationary(system).variance
-    finally:
-        installed.slycot_installed, solvers.sb03md, solvers.sb04md = kept
-
-
-def _unstable_row() -> Row:
-    try:
-        stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), _walk((0.0,), 0.3), 20.0))
-    except Unstable as error:
-        said = "refused" if "swings at 11.8" in str(error) and "grows" in str(error) else "refused without its mode"
-        return behaves(
-            "ride_covariance.unstable", SYSTEM, "a quarter car with a damper of -5 N s/m", said, "refused", str(error)
-        )
-    return behaves(
-        "ride_covariance.unstable",
-        SYSTEM,
-        "a quarter car with a damper of -5 N s/m",
-        "answered",
-        "refused",
-        "it swings up",
-    )
-
-
 def _engine_row(engine: str) -> Row:
     """The engines' own linearisation through the covariance, against quadrature of the analytic vehicle."""
     from models.engines.spatial_protocol import build
@@ -413,10 +217,8 @@ def _engine_row(engine: str) -> Row:
     for name, speed in (("r19_ride", 20.0), ("r19_free", 33.0), ("three_axle_truck", 9.0)):
         vehicle = _vehicle(name, SEED)
         linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
-        for road in _cases(analytic).values():
-            found, other = stationary(excited(linear, road, speed)), quadrature(analytic, road, speed)
-            told = _told(found)
-            worst = max(worst, _worst(found.deviation[told], np.sqrt(other.variance[told])))
+        roads = five_cases(analytic.wheels).values()
+        worst = max(worst, *(_compared(linear, analytic, road, speed)[0] for road in roads))
     return at_most(
         f"ride_covariance.engine.{engine}",
         SYSTEM,
@@ -434,7 +236,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     """Five cases over speeds with weighting, fast and direct, timed in this process's own seconds."""
     vehicle = _vehicle("r19_ride")
     linear = linear_vehicle(vehicle, source)
-    roads = {str(number): road for number, road in _cases(linear(20.0)).items()}
+    roads = five_cases(linear(20.0).wheels)
     sweep(linear, roads, speeds[:1], FILTERS)  # what is loaded and linearised once is no part of the sweep
     start = time.process_time()
     quick = sweep(linear, roads, speeds, FILTERS)
@@ -447,7 +249,7 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             "ride_covariance.fast.equal",
             SYSTEM,
             "fast route against the direct one, with three weighted seats, variance, worst of all outputs",
-            _worst(quick.variance[:, some][told], slow.variance[told]),
+            off(quick.variance[:, some][told], slow.variance[told]),
             "",
             1e-10,
             "asked",

@@ -1,7 +1,6 @@
 """Bent springs on a random road: statistical linearisation against Monte Carlo, both engines in time."""
 
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,37 +10,23 @@ from scipy.integrate import quad
 
 from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.ride.frequency import spectra
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time
-from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import promised, statistically_linear
-from models.ride.time_averages import standard_errors
-from models.road.excitation import Excitation
-from models.road.two_track import LEVEL, excitation, half_track, on_track, road_of_level
-from models.systems.ride.in_engines import Ride, ridden
-from models.vehicles.linear_vehicle import LinearVehicle
-from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise, wheels
-from models.vehicles.vehicle_file import load_vehicle
+from models.vehicles.spatial_linear import linearise
 from validation.common.rows import Row, System, Table, at_most
+from validation.ride.in_engines import NONLINEAR, SEED, SPEED, bent_in_engines, draw, linear_in_engines, ride
+from validation.ride.rides import off
 
+__all__ = ["draw", "measure", "tables"]
 TITLE = "Nonlinear ride: statistical linearisation, Monte Carlo beside it, both engines in time"
 SYSTEM: System = "ride"
-ENGINES = ("exudyn", "mujoco")
-SEED, GRAVITY, SPEED = 2211, 9.81, 20.0
-NONLINEAR = "quarter_car_nonlinear"
 LEVELS = (1.0, 4.0, 16.0)
 """Times the level of the paper: class C or so, E, and G, where the stops are met all the time."""
 COPIES, LASTING = (60, 400), (1.5, 10.0)
 """Monte Carlo in the quick and in the full share; its length in s."""
-STEP, DRIVEN, SKIPPED = 2.5e-3, 24.0, 4.0
-"""Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
-NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
 MILD = 1500.0
 """Damping (N s/m) beside a law that is looked at alone."""
-SHOWN = ("body centre", "left occupant", "travel front left", "tyre force front left")
-SAME = "the same tableau, road and laws; the sums are taken in another order"
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -52,21 +37,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         found, line = _level(level, quick)
         rows += found
         table.append(line)
-    rows += _bent_in_engines(quick)
+    rows += bent_in_engines(quick)
     if quick:
         return rows, {"levels": table, "spectra": {}}
     rows += [_linear_copies(), *_alone()]
-    found, shown = _linear_in_engines()
+    found, shown = linear_in_engines()
     return rows + found, {"levels": table, "spectra": shown}
-
-
-@cache
-def ride(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
-    """A shipped vehicle and a road of some times the paper's level, one without a width on one track."""
-    vehicle = replace(load_vehicle(name), gravity=gravity)
-    own = wheels(vehicle)
-    y = half_track(own)
-    return vehicle, excitation(road_of_level(y or 1.0, level * LEVEL), own if y else on_track(own, 1.0))
 
 
 def _gains() -> list[Row]:
@@ -136,9 +112,7 @@ def _fixed_point() -> list[Row]:
     vehicle, road = ride(NONLINEAR, 4.0)
     one, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
-    apart = [
-        float(np.abs(each.covariance.deviation / one.covariance.deviation - 1.0).max()) for each in (other, unloaded)
-    ]
+    apart = [off(each.covariance.deviation, one.covariance.deviation) for each in (other, unloaded)]
     return [
         at_most(
             "ride_nonlinear.fixed_point",
@@ -269,125 +243,6 @@ def _alone() -> list[Row]:
     return rows
 
 
-def _bent_in_engines(quick: bool) -> list[Row]:
-    """The nonlinear quarter car under gravity in both engines; its mean travel where the damper pulls it."""
-    vehicle, excitation_ = ride(NONLINEAR)
-    road = road_path(excitation_, SPEED, NONLINEAR_STEP)
-    runs = {
-        engine: ridden(
-            engine, vehicle, road, NONLINEAR_DRIVEN[not quick], seed=SEED, skipped=SKIPPED * (not quick), every=5
-        )
-        for engine in ENGINES
-    }
-    rows = [_apart("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
-    if quick:
-        return rows
-    found = statistically_linear(vehicle, excitation_, SPEED)
-    travel, force = (found.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
-    size, left = found.covariance.deviation, found.left_out
-    error, _ = standard_errors(found.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
-    for engine, run in runs.items():
-        shift = abs(run.outputs[:, travel].mean() - found.mean[travel]) / size[travel]
-        rows.append(
-            at_most(
-                f"ride_nonlinear.mean.{engine}",
-                SYSTEM,
-                f"the same in {engine}: mean travel, predicted {1e3 * found.mean[travel]:.2f} mm, by its deviation",
-                float(shift),
-                "",
-                promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
-                "what its sentence promises, and 4 standard errors",
-                "none",
-            )
-        )
-        mean = abs(run.outputs[:, force].mean()) / error[force]
-        rows.append(
-            at_most(
-                f"ride_nonlinear.load.{engine}",
-                SYSTEM,
-                "the same: mean of the dynamic tyre force, |z|",
-                float(mean),
-                "",
-                4.0,
-                "the tyre bears the weight, however the damper pulls",
-                "none",
-            )
-        )
-    return rows
-
-
-def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
-    one, other = (runs[engine].run for engine in ENGINES)
-    gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
-    return at_most(
-        f"ride_nonlinear.path.{id}",
-        SYSTEM,
-        f"{what} on one random road: exudyn against mujoco, all states",
-        float(gap),
-        "m, rad, m/s, rad/s",
-        1e-12,
-        SAME,
-        "native",
-    )
-
-
-def _linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
-    """19 freedoms, gravity on, one path of the random road: variances and means against the covariance."""
-    vehicle, excitation_ = ride("r19_ride")
-    road = road_path(excitation_, SPEED, STEP)
-    runs = {engine: ridden(engine, vehicle, road, DRIVEN, seed=SEED, skipped=SKIPPED, every=2) for engine in ENGINES}
-    linear = linearise(vehicle)
-    exact = stationary(excited(linear, excitation_, SPEED))
-    errors = standard_errors(linear, excitation_, SPEED, DRIVEN - SKIPPED)
-    rows = [_apart("r19_ride", f"r19_ride under gravity, {DRIVEN:g} s", runs)]
-    for engine, run in runs.items():
-        mean = run.outputs.mean(axis=0) / errors[0]
-        square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]
-        share = float(np.median(errors[1] / exact.variance / 2.0))
-        rows += [
-            at_most(
-                f"ride_nonlinear.variance.{engine}",
-                SYSTEM,
-                f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
-                f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
-                float(np.abs(square).max()),
-                "",
-                4.0,
-                "standard errors by the densities: samples of a path know of each other",
-                "none",
-            ),
-            at_most(
-                f"ride_nonlinear.zero.{engine}",
-                SYSTEM,
-                "the same: means about the equilibrium, largest |z| of 16",
-                float(np.abs(mean).max()),
-                "",
-                4.0,
-                "the road has no mean, and gravity is carried",
-                "none",
-            ),
-        ]
-    return rows, _spectra(runs, linear, excitation_)
-
-
-def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation_: Excitation) -> dict[str, Any]:
-    """One-sided densities over Hz of shown outputs: the covariance's own, and each engine's by Welch's method."""
-    from scipy.signal import welch
-
-    frequency = np.geomspace(0.2, 40.0, 300)
-    own = 4.0 * np.pi * spectra(linear, excitation_, SPEED, 2.0 * np.pi * frequency)
-    names = [output.name for output in linear.outputs]
-    shown = {"frequency": frequency.tolist(), "own": {name: own[:, names.index(name)].tolist() for name in SHOWN}}
-    for engine, run in runs.items():
-        f, density = welch(run.outputs, 1.0 / run.interval, nperseg=round(4.0 / run.interval), axis=0)
-        keep = (f > 0.4) & (f <= frequency[-1])  # below, leakage of the windows
-        shown[engine] = {
-            "frequency": f[keep].tolist(),
-            **{name: density[keep, names.index(name)].tolist() for name in SHOWN},
-        }
-    return shown
-
-
 def tables(data: dict[str, Any]) -> list[Table]:
     """What statistical linearisation is worth."""
     names = [output.name for output in ride(NONLINEAR)[0].outputs]
@@ -396,37 +251,3 @@ def tables(data: dict[str, Any]) -> list[Table]:
         "the kurtosis, 3 for a Gaussian output. The road's level by that of the paper."
     )
     return [Table("Statistical linearisation", note, ("level", *names), tuple(tuple(row) for row in data["levels"]))]
-
-
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Spectra of both engines' runs over the covariance's own."""
-    if not data["spectra"]:
-        return []
-    from models.drawing.figures import COLOURS, LABELS, plt
-
-    shown = data["spectra"]
-    units = ("(m/s$^2$)$^2$/Hz", "(m/s$^2$)$^2$/Hz", "m$^2$/Hz", "N$^2$/Hz")
-    figure, axes = plt.subplots(2, 2, figsize=(10.0, 6.4), sharex=True)
-    for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
-        for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
-            own = shown[engine]
-            axis.loglog(
-                own["frequency"],
-                own[name],
-                style,
-                color=COLOURS[engine],
-                linewidth=width,
-                label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
-            )
-        axis.loglog(shown["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
-        top = max(shown["own"][name])
-        axis.set(title=name.capitalize(), ylabel=f"one-sided density [{unit}]", ylim=(1e-5 * top, 5 * top))
-    for axis in axes[1]:
-        axis.set_xlabel("frequency [Hz]")
-    axes[0, 0].legend(fontsize=8)
-    figure.suptitle(f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
-    caption = (
-        "Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
-        "method; black, what the covariance's own linear vehicle and road say."
-    )
-    return [(caption, figure)]

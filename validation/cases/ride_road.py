@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
-from scipy.linalg import block_diag
 
 from models.ride.covariance import stationary
-from models.ride.delayed_system import DelayedSystem
-from models.ride.excited import excited
-from models.ride.height_densities import both_sides, output_densities, variances
+from models.ride.excited import DelayedSystem, excited
+from models.ride.frequency import both_sides, output_densities, variances
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.road.excitation import Excitation
 from models.road.isotropic import IsotropicRoad, Part, cross_spectrum_of, isotropic_like, spectral_matrix
@@ -20,8 +18,8 @@ from models.vehicles.linear_vehicle import LinearVehicle, Wheel
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, at_most, finding
-from validation.ride.fitted_roads import HALF_TRACK, fits_table, made, measured
-from validation.ride.road_figure import coherency_figure
+from validation.ride.fitted_roads import HALF_TRACK, coherency_figure, fits_table, made, measured
+from validation.ride.rides import STANDARD, off
 
 TITLE = "Ride: roads under two tracks"
 SYSTEM: System = "ride"
@@ -37,32 +35,6 @@ WHEELS = (
 SPEED = 20.0
 BAND = (1e-4, 500.0)
 """rad/m, of the frequency route."""
-STANDARD = (
-    (0.5, 418, 853),
-    (0.63, 459, 944),
-    (0.8, 477, 992),
-    (1.0, 482, 1011),
-    (1.25, 484, 1008),
-    (1.6, 494, 968),
-    (2.0, 531, 890),
-    (2.5, 631, 776),
-    (3.15, 804, 642),
-    (4.0, 967, 512),
-    (5.0, 1039, 409),
-    (6.3, 1054, 323),
-    (8.0, 1036, 253),
-    (10.0, 988, 212),
-    (12.5, 902, 161),
-    (16.0, 768, 125),
-    (20.0, 636, 100),
-    (25.0, 513, 80.0),
-    (31.5, 405, 63.2),
-    (40.0, 314, 49.4),
-    (50.0, 246, 38.8),
-    (63.0, 186, 29.5),
-    (80.0, 132, 21.1),
-)
-"""ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
 MISPRINT = 10.0
 """Hz at which the table's Wd, 212, is not that of its own parameters, 202."""
 
@@ -146,18 +118,13 @@ def _input_rows() -> list[Row]:
 
 def heights_covariance(road: Excitation, speed: float = SPEED) -> np.ndarray:
     """Covariance (w, w) in m^2 of the heights under the wheels by the Lyapunov equation of all axles' filters."""
-    axles, m = len(road.heights), len(road.F)
-    B = []
-    for i in range(axles):
-        noise = np.zeros((axles * m, road.G.shape[1]))
-        noise[i * m : (i + 1) * m] = speed**0.5 * road.G
-        B.append(noise)
-    C = np.hstack(road.heights)
+    axles, C = np.eye(len(road.heights)), np.hstack(road.heights)
+    B = tuple(np.kron(axles[:, [i]], speed**0.5 * road.G) for i in range(len(axles)))
     D = tuple(np.zeros((len(C), road.G.shape[1])) for _ in B)
     delays = tuple(length / speed for length in road.lengths)
-    names = tuple(str(i) for i in range(len(C)))
-    A = block_diag(*([speed * road.F] * axles))
-    return np.asarray(C @ stationary(DelayedSystem(A, tuple(B), delays, C, D, names, road.independent)).P @ C.T)
+    names = tuple(map(str, range(len(C))))
+    A = np.kron(axles, speed * road.F)
+    return C @ stationary(DelayedSystem(A, B, delays, C, D, names, road.independent)).P @ C.T
 
 
 def _limit_row() -> Row:
@@ -196,7 +163,7 @@ def _isotropic_rows() -> list[Row]:
             "ride_road.isotropic.fourier",
             SYSTEM,
             "cross density of an isotropic road: Bessel function against the Fourier integral of R(sqrt(x^2 + d^2))",
-            float(np.abs(along / closed - 1.0).max()),
+            off(along, closed),
             "",
             1e-11,
             "quadrature to 1e-12 of the variance, over a density that falls",
@@ -207,7 +174,7 @@ def _isotropic_rows() -> list[Row]:
             SYSTEM,
             "the same for waviness 2.6: Bessel function of order 1.3 against "
             "the integral over the two-dimensional density",
-            float(np.abs(across / hankel - 1.0).max()),
+            off(across, hankel),
             "",
             1e-9,
             "quadrature to 1e-12 of the density on the track",
@@ -247,7 +214,7 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
             "ride_road.route",
             SYSTEM,
             f"{len(exact)} accelerations of R19-ride from the densities of the heights, against the covariance",
-            _largest(by_frequency / exact - 1.0),
+            off(by_frequency, exact),
             "",
             1e-6,
             "0.0001 to 500 rad/m; no filter and no state on one side; what lies beyond is 1e-7",
@@ -255,21 +222,19 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
         )
     ]
     why = "isotropic tracks part sooner than mean and roll process as waves get shorter: less heave, more roll"
-    for name, one, other in zip(_names(vehicle), isotropic, exact, strict=True):
-        if name in ("body centre", "roll acceleration"):
-            rows.append(
-                finding(
-                    f"ride_road.isotropic.{name.split()[0]}",
-                    SYSTEM,
-                    f"{name} of R19-ride at "
-                    f"{SPEED:g} m/s: isotropic road over two-track road of the same track spectrum",
-                    float(one / other),
-                    "",
-                    "",
-                    why,
-                )
-            )
-    return rows
+    return rows + [
+        finding(
+            f"ride_road.isotropic.{name.split()[0]}",
+            SYSTEM,
+            f"{name} of R19-ride at {SPEED:g} m/s: isotropic road over two-track road of the same track spectrum",
+            float(isotropic[i] / exact[i]),
+            "",
+            "",
+            why,
+        )
+        for i, name in enumerate(_names(vehicle))
+        if name in ("body centre", "roll acceleration")
+    ]
 
 
 def _accelerations(values: np.ndarray, vehicle: LinearVehicle) -> np.ndarray:
@@ -285,10 +250,6 @@ def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) ->
     return np.sqrt(_accelerations(found, vehicle))
 
 
-def _largest(errors: np.ndarray) -> float:
-    return float(np.abs(errors).max())
-
-
 def _weighting_rows() -> list[Row]:
     """The standard's table, the filters' states against their formulas, and weighted accelerations by two routes."""
     frequency, wk, wd = np.array(STANDARD).T
@@ -297,7 +258,7 @@ def _weighting_rows() -> list[Row]:
         W = WEIGHTINGS[name]
         digit = 10.0 ** (np.floor(np.log10(np.minimum(table, 999.0))) - 2.0)
         sound = (frequency != MISPRINT) | (name != "Wd")
-        off = (1e3 * np.abs(W.response(frequency)) - table) / digit
+        digits = (1e3 * np.abs(W.response(frequency)) - table) / digit
         A, B, C = W.matrices()
         by_states = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
         rows += [
@@ -305,7 +266,7 @@ def _weighting_rows() -> list[Row]:
                 f"ride_road.weighting.{name}.table",
                 SYSTEM,
                 f"{name} from the parameters against the table of ISO 2631-1, {sound.sum()} frequencies",
-                _largest(off[sound]),
+                float(np.abs(digits[sound]).max()),
                 "units of the table's last digit",
                 1.0,
                 "half a unit of rounding; two entries were cut off, not rounded",
@@ -315,7 +276,7 @@ def _weighting_rows() -> list[Row]:
                 f"ride_road.weighting.{name}.states",
                 SYSTEM,
                 f"{name}: cascade of scaled sections against the formula of its sections",
-                _largest(by_states / W.response(frequency) - 1.0),
+                off(by_states, W.response(frequency)),
                 "",
                 1e-13,
                 "rounding",
@@ -345,11 +306,10 @@ def _weighted_rows() -> list[Row]:
     found = stationary(system).deviation[-len(filters) :]
     k, weight = both_sides(vehicle, *BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
-    names = [output.name for output in vehicle.outputs]
     rows = []
     for value, (output, name) in zip(found, filters.items(), strict=True):
         gain = np.abs(WEIGHTINGS[name].response(SPEED * k / (2.0 * np.pi))) ** 2
-        expected = math.sqrt(weight @ (gain * density[:, names.index(output)]))
+        expected = math.sqrt(weight @ (gain * density[:, vehicle.names.index(output)]))
         rows.append(
             at_most(
                 f"ride_road.weighted.{name}",

@@ -17,11 +17,11 @@ from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import REACH, quasi_stationary, varying_speed
 from models.road.excitation import Excitation
-from models.road.two_track import excitation, half_track, on_track, road_of_level
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, at_most, behaves, finding
+from validation.ride.rides import off, paper_road
 
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
 SYSTEM: System = "ride"
@@ -69,9 +69,7 @@ def ride(name: str, tyre_damping: float = 0.0, cutoff: float | None = None) -> t
     """
     spatial = load_vehicle(name)
     vehicle = linearise(replace(spatial, tyres=tuple(replace(t, damping=tyre_damping) for t in spatial.tyres)))
-    y = half_track(vehicle.wheels)
-    wheels = vehicle.wheels if y else on_track(vehicle.wheels, 1.0)
-    return vehicle, excitation(road_of_level(y or 1.0, cutoff=cutoff), wheels)
+    return vehicle, paper_road(vehicle.wheels, cutoff=cutoff)
 
 
 def _limits(name: str, stops: SpeedProfile) -> list[Row]:
@@ -89,7 +87,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
             f"ride_varying_speed.settled.{name}",
             SYSTEM,
             f"{name}, long after a change from 10 to 20 m/s: all outputs against the Lyapunov equation",
-            float(np.abs(settled[-1] / exact - 1.0).max()),
+            off(settled[-1], exact),
             "",
             1e-10,
             "the stationary limit, relative",
@@ -99,7 +97,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
             f"ride_varying_speed.even.{name}",
             SYSTEM,
             f"{name}, at 20 m/s all the time: likewise, worst instant",
-            float(np.abs(even / exact - 1.0).max()),
+            off(even, exact),
             "",
             1e-10,
             "nothing may drift",
@@ -109,7 +107,7 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
             f"ride_varying_speed.road.{name}",
             SYSTEM,
             f"{name}, through 0, 30 and 0 m/s, standing included: variance of the road under each wheel, worst instant",
-            float(np.abs((stopped.height / stopped.height[0]) ** 2 - 1.0).max()),
+            off((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
             1e-10,
             "the road does not know how fast it is driven over; relative",
@@ -137,7 +135,7 @@ def _adjoint() -> Row:
         "ride_varying_speed.adjoint",
         SYSTEM,
         "half_car, a stop within its wheelbase and off again: body rear against the adjoint, relative",
-        abs(float(found.of("body rear")[-1]) / exact - 1.0),
+        off(found.of("body rear")[-1], exact),
         "",
         1e-8,
         "the adjoint's solver is good to 1e-10",
@@ -165,8 +163,8 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     """The 19 freedoms along a drive: covariance, quasi-stationary, copies, and the seconds."""
     vehicle, road = ride("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
-    copies, slow = _timed(lambda: along(vehicle, road, profile, instants, copies=COPIES, seed=SEED))
-    found, fast = _timed(lambda: varying_speed(vehicle, road, profile, instants=copies.time))
+    copies, slow = _timed(along, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
+    found, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
     columns = [found.names.index(point) for point in POINTS]
     near = np.abs(found.time[:, None] - often).argmin(axis=0)
@@ -186,8 +184,7 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
 
 def _copies(name: str, found: dict[str, Any]) -> list[Row]:
     """Copies at three instants in three points, all outputs beside, and the error of the quasi-stationary answer."""
-    quasi, true = np.array(found["quasi"]), np.array(found["deviation"])
-    off = np.abs(quasi / true - 1.0)
+    error = off(np.array(found["quasi"]), np.array(found["deviation"]))
     return [
         at_most(
             f"ride_varying_speed.copies.{name}",
@@ -213,7 +210,7 @@ def _copies(name: str, found: dict[str, Any]) -> list[Row]:
             f"ride_varying_speed.quasi.{name}",
             SYSTEM,
             f"r19_ride {name}: largest error of the quasi-stationary standard deviation in 3 points",
-            float(off.max()),
+            error,
             "",
             {"accelerating": 0.017, "braking": 0.15}[name],
             "beside what a prototype sampled; the largest over all instants",
@@ -227,7 +224,7 @@ def _constant() -> list[Row]:
     vehicle, road = ride("r19_ride")
     exact = stationary(at_speed(vehicle, road, STEADY))
     fast = _timed(lambda: [stationary(at_speed(vehicle, road, STEADY)) for _ in range(REPEATS)])[1] / REPEATS
-    copies, slow = _timed(lambda: at_constant_speed(vehicle, road, STEADY, LASTING, copies=STEADY_COPIES, seed=SEED))
+    copies, slow = _timed(at_constant_speed, vehicle, road, STEADY, LASTING, copies=STEADY_COPIES, seed=SEED)
     columns = [copies.names.index(point) for point in POINTS]
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
@@ -276,9 +273,10 @@ def _constant() -> list[Row]:
     ]
 
 
-def _timed(run: Callable[[], Any]) -> tuple[Any, float]:
+def _timed(run: Callable[..., Any], *given: Any, **more: Any) -> tuple[Any, float]:
+    """What a call returns, and its processor seconds."""
     start = time.process_time()
-    return run(), time.process_time() - start
+    return run(*given, **more), time.process_time() - start
 
 
 def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, output: str) -> float:

@@ -9,7 +9,7 @@ The covariance S(a - b) of f(a) and f(b) is exact, so that of x_i with f and of 
 In the motions of the vehicle R is diagonal.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,9 +23,10 @@ SHARES = (0.0, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Sampled:
-    """Runs of ``march``, whose quantities have no weightings."""
+    """Runs of ``march``, whose quantities have no weightings, in steps (s)."""
 
     march: March
+    step: float = 0.0
 
     @property
     def longest(self) -> float:
@@ -35,24 +36,12 @@ class Sampled:
     def deviations(self, step: float) -> np.ndarray:
         """Standard deviations (q,) of the quantities at the steps (s) of a run."""
         assert not self.march.weightings
-        return _Steps(self.march, step).deviations()
-
-
-@dataclass(frozen=True)
-class _Steps:
-    """A run of ``march`` in steps (s)."""
-
-    march: March
-    step: float
-
-    def deviations(self) -> np.ndarray:
-        """Standard deviations (q,) of the quantities."""
-        axles = range(len(self._delays))
+        run, axles = replace(self, step=step), range(len(self._delays))
         total = np.zeros(len(self.march.rows))
         for i in axles:
             for j in [i] if self.march.reduced.excitation.independent else axles:
-                total += self._shared(i, j)
-        return np.asarray(np.sqrt(total))
+                total += run._shared(i, j)
+        return np.sqrt(total)
 
     def _shared(self, i: int, j: int) -> np.ndarray:
         """Covariances (q,) of what axle i moves with what axle j moves."""
@@ -61,7 +50,7 @@ class _Steps:
         with_road = np.einsum("ql,lm,qm->q", seen, self._with_road(i, late), by_j)
         back = np.einsum("ql,lm,qm->q", seen, self._with_road(j, -late), by_i)
         road = np.einsum("ql,lm,qm->q", by_i, self._road(-late), by_j)
-        return np.asarray((motions + with_road + back + road).real)
+        return (motions + with_road + back + road).real
 
     def _late(self, i: int, j: int) -> float:
         """Time (s) by which the road of axle j is ahead of that of axle i."""
@@ -80,13 +69,13 @@ class _Steps:
     def _variance(self) -> np.ndarray:
         """Of the filters (m, m)."""
         G = self.march.reduced.excitation.G
-        return np.asarray(solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T))
+        return solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T)
 
     def _road(self, later: float) -> np.ndarray:
         """S (m, m): the filters by themselves ``later`` seconds before."""
         if later < 0:
             return self._road(-later).T
-        return np.asarray(expm(self._rate * later) @ self._variance)
+        return expm(self._rate * later) @ self._variance
 
     def _by_road(self, axle: int) -> np.ndarray:
         """Quantities by an axle's filters (q, m)."""
@@ -98,7 +87,7 @@ class _Steps:
     def _grown(self) -> np.ndarray:
         """R (n,) of the motions."""
         z = self.step * self.march.motions[0]
-        return np.asarray(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24)
+        return 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
 
     def _moved(self, axle: int) -> list[np.ndarray]:
         """B (n, m) by share of the step."""
@@ -120,7 +109,7 @@ class _Steps:
     def _driven(self, axle: int, late: float) -> np.ndarray:
         """A step's forces (n, m) by the filters ``late`` seconds after the step begins, in the axle's own time."""
         parts = zip(self._moved(axle), SHARES, strict=True)
-        return np.asarray(sum(B @ self._road(share * self.step - late) for B, share in parts))
+        return sum(B @ self._road(share * self.step - late) for B, share in parts)
 
     def _with_road(self, axle: int, after: float) -> np.ndarray:
         """x of an axle by the filters that it meets ``after`` seconds later (n, m); before, where that is negative."""
@@ -131,7 +120,7 @@ class _Steps:
         for i in range(steps):
             given = given @ sooner if i > 1 else self._driven(axle, begin - i * self.step)
             value = self._grown[:, None] * value + given
-        return np.asarray(value)
+        return value
 
     def _now(self, axle: int) -> np.ndarray:
         """x of an axle by the filters that it meets at that time (n, m)."""
@@ -151,7 +140,7 @@ class _Steps:
             B @ self._driven(j, share * self.step + self._late(j, i)).conj().T
             for B, share in zip(self._moved(i), SHARES, strict=True)
         )
-        return np.asarray(given / (1 - self._grown[:, None] * self._grown.conj()))
+        return given / (1 - self._grown[:, None] * self._grown.conj())
 
     def _before(self, i: int, j: int) -> np.ndarray:
         """x of axle i at a step's begin by the forces of axle j in that step (n, n)."""

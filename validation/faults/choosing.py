@@ -16,11 +16,9 @@ from models.advice.choice.screen import Screen
 from models.advice.ride_choice.choose import Choice
 from models.advice.ride_choice.choose import Chooser as LinearChooser
 from models.advice.ride_choice.screen import Screen as LinearScreen
-from validation.cases import choice_linear as linear
-from validation.cases import choice_nonlinear as nonlinear
 from validation.choice.drawn_scenes import Asked
 from validation.choice.drawn_scenes import drawn as drawn_run
-from validation.choice.nearby import worst_nearby
+from validation.choice.judged import JudgedByRuns, asked, changes_by_frequency, judged_of, worst_nearby
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import attribute
 from validation.ride.drawn_rides import Drawn, drawn
@@ -41,8 +39,8 @@ def _linear() -> Drawn:
 
 @cache
 def _run() -> Asked:
-    asked = drawn_run("pitch-plane", RUN)
-    return replace(asked, table={**asked.table, "run": {**asked.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
+    run = drawn_run("pitch-plane", RUN)
+    return replace(run, table={**run.table, "run": {**run.table["run"], "duration": 0.5}}, tolerance=TOLERANCE)
 
 
 def _by_frequency() -> tuple[Choice, np.ndarray, float]:
@@ -51,22 +49,22 @@ def _by_frequency() -> tuple[Choice, np.ndarray, float]:
     return _linear_by(LinearChooser.__init__, LinearChooser.confirm, LinearChooser.off, LinearScreen.predicted)
 
 
-def _by_runs() -> nonlinear.Judged:
+def _by_runs() -> JudgedByRuns:
     """The same of the half car."""
     return _runs_by(Chooser.__init__, Chooser.confirm, Screen.shares)
 
 
 @cache
 def _linear_by(*functions: Any) -> tuple[Choice, np.ndarray, float]:
-    chooser = linear.asked(_linear())
+    chooser = asked(_linear())
     choice = chooser.choose()
     nearby = worst_nearby(chooser, frozenset(choice.left_out), DRAWS, DRAWS) * chooser.tolerance
-    return choice, linear.changes_by_frequency(chooser, choice), nearby
+    return choice, changes_by_frequency(chooser, choice), nearby
 
 
 @cache
-def _runs_by(*functions: Any) -> nonlinear.Judged:
-    return nonlinear.judged_of(_run(), "pitch-plane", "reference")
+def _runs_by(*functions: Any) -> JudgedByRuns:
+    return judged_of(_run(), "pitch-plane", "reference")
 
 
 def _variances() -> float:
@@ -121,7 +119,7 @@ def _other_sign(real: Any) -> Any:
     def predicted(screen: LinearScreen, reduced: Any) -> np.ndarray:
         C = screen.base.system.C[screen.rows]
         full = np.einsum("ki,ij,kj->k", C, screen.P, C)
-        return np.asarray(np.maximum(2 * full - real(screen, reduced), 0.0))
+        return np.maximum(2 * full - real(screen, reduced), 0.0)
 
     return predicted
 

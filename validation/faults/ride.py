@@ -10,17 +10,17 @@ import numpy as np
 from models.engines.spatial_reference import SpatialReference
 from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.frequency import quadrature
-from models.ride.operating_point import poles
 from models.ride.weighting import WEIGHTINGS, weighting
 from models.road import two_track
 from models.road.excitation import Excitation
 from models.vehicles import spatial_linear, vehicle_file
-from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel, poles
 from models.vehicles.spatial import SpatialVehicle
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
+from validation.ride.rides import R19_FREQUENCIES, STANDARD, off
 
 SPEED = 17.0
 INERTIA = np.diag([207.26524557936952, 1565.8178787125541, 1791.5995300122856])
@@ -47,7 +47,7 @@ def _by_frequency() -> np.ndarray:
 
 def _quadrature() -> float:
     """Variances of the half car against the integrals over its spectra."""
-    return _off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
+    return off(stationary(_system("half_car", _one_track)[2]).variance, _by_frequency())
 
 
 def _closed_form() -> float:
@@ -56,7 +56,7 @@ def _closed_form() -> float:
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
     found = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
-    return _off(found, car.body_acceleration(q * SPEED, corner * SPEED))
+    return off(found, car.body_acceleration(q * SPEED, corner * SPEED))
 
 
 @cache
@@ -79,21 +79,19 @@ def _heights() -> float:
     from models.ride import excited
 
     found = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
-    return _off(found, _covariance_of_heights())
+    return off(found, _covariance_of_heights())
 
 
 def _published_road() -> float:
     """Variance of a track of the paper's road: pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
     found = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
-    return _off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
+    return off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
 def _frequencies() -> float:
     """19 eigenfrequencies of R19-ride as its data have them."""
-    from validation.cases.ride_engines import FREQUENCIES
-
-    own = spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride"))
-    return _off(np.sort(np.abs(poles(own)))[::2] / (2 * np.pi), np.array(FREQUENCIES))
+    rates = poles(spatial_linear.linearise(vehicle_file.load_vehicle("r19_ride")))
+    return off(np.sort(np.abs(rates))[::2] / (2 * np.pi), R19_FREQUENCIES)
 
 
 def _whole_inertia() -> float:
@@ -138,19 +136,13 @@ def _states_of_weighting() -> float:
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
     found = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
-    return float(np.abs(found / WEIGHTINGS["Wk"].response(frequency) - 1.0).max())
+    return off(found, WEIGHTINGS["Wk"].response(frequency))
 
 
 def _table_of_weighting() -> float:
     """Wk against the standard's table, relative."""
-    from validation.cases.ride_road import STANDARD
-
     frequency, wk, _ = np.array(STANDARD).T
-    return float(np.abs(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)) / wk - 1.0).max())
-
-
-def _off(found: Any, wanted: Any) -> float:
-    return float(np.abs(np.asarray(found) / wanted - 1.0).max())
+    return off(1e3 * np.abs(WEIGHTINGS["Wk"].response(frequency)), wk)
 
 
 CHECKS = {
@@ -178,8 +170,9 @@ def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
 
 def _reversed(real: Any) -> Any:
     def hits(system: DelayedSystem) -> Any:
-        B, D, delays = real(system)
-        return B[::-1], D[::-1], [delays[-1] - delay for delay in delays[::-1]]
+        met = real(system)
+        delays = [met.delays[-1] - delay for delay in met.delays[::-1]]
+        return met._replace(B=met.B[::-1], D=met.D[::-1], delays=delays)
 
     return hits
 
@@ -232,10 +225,7 @@ FAULTS = (
     Fault(
         "cross terms of the axles missing",
         "covariance",
-        attribute(
-            "models.ride.covariance:_responses",
-            lambda real: lambda A, B, delays, independent: [np.zeros_like(b) for b in B],
-        ),
+        attribute("models.ride.covariance:_responses", lambda real: lambda A, met: [np.zeros_like(b) for b in met.B]),
     ),
     Fault(
         "noise without the root of the speed",

@@ -5,110 +5,41 @@ Where an implementation takes part, the linear vehicle is its own; the covarianc
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from models.core.errors import InputError
 from models.core.scene_file import parse
-from models.ride.closed_forms import QuarterCar
 from models.ride.covariance import DIFFUSING, INFINITE, stationary
-from models.ride.delayed_system import DelayedSystem
 from models.ride.excited import excited
 from models.ride.frequency import quadrature
 from models.ride.marginal import Unstable
-from models.ride.operating_point import poles
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
 from models.ride.weighting import WEIGHTINGS, weighted
-from models.road.excitation import Excitation
-from models.road.two_track import excitation, half_track, on_track, road_of_level
-from models.systems.ride.of_scene import linear_vehicle
-from models.vehicles.linear_vehicle import LinearVehicle
-from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
+from models.vehicles.linear_vehicle import LinearVehicle, poles
 from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.ride.hard_rides import CORNER, SPEED, after_hours, closed_form, linear, quarter, single, steered
+from validation.ride.rides import INTENSITY, off, one_track, paper_road
 
 Change = Callable[[dict[str, Any]], object]
-SPEED = 20.0
-Q = 1e-4
-"""Intensity of a road of one state, m^2 per m."""
-BODY, CORNER = (0.0, 0.0, 1.0), (300.0, 40.0, 2e4, 1500.0, 2e5)
-"""Where a body of one freedom lies; masses of body and wheel, spring, damper and tyre of a quarter car."""
-
-
-def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
-    """The linear vehicle of an implementation."""
-    return linear_vehicle(vehicle, implementation)(speed)
-
-
-def track(corner: float, axles: int = 1) -> Excitation:
-    """One track with one state, all axles at one place: z' = -corner z + w in path, corner in rad/m."""
-    heights = tuple(np.eye(axles)[:, [i]] for i in range(axles))
-    return Excitation(np.array([[-corner]]), np.array([[Q**0.5]]), heights, (0.0,) * axles)
-
-
-def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
-    """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
-    own = replace(load_vehicle("quarter_car"), name="quarter")
-    bodies = tuple(replace(body, mass=m) for body, m in zip(own.bodies, (m_s, m_u), strict=True))
-    springs = (replace(own.springs[0], stiffness=k, damping=c),)
-    return replace(own, bodies=bodies, springs=springs, tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))
-
-
-def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
-    """A body on a tyre, held by a damper to the ground; outputs: its acceleration and its height."""
-    outputs = tuple(PointOutput(kind, kind, "body", BODY, (0.0, 0.0, 1.0)) for kind in ("acceleration", "displacement"))
-    damper = SpringDamper("damper", "body", None, BODY, BODY, (0.0, 0.0, 1.0), 0.0, damping)
-    return SpatialVehicle(
-        "single",
-        (Body("body", mass, BODY, ("z",)),),
-        (damper,),
-        (Tyre("tyre", "body", BODY, 0, stiffness),),
-        (0.0,),
-        outputs=outputs,
-    )
-
-
-def own_road(vehicle: LinearVehicle, **words: str) -> Excitation:
-    """The paper's road under a vehicle's own wheels; a vehicle without a width runs on one track."""
-    y = half_track(vehicle.wheels)
-    return excitation(road_of_level(y or 1.0), vehicle.wheels if y else on_track(vehicle.wheels, 1.0), **words)
-
-
-def from_closed_form(car: tuple[float, ...], corner: float, speed: float, implementation: str) -> float:
-    """Acceleration and travel of a quarter car against their closed forms, relative."""
-    found = stationary(excited(linear(quarter(*car), implementation), track(corner), speed)).variance[:2]
-    exact, q, w = QuarterCar(*car), Q * speed, corner * speed
-    wanted = np.array([exact.body_acceleration(q, w), exact.suspension_travel(q, w)])
-    return float(np.abs(found / wanted - 1.0).max())
-
-
-def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
-    """A case of a quarter car with some of its values changed."""
-    values = dict(zip(("m_s", "m_u", "k", "c", "k_t"), CORNER, strict=True)) | car
-
-    def error(implementation: str, folder: Path) -> float:
-        return max(from_closed_form(tuple(values.values()), corner, speed, implementation) for speed in speeds)
-
-    return error
 
 
 def damped_tyre(implementation: str, folder: Path) -> float:
     """Acceleration of the body against quadrature, where the force of the tyre, and it alone, is called infinite."""
-    vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), track(0.3)
+    vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), one_track((0.0,), 0.3)
     found = stationary(excited(vehicle, road, SPEED))
     if [status == INFINITE for status in found.status] != [False, False, True]:
         return np.inf
-    return float(np.abs(found.variance[:2] / quadrature(vehicle, road, SPEED).variance[:2] - 1.0).max())
+    return off(found.variance[:2], quadrature(vehicle, road, SPEED).variance[:2])
 
 
 def damped_tyre_naive(folder: Path) -> str:
     """Lyapunov's equation and the outputs without what reaches them directly."""
-    system = excited(linear(quarter(*CORNER, c_t=100.0), "reference"), track(0.3), SPEED)
+    system = excited(linear(quarter(*CORNER, c_t=100.0), "reference"), one_track((0.0,), 0.3), SPEED)
     silent = replace(system, D=tuple(0.0 * D for D in system.D))
     return f"C P C' gives the tyre force a standard deviation of {stationary(silent).deviation[2]:.0f} N"
 
@@ -116,47 +47,22 @@ def damped_tyre_naive(folder: Path) -> str:
 def free(implementation: str, folder: Path) -> float:
     """Accelerations of R19-free against the exact covariance after an hour, axles independent, relative."""
     vehicle = linear(load_vehicle("r19_free"), implementation)
-    system = excited(vehicle, own_road(vehicle, front_rear="uncorrelated"), SPEED)
+    system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
     found, wanted = stationary(system), after_hours(system)[0]
-    return float(np.abs(found.variance[rows] / wanted[rows] - 1.0).max())
-
-
-def after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
-    """Variances (p,) 1 and 2 hours after rest, axles independent: a step of 3 ms by van Loan's block, then doubled."""
-    n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
-    block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
-    E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]
-    found = []
-    for _ in range(22):
-        found.append(np.einsum("pi,ij,pj->p", system.C, P, system.C))
-        E, P = E @ E, P + E @ P @ E.T
-    return found[-2], found[-1]
-
-
-@cache
-def steered() -> SpatialVehicle:
-    """R19-free with roll steer in front; outputs: its heading and its place sideways."""
-    table = parse(SHIPPED / "r19_free.toml")
-    table["axles"][0]["roll_steer"] = 0.05
-    vehicle = build_vehicle(table, "steered")
-    outputs = (
-        TurnOutput("heading", "angle", "body", (0.0, 0.0, 1.0)),
-        PointOutput("place", "displacement", "body", vehicle.body("body").position, (0.0, 1.0, 0.0)),
-    )
-    return replace(vehicle, outputs=outputs)
+    return off(found.variance[rows], wanted[rows])
 
 
 def drifting(implementation: str, folder: Path) -> float:
     """Rates of heading (t) and place (t^3) against the exact covariance after 1 and 2 hours, axles independent."""
     vehicle = linear(steered(), implementation)
-    system = excited(vehicle, own_road(vehicle, front_rear="uncorrelated"), SPEED)
+    system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     found = stationary(system)
     if found.status != (DIFFUSING, DIFFUSING) or found.power.tolist() != [1, 3]:
         return np.inf
     one, two = after_hours(system)
     grown = (two - one) / (2.0**found.power - 1.0) / 3600.0**found.power
-    return float(np.abs(grown / found.rate - 1.0).max())
+    return off(grown, found.rate)
 
 
 def undamped(corner: float) -> Callable[..., float]:
@@ -164,12 +70,12 @@ def undamped(corner: float) -> Callable[..., float]:
 
     def error(implementation: str, folder: Path) -> float:
         own = replace(single(300.0, 2e5, 0.0), springs=())
-        found = stationary(excited(linear(own, implementation), track(corner), SPEED))
+        found = stationary(excited(linear(own, implementation), one_track((0.0,), corner), SPEED))
         if found.status != (DIFFUSING, DIFFUSING):
             return np.inf
         w2 = 2e5 / 300.0
-        height = w2 * Q * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
-        return float(np.abs(found.rate / (np.array([w2**2, 1.0]) * height) - 1.0).max())
+        height = w2 * INTENSITY * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
+        return off(found.rate, np.array([w2**2, 1.0]) * height)
 
     return error
 
@@ -177,13 +83,15 @@ def undamped(corner: float) -> Callable[..., float]:
 def triple(implementation: str, folder: Path) -> float:
     """Critically damped, and the road's corner at the same place: 3 q w^3 / 16 and 3 q / 16 w, relative."""
     w = 6.0
-    found = stationary(excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), track(w / SPEED), SPEED))
-    return float(np.abs(found.variance / (3.0 * Q * SPEED / 16.0 * np.array([w**3, 1.0 / w])) - 1.0).max())
+    found = stationary(
+        excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED)
+    )
+    return off(found.variance, 3.0 * INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
 
 
 def triple_naive(folder: Path) -> str:
     """The condition of the eigenvectors."""
-    system = excited(linear(single(300.0, 10800.0, 3600.0), "reference"), track(0.3), SPEED)
+    system = excited(linear(single(300.0, 10800.0, 3600.0), "reference"), one_track((0.0,), 0.3), SPEED)
     with np.errstate(all="ignore"):
         condition = np.linalg.cond(np.linalg.eig(system.A)[1])
     return f"sums over eigenvectors have a condition of {condition:.0e} there"
@@ -203,13 +111,13 @@ def toppling(implementation: str, folder: Path) -> float:
 
 
 def _refused_by_growth(vehicle: LinearVehicle) -> float:
-    road, growing = own_road(vehicle), float(poles(vehicle).real.max())
+    road, growing = paper_road(vehicle.wheels), float(poles(vehicle).real.max())
     for route in (lambda: stationary(excited(vehicle, road, SPEED)), lambda: quadrature(vehicle, road, SPEED)):
         try:
             route()
         except Unstable as error:
             said = error
-            if abs(error.growth / growing - 1.0) > 1e-9:
+            if off(error.growth, growing) > 1e-9:
                 return np.inf
         else:
             return np.inf
@@ -219,20 +127,20 @@ def _refused_by_growth(vehicle: LinearVehicle) -> float:
 def crawling(implementation: str, folder: Path) -> float:
     """A delay of 26,000 s between the axles against independent ones, relative."""
     vehicle = linear(load_vehicle("half_car"), implementation)
-    late, apart = (_deviation(vehicle, 1e-4, front_rear=word) for word in ("delayed", "uncorrelated"))
-    return float(np.abs(late / apart - 1.0).max())
+    late, apart = (_deviation(vehicle, 1e-4, word) for word in ("delayed", "uncorrelated"))
+    return off(late, apart)
 
 
 def same_place(implementation: str, folder: Path) -> float:
     """Two axles at one x, delayed by nothing, against one input, relative."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     here = replace(vehicle, wheels=tuple(replace(wheel, x=0.0) for wheel in vehicle.wheels))
-    delayed, equal = (_deviation(here, SPEED, front_rear=word) for word in ("delayed", "equal"))
-    return float(np.abs(delayed / equal - 1.0).max())
+    delayed, equal = (_deviation(here, SPEED, word) for word in ("delayed", "equal"))
+    return off(delayed, equal)
 
 
-def _deviation(vehicle: LinearVehicle, speed: float, **words: str) -> np.ndarray:
-    return stationary(excited(vehicle, own_road(vehicle, **words), speed)).deviation
+def _deviation(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delayed") -> np.ndarray:
+    return stationary(excited(vehicle, paper_road(vehicle.wheels, "modelled", axles), speed)).deviation
 
 
 def mirrored(implementation: str, folder: Path) -> float:
@@ -245,29 +153,25 @@ def mirrored(implementation: str, folder: Path) -> float:
         )
         vehicle = linear(replace(own, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
-        found.append(_answer(vehicle)[rows])
-    return float(np.abs(found[0] / found[1] - 1.0).max())
-
-
-def _answer(vehicle: LinearVehicle) -> np.ndarray:
-    return stationary(excited(vehicle, own_road(vehicle), SPEED)).deviation
+        found.append(_deviation(vehicle)[rows])
+    return off(found[0], found[1])
 
 
 def slow_weighting(implementation: str, folder: Path) -> float:
     """Body acceleration weighted by Wk at 1 mm/s against quadrature, relative."""
     vehicle = linear(quarter(*CORNER), implementation)
-    road, name = track(0.3), vehicle.outputs[0].name
+    road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
     found = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
     wanted = quadrature(vehicle, road, 1e-3, {name: WEIGHTINGS["Wk"].response}).variance[0]
-    return float(abs(found / wanted - 1.0))
+    return off(found, wanted)
 
 
 def standstill(implementation: str, folder: Path) -> float:
     """Variance of the road under each wheel from a stop to 10 m/s to a stop, relative to the first."""
     vehicle = linear(load_vehicle("half_car"), implementation)
     drive = SpeedProfile((0.0, 0.1, 1.1, 1.6, 2.0), (0.0, 0.0, 10.0, 0.0, 0.0))
-    height = varying_speed(vehicle, own_road(vehicle), drive).height
-    return float(np.abs((height / height[0]) ** 2 - 1.0).max())
+    height = varying_speed(vehicle, paper_road(vehicle.wheels), drive).height
+    return off((height / height[0]) ** 2, 1.0)
 
 
 def no_speed(implementation: str, folder: Path) -> float:
@@ -295,7 +199,7 @@ def bad(change: Change, place: str) -> Callable[..., float]:
             if place not in refusal.place:
                 return np.inf
             raise
-        return float(np.isfinite(_answer(linear(vehicle, implementation))).all()) + 1.0
+        return float(np.isfinite(_deviation(linear(vehicle, implementation))).all()) + 1.0
 
     return error
 

@@ -19,14 +19,14 @@ from models.machine.timing import interleave
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.frequency import quadrature, spectra
-from models.ride.monte_carlo import at_constant_speed
+from models.ride.monte_carlo import Estimate, at_constant_speed
 from models.ride.sweep import sweep
 from models.road.excitation import Excitation
-from models.road.two_track import CASES, excitation, half_track, road_of_level
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, at_most, finding, within
+from validation.ride.rides import five_cases
 
 SYSTEM: System = "cost"
 SPEED, LOWEST = 20.0, 1e-2
@@ -81,8 +81,7 @@ class Ride:
 def problem() -> Ride:
     """R19-ride at 20 m/s."""
     vehicle = linearise(load_vehicle("r19_ride"))
-    road = road_of_level(half_track(vehicle.wheels))
-    roads = {str(number): excitation(road, vehicle.wheels, *case) for number, case in CASES.items()}
+    roads = five_cases(vehicle.wheels)
     true = quadrature(vehicle, roads["3"], SPEED)
     return Ride(vehicle, roads, np.sqrt(true.variance), float(true.error.max()))
 
@@ -118,15 +117,16 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
         points.append(Point(name, "frequencies", count, errors, time.perf_counter() - begun))
         jobs.append(partial(grid, ride, count, last, even))
     for copies, lasting in COPIES[quick]:
-        begun = time.perf_counter()
-        points.append(replace(_copies(ride, copies, lasting), seconds=time.perf_counter() - begun))
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
-    taken = [p.seconds for p in points]
+        begun = time.perf_counter()
+        found: Estimate = jobs[-1]()
+        errors, z = ride.errors(np.sqrt(found.variance[0])), float(np.abs(found.z(ride.truth[None])).max())
+        name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - begun
+        points.append(Point(name, "copies", copies, errors, seconds, z))
     few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
-    for i, seconds in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True):
-        taken[i] = float(np.median(seconds))
-    per = {1: 5 * swept}  # of the sweep a point
-    points = [Point(**{**asdict(p), "seconds": taken[i] / per.get(i, 1)}) for i, p in enumerate(points)]
+    for i, times in zip(few, interleave([jobs[i] for i in few], rounds, least), strict=True):
+        points[i] = replace(points[i], seconds=float(np.median(times)))
+    points[1] = replace(points[1], seconds=points[1].seconds / (5 * swept))  # of the sweep a point
     return judged(ride, points), {"points": [asdict(p) for p in points], "uncertainty": ride.uncertainty}
 
 
@@ -139,30 +139,16 @@ def _lyapunov(ride: Ride) -> Point:
 
 
 def _swept(ride: Ride, speeds: int) -> Point:
-    from models.ride import modal
+    from models.ride import sweep as module
 
-    with mock.patch.object(modal, "modes", wraps=modal.modes) as made:
+    with mock.patch.object(module, "modes", wraps=module.modes) as made:
         found = fast(ride, speeds)
     return Point(f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(found), 0.0)
 
 
-def _copies(ride: Ride, copies: int, lasting: float) -> Point:
-    found = at_constant_speed(ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED)
-    errors = ride.errors(np.sqrt(found.variance[0]))
-    return Point(
-        f"Monte Carlo, {lasting:g} s each",
-        "copies",
-        copies,
-        errors,
-        0.0,
-        float(np.abs(found.z(ride.truth[None])).max()),
-    )
-
-
 def judged(ride: Ride, points: list[Point]) -> list[Row]:
     """Errors and counts against what they must be."""
-    by_name = {p.name.split(",")[0]: p for p in points}
-    exact = [by_name["Lyapunov"], by_name["sweep"]]
+    exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]
     rows = [
         at_most(

@@ -1,30 +1,65 @@
-"""Ride scenes drawn at random: vehicles with stiff and with irrelevant parts, roads, quantities, tolerances."""
+"""Ride scenes drawn at random: vehicles, roads, quantities, tolerances.
 
-from collections.abc import Callable
+Linear vehicles have stiff and irrelevant parts; bent springs have dampers, stops and friction.
+"""
+
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
+from models.advice.ride_choice.in_time import InTime, in_time
 from models.advice.ride_choice.reduced import Whole
 from models.ride.covariance import FINITE, stationary
-from models.systems.ride.reduced_scene import Held
-from models.systems.ride.scene import RideScene, build
+from models.systems.ride.omissions import wheels_of
+from models.systems.ride.reduced_scene import ReducedScene
+from models.systems.ride.scene import build
+from models.vehicles.curve import Curve
 from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
-from validation.ride.ride_twins import twin
+from validation.ride.rides import twin
 
 VEHICLES = ("quarter_car", "half_car", "half_car", "seven_freedoms")
+BENT_VEHICLES, TOLERANCES = ("quarter_car", "quarter_car", "half_car"), (0.02, 0.02, 0.05, 0.01)
+"""Drawn scenes with bent springs take these in turn."""
+SEED, LASTING, COPIES = 2211, 8.0, 48
+UP = (0.0, 0.0, 1.0)
+_loaded = cache(load_vehicle)
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """One scene: what it holds, its speed (m/s), the outputs that must stay right, and how right."""
+    """One scene, its speed (m/s), the outputs that must stay right, and how right."""
 
-    held: Held
+    scene: ReducedScene
     speed: float
     quantities: tuple[str, ...]
     tolerance: float
+
+
+@dataclass(frozen=True)
+class Bent:
+    """One scene with bent springs, what must stay right, and how right."""
+
+    scene: ReducedScene
+    quantities: tuple[str, ...]
+    tolerance: float
+
+    def opened(self, copies: int = COPIES, seed: int = 1) -> InTime:
+        """As it is run, with so many copies."""
+        options = {"copies": copies, "lasting": LASTING, "seed": seed}
+        return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
+
+
+class Draw:
+    """Random numbers of a seed."""
+
+    def __init__(self, seed: int | list[int]) -> None:
+        self.random = np.random.default_rng(seed)
+
+    def between(self, low: float, high: float) -> float:
+        """A number whose logarithm is as likely anywhere between these."""
+        return float(np.exp(self.random.uniform(np.log(low), np.log(high))))
 
 
 def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> Drawn:
@@ -33,40 +68,29 @@ def drawn(seed: int, tolerance: float | None = None, detailed: bool = True) -> D
     detailed : a vehicle as multibody programs hold it, every wheel on a stiff bushing and a light part on stiff mounts;
     else each of them in about half of the scenes, and soft at times.
     """
-    rng = np.random.default_rng(seed)
-
-    def between(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
+    draw = Draw(seed)
+    rng = draw.random
     name = str(rng.choice(VEHICLES))
-    vehicle = _vehicle(twin(_loaded(name), seed), rng, between, detailed)
-    cutoff = between(20.0, 200.0) if rng.random() < 0.4 else None
-    road = {} if cutoff is None else {"cutoff": cutoff}
+    vehicle = _vehicle(twin(_loaded(name), seed), draw, detailed)
+    cutoff = draw.between(20.0, 200.0) if rng.random() < 0.4 else None
     speed = float(rng.uniform(8.0, 40.0))
-    held = Held(_scene(name, road, speed), vehicle)
-    found = stationary(Whole(held, speed).full.system)
-    silent = 1e-9 * max(abs(v) for v in found.variance if np.isfinite(v))
-    told = [n for n, s, v in zip(found.names, found.status, found.variance, strict=True) if s == FINITE and v > silent]
+    scene = _scene("drawn", name, {} if cutoff is None else {"cutoff": cutoff}, speed, vehicle)
+    ride = stationary(Whole(scene, speed).full.system)
+    silent = 1e-9 * max(abs(v) for v in ride.variance if np.isfinite(v))
+    told = [n for n, s, v in zip(ride.names, ride.status, ride.variance, strict=True) if s == FINITE and v > silent]
     count = min(len(told), int(rng.integers(1, 3)))
-    asked = tuple(str(n) for n in rng.choice(told, count, replace=False))
-    return Drawn(held, speed, asked, tolerance or between(0.005, 0.1))
+    asked = tuple(map(str, rng.choice(told, count, replace=False)))
+    return Drawn(scene, speed, asked, tolerance or draw.between(0.005, 0.1))
 
 
-@cache
-def _loaded(name: str) -> SpatialVehicle:
-    return load_vehicle(name)
+def _scene(title: str, file: str, road: dict[str, float], speed: float, vehicle: SpatialVehicle) -> ReducedScene:
+    table = {"title": title, "system": "ride", "vehicle": {"file": file}, "road": road, "speeds": {"values": [speed]}}
+    return ReducedScene(build(table, "drawn"), vehicle)
 
 
-def _scene(name: str, road: dict[str, float], speed: float) -> RideScene:
-    table = {"title": "drawn", "system": "ride", "vehicle": {"file": name}, "road": road, "speeds": {"values": [speed]}}
-    return build(table, "drawn")
-
-
-def _vehicle(
-    vehicle: SpatialVehicle, rng: np.random.Generator, between: Callable[[float, float], float], detailed: bool
-) -> SpatialVehicle:
+def _vehicle(vehicle: SpatialVehicle, draw: Draw, detailed: bool) -> SpatialVehicle:
     """Light wheels, firm dampers, damped tyres in three of five; a fore-aft bushing and a part on mounts at times."""
-    wheels = {tyre.body for tyre in vehicle.tyres}
+    rng, between, wheels = draw.random, draw.between, wheels_of(vehicle)
     light, firm = between(0.15, 1.2), between(0.5, 4.0)
     damping = between(30.0, 400.0) if rng.random() < 0.6 else 0.0
     bodies = [replace(b, mass=light * b.mass) if b.name in wheels else b for b in vehicle.bodies]
@@ -74,31 +98,53 @@ def _vehicle(
     outputs = list(vehicle.outputs)
     if detailed or rng.random() < 0.4:
         k, lean = between(1e6 if detailed else 3e5, 2e7), rng.uniform(0.02, 0.15)
+        axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
         for i, body in enumerate(bodies):
             if body.name in wheels:
-                bodies[i] = replace(body, freedoms=("x", "z"))
-                axis = (float(np.cos(lean)), 0.0, float(np.sin(lean)))
-                springs.append(
-                    SpringDamper(
-                        f"{body.name} bush",
-                        "body",
-                        body.name,
-                        body.position,
-                        body.position,
-                        axis,
-                        k,
-                        0.1 * float(np.sqrt(k * body.mass)),
-                    )
-                )
+                bodies[i], at = replace(body, freedoms=("x", "z")), body.position
+                c = 0.1 * float(np.sqrt(k * body.mass))
+                springs.append(SpringDamper(f"{body.name} bush", "body", body.name, at, at, axis, k, c))
     if detailed or rng.random() < 0.6:
-        own = next(b for b in bodies if b.name == "body")
-        m = own.mass * between(0.002, 0.02 if detailed else 0.15)
-        at = (own.position[0] + float(rng.uniform(-1, 1)), own.position[1], own.position[2])
+        chassis = next(b for b in bodies if b.name == "body")
+        m = chassis.mass * between(0.002, 0.02 if detailed else 0.15)
+        at = (chassis.position[0] + float(rng.uniform(-1, 1)), *chassis.position[1:])
         k = m * (2 * np.pi * between(20.0 if detailed else 3.0, 200.0)) ** 2
         bodies.append(Body("part", m, at, ("z",)))
-        up = (0.0, 0.0, 1.0)
-        springs.append(SpringDamper("part", "part", "body", at, at, up, k, 0.2 * float(np.sqrt(k * m))))
+        springs.append(SpringDamper("part", "part", "body", at, at, UP, k, 0.2 * float(np.sqrt(k * m))))
         if not detailed:
-            outputs.append(PointOutput("part", "acceleration", "part", at, up))
+            outputs.append(PointOutput("part", "acceleration", "part", at, UP))
     tyres = tuple(replace(tyre, damping=damping) for tyre in vehicle.tyres)
     return replace(vehicle, bodies=tuple(bodies), springs=tuple(springs), tyres=tyres, outputs=tuple(outputs))
+
+
+def drawn_bent(number: int) -> Bent:
+    """The scene of a number whose springs are bent."""
+    draw = Draw([SEED, number])
+    name = BENT_VEHICLES[number % len(BENT_VEHICLES)]
+    vehicle = load_vehicle(name)
+    springs = tuple(_bent(spring, draw) for spring in vehicle.springs)
+    level, speed = draw.between(1e-5, 1.5e-4), float(draw.random.uniform(10.0, 35.0))
+    asked = draw.random.choice([output.name for output in vehicle.outputs], 2, replace=False)
+    scene = _scene(f"bent {number}", name, {"level": level}, speed, replace(vehicle, springs=springs))
+    return Bent(scene, tuple(map(str, asked)), TOLERANCES[number % len(TOLERANCES)])
+
+
+def _bent(spring: SpringDamper, draw: Draw) -> SpringDamper:
+    """A digressive damper that is harder in rebound, stops at both ends, and friction: each in most of the springs."""
+    c, rebound, digressive = spring.damping, draw.between(1.0, 2.5), draw.between(0.3, 1.0)
+    curve = Curve(
+        (-1.0, -0.2, 0.0, 0.2, 1.0),
+        (-c * rebound * (0.2 + 0.8 * digressive), -0.2 * c * rebound, 0.0, 0.2 * c, c * (0.2 + 0.8 * digressive)),
+    )
+    gap, hard = draw.between(0.02, 0.08), draw.between(2e4, 2e5)
+    stops = Curve((-gap - 0.05, -gap, gap, gap + 0.05), (-0.05 * hard, 0.0, 0.0, 0.05 * hard))
+    friction = draw.between(5.0, 80.0)
+    bent, stopped, dry = draw.random.random(3) < (0.8, 0.7, 0.7)
+    bent = bent or not (stopped or dry)
+    return replace(
+        spring,
+        rate_force=curve if bent else None,
+        damping=0.0 if bent else c,
+        travel_force=stops if stopped else None,
+        friction=friction if dry else 0.0,
+    )

@@ -14,9 +14,9 @@ import numpy as np
 
 from models.advice.choice.answer import Answer, by_chance, less, relative, rounding
 from models.advice.choice.variants import Variants, system_of
-from models.advice.ride_choice.in_time import goes_in_time
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
+from models.systems.ride.of_scene import goes_in_time
 
 STEPS = 960
 """Of every run, so many are priced."""

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from models.advice.price.effects import ROUNDS, SEED, Changed, Price, PriceList, spread
-from models.advice.ride_choice.cost import cost
+from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import Reduced, Whole
 from models.advice.ride_choice.screen import confirmed
 from models.core.errors import InputError
 from models.core.scene_effects import absent, beside, listing
 from models.machine.timing import paired_ratio
-from models.systems.ride.of_scene import told_by, vehicle_of
-from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal, without
+from models.systems.ride.of_scene import told_by
+from models.systems.ride.omissions import effects_of
+from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal, without
 
 STEPS = 500
 """Steps that are timed in every turn."""
@@ -26,11 +27,10 @@ def price_list_of_ride(scene: Any) -> PriceList:
     """Prices at the scene's middle speed; InputError for one that varies."""
     if scene.speeds is None:
         raise InputError(scene.file, "drive", None, "has no effects priced in closed form: give [speeds]")
-    held = Held(scene, vehicle_of(scene))
     speeds = scene.speeds.all()
     with told_by(scene):
-        whole = Whole(held, float(speeds[len(speeds) // 2]))
-        effects = effects_of(held)
+        whole = Whole(ReducedScene.whole(scene), float(speeds[len(speeds) // 2]))
+        effects = effects_of(whole.scene)
         rests = {effect.name: _rest(whole, effect) for effect in effects}
     more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
     systems = {name: one for name, one in ({"": whole.full} | rests | more).items() if isinstance(one, Reduced)}
@@ -55,7 +55,7 @@ def _rest(whole: Whole, effect: Effect) -> Reduced | str:
     if why:
         return why
     try:
-        return whole.reduced(without(whole.held, [effect]))
+        return whole.reduced(without(whole.scene, [effect]))
     except InputError as error:
         return error.allowed
 
@@ -63,27 +63,25 @@ def _rest(whole: Whole, effect: Effect) -> Reduced | str:
 def _beside(scene: Any, name: str, speed: float) -> Reduced | str:
     """The scene with one more effect at its usual values, or why there is none."""
     try:
-        other = beside(scene, name)
-        return Whole(Held(other, vehicle_of(other)), speed).full
+        return Whole(ReducedScene.whole(beside(scene, name)), speed).full
     except InputError as error:
         return error.allowed
 
 
 def _counts(system: Reduced) -> dict[str, int]:
     """States, and calls per second of motion at the step limit."""
-    own = cost(system)
-    return {"states": own.states, "calls per second": round(own.calls) if np.isfinite(own.calls) else 0}
+    of_run = cost(system)
+    return {"states": of_run.states, "calls per second": round(of_run.calls) if np.isfinite(of_run.calls) else 0}
 
 
 def _turns(systems: dict[str, Reduced]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (ROUNDS,) of every system, in a random order."""
-    found, names = {name: np.empty(ROUNDS) for name in systems}, list(systems)
-    order = np.random.default_rng(SEED)
+    micros, order = {name: np.empty(ROUNDS) for name in systems}, np.random.default_rng(SEED)
     for i in range(ROUNDS):
-        for j in order.permutation(len(names)):
-            system = systems[names[j]]
-            found[names[j]][i] = _timed(system.system.A[: system.states, : system.states])
-    return found
+        for j in order.permutation(len(systems)):
+            name, system = list(systems.items())[j]
+            micros[name][i] = _timed(system.system.A[: system.states, : system.states])
+    return micros
 
 
 def _timed(A: np.ndarray) -> float:
@@ -122,17 +120,16 @@ def _price(
 def _changes(whole: Whole, rest: Reduced) -> tuple[Changed, ...]:
     """Standard deviations, exact; infinite where white noise reaches a quantity."""
     names = whole.full.system.names
-    own = [output.unit for output in whole.linear.outputs]
-    units = [*own, *["m/s^2"] * (len(names) - len(own))]  # weighted accelerations come last
+    units = [output.unit for output in whole.linear.outputs]
+    units += ["m/s^2"] * (len(names) - len(units))  # weighted accelerations come last
     try:
         with np.errstate(invalid="ignore"):
             full, left = (np.sqrt(confirmed(system, list(range(len(names))))) for system in (whole.full, rest))
     except InputError:
         return ()
-    rows = zip(names, units, full, left, strict=True)
-    found = [
+    changes = [
         Changed(name, unit, float(abs(b - a)), float(abs(b / a - 1.0)))
-        for name, unit, a, b in rows
+        for name, unit, a, b in zip(names, units, full, left, strict=True)
         if np.isfinite(a) and a > 0.0
     ]
-    return tuple(sorted(found, key=lambda one: -one.relative))
+    return tuple(sorted(changes, key=lambda change: -change.relative))

@@ -13,6 +13,7 @@ import numpy as np
 from models.advice.ride_choice.reduced import Whole
 from models.ride.covariance import stationary
 from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial import FREEDOMS
 from models.vehicles.spatial_linear import slopes_at_rest
 
 
@@ -21,58 +22,38 @@ def activity(whole: Whole) -> dict[str, float]:
 
     A wheel that meets white noise through a damped tyre has an acceleration without variance: its inertia is inf.
     """
-    vehicle, system, n = whole.held.vehicle, whole.full.system, len(whole.linear.mass)
-    P, motion = stationary(system).P, Kinematics(vehicle)
-    P, states = P[: whole.full.states, : whole.full.states], whole.full.states
-    acceleration = system.A[n : 2 * n, :states]
-    noise = np.hstack([b[n : 2 * n] for b in system.B])
-    zeros = np.zeros((1, states))
+    vehicle, system, n, states = whole.scene.vehicle, whole.full.system, len(whole.linear.mass), whole.full.states
+    P, A, motion = stationary(system).P[:states, :states], system.A[:states, :states], Kinematics(vehicle)
+    noise, watts = np.hstack([b[n : 2 * n] for b in system.B]), dict[str, float]()
 
-    def deviations(row: np.ndarray, road: np.ndarray = zeros) -> tuple[float, float]:
-        """Of a deflection (its coordinates' row, less a road height's) and of its rate."""
-        u = np.concatenate([row, np.zeros(states - n)]) - road[0]
-        v = u @ system.A[:states, :states]
-        return _deviation(u, P), _deviation(v, P)
+    def elastic(name: str, k: float, c: float, row: np.ndarray, road: np.ndarray | float = 0.0) -> None:
+        """Of a deflection: its coordinates' row, less a road height's."""
+        u = np.concatenate([row, np.zeros(states - n)]) - road
+        s_u, s_v = _deviation(u, P), _deviation(u @ A, P)
+        if k:
+            watts[f"spring {name}"] = 2 / np.pi * k * s_u * s_v
+        if c:
+            watts[f"damper {name}"] = c * s_v**2
 
-    out: dict[str, float] = {}
     for spring in vehicle.springs:
         apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-        k, c = slopes_at_rest(spring)
-        _elastic(out, spring.name, k, c, *deviations(np.array(spring.axis) @ apart))
+        elastic(spring.name, *slopes_at_rest(spring), np.array(spring.axis) @ apart)
     for bar in vehicle.bars:
         risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
-        _elastic(
-            out,
-            bar.name,
-            bar.stiffness,
-            bar.damping,
-            *deviations(motion.coordinate(bar.body, "rx") - risen / bar.track),
-        )
+        elastic(bar.name, bar.stiffness, bar.damping, motion.coordinate(bar.body, "rx") - risen / bar.track)
     heights = np.hstack([np.zeros((len(vehicle.tyres), 2 * n)), *whole.excitation.heights])
     for tyre, height in zip(vehicle.tyres, heights, strict=True):
         row = motion.shift(tyre.body, tyre.point)[2]
-        _elastic(out, f"tyre {tyre.name}", tyre.stiffness, tyre.damping, *deviations(row, height[None]))
+        elastic(f"tyre {tyre.name}", tyre.stiffness, tyre.damping, row, height)
     for body in vehicle.bodies:
         rows = [*motion.shift(body.name, body.position), *motion.turn(body.name)]
         values = [body.mass] * 3 + list(np.diag(body.inertia))
-        for freedom, row, value in zip(("x", "y", "z", "rx", "ry", "rz"), rows, values, strict=True):
+        for freedom, row, value in zip(FREEDOMS, rows, values, strict=True):
             if row.any() and value:
-                s_a = np.inf if abs(row @ noise).max() > 0 else _deviation(row @ acceleration, P)
-                out[f"inertia {body.name} {freedom}"] = (
-                    2
-                    / np.pi
-                    * value
-                    * s_a
-                    * _deviation(np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)
-                )
-    return out
-
-
-def _elastic(out: dict[str, float], name: str, k: float, c: float, s_u: float, s_v: float) -> None:
-    if k:
-        out[f"spring {name}"] = 2 / np.pi * k * s_u * s_v
-    if c:
-        out[f"damper {name}"] = c * s_v**2
+                s_a = np.inf if abs(row @ noise).max() > 0 else _deviation(row @ A[n : 2 * n], P)
+                s_v = _deviation(np.concatenate([np.zeros(n), row, np.zeros(states - 2 * n)]), P)
+                watts[f"inertia {body.name} {freedom}"] = 2 / np.pi * value * s_a * s_v
+    return watts
 
 
 def _deviation(row: np.ndarray, P: np.ndarray) -> float:

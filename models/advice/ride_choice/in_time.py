@@ -17,12 +17,12 @@ from models.core.strict import LARGEST, Strict, quantity
 from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import EVERY, March, forgotten, usual_step
 from models.ride.road_path import RoadPath, check_rates, road_path
-from models.ride.statistical_linearisation import BentSpring, bent, statistically_linear
+from models.ride.statistical_linearisation import BentSpring, statistically_linear
 from models.road.excitation import Excitation
-from models.systems.ride.of_scene import vehicle_of
-from models.systems.ride.reduced_scene import Effect, Held, effects_of, illegal
-from models.systems.ride.reduced_scene import without as held_without
-from models.systems.ride.scene import RideScene
+from models.systems.ride.of_scene import in_time_only
+from models.systems.ride.omissions import effects_of, wheels_of
+from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
+from models.systems.ride.reduced_scene import without as without_effects
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
 
@@ -63,7 +63,7 @@ class Pace:
 class InTime:
     """A scene's copies at all its speeds, less ``left_out``, with steps so many ``times`` as long."""
 
-    held: Held
+    scene: ReducedScene
     samples: Samples
     paces: tuple[Pace, ...]
     effects: tuple[Effect, ...]
@@ -74,7 +74,7 @@ class InTime:
     @property
     def file(self) -> str:
         """The scene's."""
-        return self.held.scene.file
+        return self.scene.ride.file
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -89,14 +89,13 @@ class InTime:
     @property
     def absent(self) -> tuple[str, ...]:
         """Effects that the scene does not name."""
-        return absent(self.held.scene)
+        return absent(self.scene.ride)
 
     def beside(self, name: str) -> "InTime":
         """With one of these at its usual values; InputError where it cannot be."""
-        scene = beside(self.held.scene, name)
-        held = Held(scene, vehicle_of(scene))
-        _check(held)
-        return replace(self, held=held)
+        scene = ReducedScene.whole(beside(self.scene.ride, name))
+        _check(scene)
+        return replace(self, scene=scene)
 
     @property
     def steps(self) -> int:
@@ -111,7 +110,7 @@ class InTime:
         if why:
             raise InputError(self.file, "effects", None, why)
         fresh = [effect for effect in chosen if effect.name not in self.left_out]
-        return replace(self, held=held_without(self.held, fresh), left_out=left_out)
+        return replace(self, scene=without_effects(self.scene, fresh), left_out=left_out)
 
     def longer(self, times: int) -> "InTime":
         """With steps so many times as long."""
@@ -124,11 +123,11 @@ class InTime:
 
     @cached_property
     def _excitation(self) -> Excitation:
-        return self.held.excitation()
+        return self.scene.excitation()
 
     def vehicle(self, pace: Pace) -> SpatialVehicle:
         """What is left of the vehicle at a speed; InputError where a run in time cannot do without it."""
-        return left(self.held, pace.springs)
+        return left(self.scene, pace.springs)
 
     def roads(self, pace: Pace) -> np.ndarray:
         """Heights and rates (2 steps + 1, 2 w, copies) at half steps."""
@@ -149,94 +148,75 @@ class InTime:
         return march.plain.outputs, second - 2 * mean * first + mean**2
 
 
-def in_time(held: Held) -> InTime:
+def in_time(scene: ReducedScene) -> InTime:
     """The whole of a scene; InputError for one that has a closed form, or that no copies answer."""
-    _check(held)
-    scene = held.scene
-    assert scene.speeds is not None
-    own = {key: value for key, value in scene.options.items() if key in Samples.model_fields}
-    samples = Samples.model_validate(own)
-    paces = tuple(_pace(held, float(speed), samples.lasting) for speed in scene.speeds.all())
-    return InTime(held, samples, paces, tuple(effect for effect in effects_of(held) if _may_go(held, effect)))
+    _check(scene)
+    speeds, options = scene.ride.speeds, scene.ride.options
+    assert speeds is not None
+    samples = Samples.model_validate({key: value for key, value in options.items() if key in Samples.model_fields})
+    paces = tuple(_pace(scene, float(speed), samples.lasting) for speed in speeds.all())
+    return InTime(scene, samples, paces, tuple(effect for effect in effects_of(scene) if _may_go(scene, effect)))
 
 
-def goes_in_time(scene: RideScene) -> bool:
-    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them, or tyres
-    may lift."""
-    return not scene.vehicle.small_motion and _in_time_only(vehicle_of(scene))
+def _check(scene: ReducedScene) -> None:
+    ride = scene.ride
+    if ride.vehicle.small_motion or not in_time_only(scene.vehicle):
+        raise InputError(ride.file, "vehicle.file", ride.vehicle.file, "is linear, and has a closed form")
+    if ride.speeds is None:
+        raise InputError(ride.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
+    for name, by in ride.weighting.items():
+        raise InputError(ride.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
+    check_rates(scene.vehicle, scene.excitation(), ride.file)
 
 
-def _in_time_only(vehicle: SpatialVehicle) -> bool:
-    return bool(bent(vehicle)) or vehicle.lifts
-
-
-def _check(held: Held) -> None:
-    scene = held.scene
-    if scene.vehicle.small_motion or not _in_time_only(held.vehicle):
-        raise InputError(scene.file, "vehicle.file", scene.vehicle.file, "is linear, and has a closed form")
-    if scene.speeds is None:
-        raise InputError(scene.file, "drive", None, "has no effects priced or chosen by runs: give [speeds]")
-    for name, by in scene.weighting.items():
-        raise InputError(scene.file, f"weighting.{name}", by, "is not read by runs in time: leave it out")
-    check_rates(held.vehicle, held.excitation(), scene.file)
-
-
-def _pace(held: Held, speed: float, lasting: float) -> Pace:
-    excitation = held.excitation()
-    found = statistically_linear(held.vehicle.with_tyres(pushes_only=False), excitation, speed)
-    half = road_path(excitation, speed, usual_step(held.vehicle, speed, found.vehicle)).half
+def _pace(scene: ReducedScene, speed: float, lasting: float) -> Pace:
+    excitation = scene.excitation()
+    linear = statistically_linear(scene.vehicle.with_tyres(pushes_only=False), excitation, speed)
+    half = road_path(excitation, speed, usual_step(scene.vehicle, speed, linear.vehicle)).half
     unit = 2.0 * half * UNIT
-    settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(found.vehicle), lasting))
-    return Pace(speed, half, settling, counted, found.springs)
+    settling, counted = (UNIT * int(np.ceil(time / unit)) for time in (forgotten(linear.vehicle), lasting))
+    return Pace(speed, half, settling, counted, linear.springs)
 
 
-def _may_go(held: Held, effect: Effect) -> bool:
+def _may_go(scene: ReducedScene, effect: Effect) -> bool:
     """Whether a run in time can do without an effect and all that it takes along."""
-    rest = effect.without(held)
-    bushings = rest.rigid and any({s.one, s.two} & _wheels(held.vehicle) for s in _named(held.vehicle, rest.rigid))
-    return not (rest.massless or bushings)
+    rest = effect.without(scene)
+    rigid = (spring for spring in scene.vehicle.springs if spring.name in rest.rigid)
+    return not rest.massless and not any({spring.one, spring.two} & wheels_of(scene.vehicle) for spring in rigid)
 
 
-def left(held: Held, moving: dict[str, BentSpring]) -> SpatialVehicle:
-    """The vehicle of what is held; ``moving``: how bent springs move, for the gains of straight laws."""
-    vehicle = replace(
-        held.vehicle,
-        springs=tuple(_straight(s, held.straight, moving) for s in held.vehicle.springs if s.name not in held.rigid),
+def left(scene: ReducedScene, moving: dict[str, BentSpring]) -> SpatialVehicle:
+    """The vehicle of what is left; ``moving``: how bent springs move, for the gains of straight laws."""
+    springs = scene.vehicle.springs
+    seats = {s.one: s.two for s in springs if s.name in scene.rigid and s.two is not None}
+
+    def body(before: Body) -> Body:
+        if before.name in seats:
+            return replace(before, freedoms=(), parent=seats[before.name])
+        return replace(before, freedoms=tuple(f for f in before.freedoms if (before.name, f) not in scene.locked))
+
+    return replace(
+        scene.vehicle,
+        springs=tuple(_straight(s, scene.straight, moving) for s in springs if s.name not in scene.rigid),
+        bodies=tuple(sorted(map(body, scene.vehicle.bodies), key=lambda each: each.name in seats)),
     )
-    seats = {s.one: s.two for s in _named(held.vehicle, held.rigid) if s.two is not None}
-    bodies = [_held(body, held, seats) for body in vehicle.bodies]
-    return replace(vehicle, bodies=tuple(sorted(bodies, key=lambda body: body.name in seats)))
-
-
-def _held(body: Body, held: Held, seats: dict[str, str]) -> Body:
-    if body.name in seats:
-        return replace(body, freedoms=(), parent=seats[body.name])
-    return replace(body, freedoms=tuple(f for f in body.freedoms if (body.name, f) not in held.locked))
 
 
 def _straight(spring: SpringDamper, laws: frozenset[str], moving: dict[str, BentSpring]) -> SpringDamper:
     """Gains of statistical linearisation in place of these laws."""
-    own = moving.get(spring.name)
-    if own is None:
+    motion = moving.get(spring.name)
+    if motion is None:
         return spring
     if "travel_force" in laws and spring.travel_force:
-        gain = of_curve(spring.travel_force, own.travel, own.deviation)[1]
+        gain = of_curve(spring.travel_force, motion.travel, motion.deviation)[1]
         spring = replace(spring, stiffness=spring.stiffness + gain, travel_force=None)
     if "rate_force" in laws and spring.rate_force:
-        gain = of_curve(spring.rate_force, 0.0, own.rate)[1]
+        gain = of_curve(spring.rate_force, 0.0, motion.rate)[1]
         spring = replace(spring, damping=spring.damping + gain, rate_force=None)
     if "friction" in laws and spring.friction:
-        gain = of_friction(spring.friction, spring.friction_rate, own.rate)
+        gain = of_friction(spring.friction, spring.friction_rate, motion.rate)
         spring = replace(spring, damping=spring.damping + gain, friction=0.0)
     return spring
-
-
-def _named(vehicle: SpatialVehicle, names: Iterable[str]) -> list[SpringDamper]:
-    return [spring for spring in vehicle.springs if spring.name in set(names)]
-
-
-def _wheels(vehicle: SpatialVehicle) -> set[str]:
-    return {tyre.body for tyre in vehicle.tyres}
 
 
 _kept: dict[tuple[object, ...], np.ndarray] = {}
@@ -244,19 +224,10 @@ _kept: dict[tuple[object, ...], np.ndarray] = {}
 
 def _roads(path: RoadPath, steps: int, samples: Samples) -> np.ndarray:
     """Heights and rates (2 steps + 1, 2 w, copies); the last few that were asked for are kept."""
-    own = path.excitation
-    key = (
-        own.F.tobytes(),
-        own.G.tobytes(),
-        *(H.tobytes() for H in own.heights),
-        own.lengths,
-        own.independent,
-        path.speed,
-        path.half,
-        steps,
-        samples.copies,
-        samples.seed,
-    )
+    road = path.excitation
+    arrays = (array.tobytes() for array in (road.F, road.G, *road.heights))
+    of_run = path.speed, path.half, steps, samples.copies, samples.seed
+    key = (*arrays, road.lengths, road.independent, *of_run)
     if key not in _kept:
         while sum(roads.nbytes for roads in _kept.values()) > ROOM:
             del _kept[next(iter(_kept))]

@@ -1,4 +1,4 @@
-"""What a run in time makes of a linear scene: deviations by the classical Runge-Kutta method at a step, in closed form.
+"""What a run in time makes of deviations, by the classical Runge-Kutta method at a step in closed form, and its cost.
 
 A run reads the road's filters at the begin, the middle and the end of a step (f0, fm, f1). In a motion of rate s, with
 z = h s, a step is x1 = R x0 + h (c0 g0 + cm gm + c1 g1), g the force of the road on it and
@@ -17,11 +17,13 @@ from typing import Protocol
 
 import numpy as np
 
-from models.advice.ride_choice.cost import stable_step
 from models.advice.ride_choice.reduced import Reduced
-from models.advice.ride_choice.waves import at_axles, filtered, frequencies
-from models.ride.weighting import WEIGHTINGS
+from models.advice.ride_choice.waves import at_axles, filtered, frequencies, weighting_factors
 
+STAGES = 4
+"""Calls of a step of the classical Runge-Kutta method."""
+REACH = np.linspace(0.0, 3.0, 601)[1:]
+"""Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
 ALIKE, BEYOND = 6, 6.0
 """Waves to either side that look alike at the steps, at least, and so many times the road's last corner; the last two
 stand for all beyond, which fall with their square."""
@@ -58,16 +60,15 @@ class March:
     @cached_property
     def _read(self) -> np.ndarray:
         """Quantities by states (q, n + m), before their weightings."""
-        weighted = dict(self.weightings)
-        names = self.reduced.system.names
+        weighted, names = dict(self.weightings), self.reduced.system.names
         plain = [
             names.index(names[row].removesuffix(f" {weighted[row]}")) if row in weighted else row for row in self.rows
         ]
-        return np.asarray(self.reduced.system.C[plain, : self.reduced.states])
+        return self.reduced.system.C[plain, : self.reduced.states]
 
     def heard(self, states: np.ndarray) -> np.ndarray:
         """Quantities (q, ...), before their weightings, of states of vehicle and road (n + m, ...)."""
-        return np.asarray(self._read @ states)
+        return self._read @ states
 
     @cached_property
     def longest(self) -> float:
@@ -93,7 +94,7 @@ class March:
         heard = np.tensordot(seen, moved, 1) + np.tensordot(self._read[:, self.vehicle :], road, 1)
         count = np.where(abs(alike) < last - 1, 1.0, 1.0 + alike**2 / (2.0 * (abs(alike) + 1.0)))
         total = ((abs(heard) ** 2).sum(axis=2).reshape(len(seen), len(alike), -1) * count).sum(axis=1)
-        return np.asarray(np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi))
+        return np.sqrt(total * abs(self._heard(omega)) ** 2 @ weights / np.pi)
 
     def _alike(self, step: float) -> int:
         """Waves to either side up to which not all of them fall with their square."""
@@ -109,12 +110,7 @@ class March:
     def _heard(self, omega: np.ndarray) -> np.ndarray:
         """Factors (q, w) of the weightings."""
         names = dict(self.weightings)
-        return np.array(
-            [
-                WEIGHTINGS[names[row]].response(omega / (2 * np.pi)) if row in names else np.ones(len(omega))
-                for row in self.rows
-            ]
-        )
+        return weighting_factors([names.get(row, "") for row in self.rows], omega)
 
     def _road(self, omega: np.ndarray, apart: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
         """States of all axles' filters by each noise (a m, w, a k), and the mean noise (a k, w, a k) of a run."""
@@ -164,3 +160,39 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
         middle = (low * high) ** 0.5
         low, high = (middle, high) if kept(middle) else (low, middle)
     return float(low)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """``states`` of vehicle and road filters, without weightings; ``step`` (s), the largest at which the classical
+    Runge-Kutta method is stable for the vehicle; ``calls`` of its right-hand side per second of motion at that step.
+
+    The road's own poles do not bound the step: a time run reads heights from a table made beforehand. How fine a step
+    must be to resolve the road or a quantity is another question, the same with and without an effect.
+    """
+
+    states: int
+    step: float
+    calls: float
+
+    @property
+    def work(self) -> float:
+        """Calls times states, per second of motion."""
+        return self.calls * self.states
+
+
+def cost(reduced: Reduced) -> Cost:
+    """Cost of a system whose every motion dies out; a motion that grows has no stable step and costs without end."""
+    n = reduced.states - len(reduced.excitation.heights) * len(reduced.excitation.F)
+    step = stable_step(np.linalg.eigvals(reduced.system.A[:n, :n]))
+    return Cost(reduced.states, step, STAGES / step if step else np.inf)
+
+
+def stable_step(values: np.ndarray) -> float:
+    """Largest step (s) with |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = step times every eigenvalue (1/s)."""
+    values = values[abs(values) > 0]
+    z = values[:, None] / abs(values)[:, None] * REACH
+    grown = abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-12
+    first = np.where(grown.any(axis=1), grown.argmax(axis=1), len(REACH))
+    reach = np.where(first > 0, REACH[np.maximum(first, 1) - 1], 0.0)
+    return float((reach / abs(values)).min(initial=np.inf))

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.advice.ride_choice.cost import STAGES
-from models.advice.ride_choice.march import March
+from models.advice.ride_choice.march import STAGES, March
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
@@ -102,7 +101,7 @@ def _begin(march: March, road: np.ndarray) -> np.ndarray:
     told = P[:n, n:] @ np.linalg.pinv(P[n:, n:], hermitian=True)
     values, vectors = np.linalg.eigh(P[:n, :n] - told @ P[n:, :n])
     chance = np.random.default_rng(SEED).standard_normal((n, road.shape[1]))
-    return np.asarray(told @ road + vectors * np.sqrt(values.clip(0.0)) @ chance)
+    return told @ road + vectors * np.sqrt(values.clip(0.0)) @ chance
 
 
 def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
@@ -116,4 +115,4 @@ def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
         np.kron(np.eye(len(own.heights)), each)
         for each in (march.speed * own.F, np.linalg.pinv(march.speed**0.5 * own.G))
     )
-    return np.asarray(into @ (back @ ((end - begin) / step - path @ (begin + 4 * middle + end) / 6)))
+    return into @ (back @ ((end - begin) / step - path @ (begin + 4 * middle + end) / 6))

@@ -6,7 +6,7 @@ H by dC q - (C / Z) (dZ q - dB), so that one solution tells the slopes of e by a
 of the slopes name the corner of the box of parameters in which e is the largest: it is looked at as it is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,10 +14,9 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from models.advice.ride_choice.reduced import constrain
-from models.advice.ride_choice.waves import at_axles, filtered, frequencies
-from models.ride.weighting import WEIGHTINGS
-from models.systems.ride.reduced_scene import Held
-from models.vehicles.linear_vehicle import LinearVehicle
+from models.advice.ride_choice.waves import at_axles, filtered, frequencies, weighting_factors
+from models.systems.ride.reduced_scene import ReducedScene
+from models.vehicles.linear_vehicle import LinearVehicle, Rows
 from models.vehicles.spatial import SpatialVehicle
 
 OFF = 0.05
@@ -54,15 +53,11 @@ def parameters(vehicle: SpatialVehicle) -> list[Parameter]:
 def changed(vehicle: SpatialVehicle, factors: Mapping[Parameter, float]) -> SpatialVehicle:
     """The vehicle with these values so many times as large; those that it has not are passed over."""
 
-    def part(group: str, own: Any) -> Any:
-        values = {
-            key: _times(getattr(own, key), factors[group, own.name, key])
-            for key in PARTS[group]
-            if (group, own.name, key) in factors
-        }
-        return replace(own, **values)
+    def part(group: str, before: Any) -> Any:
+        known = [key for key in PARTS[group] if (group, before.name, key) in factors]
+        return replace(before, **{k: _times(getattr(before, k), factors[group, before.name, k]) for k in known})
 
-    groups: dict[str, Any] = {group: tuple(part(group, own) for own in getattr(vehicle, group)) for group in PARTS}
+    groups: dict[str, Any] = {group: tuple(part(group, each) for each in getattr(vehicle, group)) for group in PARTS}
     return replace(vehicle, **groups)
 
 
@@ -70,12 +65,12 @@ def _times(value: Any, factor: float) -> Any:
     return tuple(_times(each, factor) for each in value) if isinstance(value, tuple) else value * factor
 
 
-def speeds_between(held: Held, listed: np.ndarray) -> np.ndarray:
+def speeds_between(scene: ReducedScene, listed: np.ndarray) -> np.ndarray:
     """The listed speeds (m/s) and as many between the first and the last as tell how the axles' delay goes on."""
     low, high = float(listed.min()), float(listed.max())
     if low == high:
         return np.array([low])
-    length = max(held.excitation().lengths)
+    length = max(scene.excitation().lengths)
     turns = 8.0 * LOBES * length * (1.0 / low - 1.0 / high)
     slow = 1.0 / np.linspace(1.0 / high, 1.0 / low, int(np.ceil(turns)) + 1)
     return np.unique(np.concatenate([listed, slow, np.geomspace(low, high, EVEN)]).round(12))
@@ -92,20 +87,20 @@ class Spectra:
 class Neighbourhood:
     """A scene's quantities (outputs with the names of their weightings, or "") at all speeds (m/s) of its range."""
 
-    def __init__(self, held: Held, listed: np.ndarray, quantities: list[tuple[int, str]]) -> None:
-        self.held, self.quantities = held, quantities
-        self.speeds = speeds_between(held, listed)
-        self.parameters = parameters(held.vehicle)
+    def __init__(self, scene: ReducedScene, listed: np.ndarray, quantities: list[tuple[int, str]]) -> None:
+        self.scene, self.quantities = scene, quantities
+        self.speeds = speeds_between(scene, listed)
+        self.parameters = parameters(scene.vehicle)
         self.few = self.speeds[np.unique(np.linspace(0, len(self.speeds) - 1, FEW).round().astype(int))]
-        self.whole, self.at_few = self.spectra(held, self.speeds), self.spectra(held, self.few, True)
+        self.whole, self.at_few = self.spectra(scene, self.speeds), self.spectra(scene, self.few, True)
 
-    def changes(self, rest: Held, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
+    def changes(self, rest: ReducedScene, factors: Mapping[Parameter, float] | None = None) -> np.ndarray:
         """Relative changes (v, q) of deviations by what is left; with parameters that are off in both."""
-        full = self.whole if factors is None else self.spectra(_off(self.held, factors), self.speeds)
+        full = self.whole if factors is None else self.spectra(_off(self.scene, factors), self.speeds)
         left = self.spectra(_off(rest, factors or {}), self.speeds)
-        return np.asarray(np.sqrt(left.variances / full.variances) - 1.0)
+        return np.sqrt(left.variances / full.variances) - 1.0
 
-    def corners(self, rest: Held) -> list[dict[Parameter, float]]:
+    def corners(self, rest: ReducedScene) -> list[dict[Parameter, float]]:
         """Factors of all parameters that make each quantity's change the largest, to first order, at any of a few
         speeds."""
         left, full = self.spectra(rest, self.few, True), self.at_few
@@ -116,19 +111,20 @@ class Neighbourhood:
         signs = [np.sign(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
         return [dict(zip(self.parameters, 1.0 + OFF * sign, strict=True)) for sign in signs]
 
-    def spectra(self, held: Held, speeds: np.ndarray, slopes: bool = False) -> Spectra:
+    def spectra(self, scene: ReducedScene, speeds: np.ndarray, slopes: bool = False) -> Spectra:
         """Variances of a scene, and slopes if asked for; at each speed by itself where the vehicle depends on it."""
-        apart = held.vehicle.side_forces or held.vehicle.drags
+        apart = scene.vehicle.side_forces or scene.vehicle.drags
         groups = [speeds[[i]] for i in range(len(speeds))] if apart else [speeds]
-        found = [self._spectra(held, speeds, slopes) for speeds in groups]
-        return Spectra(*(np.concatenate([getattr(own, key) for own in found]) for key in ("variances", "slopes")))
+        spectra = [self._spectra(scene, speeds, slopes) for speeds in groups]
+        return Spectra(*(np.concatenate([getattr(one, key) for one in spectra]) for key in ("variances", "slopes")))
 
-    def _spectra(self, held: Held, speeds: np.ndarray, slopes: bool) -> Spectra:
-        vehicle, _ = constrain(held, float(speeds[0]))
-        excitation, rates = held.excitation(), _rates(vehicle)
+    def _spectra(self, scene: ReducedScene, speeds: np.ndarray, slopes: bool) -> Spectra:
+        vehicle, _ = constrain(scene, float(speeds[0]))
+        excitation, rates = scene.excitation(), _rates(vehicle)
         ends = ENDS[0] * abs(rates).min(), ENDS[1] * abs(rates).max()
         omega, weights, apart = frequencies(rates, max(excitation.lengths) / float(speeds[0]), ends)
-        weights = weights[:, None] * abs(self._heard(omega)) ** 2 / np.pi
+        factors = weighting_factors([name for _, name in self.quantities], omega).T
+        weights = weights[:, None] * abs(factors) ** 2 / np.pi
         road = at_axles(filtered(excitation, speeds, omega), excitation, speeds, omega, apart)
         heights = np.hstack(excitation.heights) @ road
         response = Response(vehicle, [row for row, _ in self.quantities], omega)
@@ -136,64 +132,54 @@ class Neighbourhood:
         variances = np.einsum("vwqk,vwqk,wq->vq", seen, seen.conj(), weights, optimize=True).real
         if not slopes:
             return Spectra(variances, np.zeros((len(speeds), 0)))
-        found = np.zeros((*variances.shape, len(self.parameters)))
-        for i, one in enumerate(self.parameters):
-            other, _ = constrain(_off(held, {one: 1.0 + OFF}), float(speeds[0]))
+        by_parameter = np.zeros((*variances.shape, len(self.parameters)))
+        for i, parameter in enumerate(self.parameters):
+            other, _ = constrain(_off(scene, {parameter: 1.0 + OFF}), float(speeds[0]))
             moved = response.slope(other) @ heights
-            found[:, :, i] = 2 * np.einsum("vwqk,vwqk,wq->vq", seen.conj(), moved, weights, optimize=True).real
-        return Spectra(variances, found)
-
-    def _heard(self, omega: np.ndarray) -> np.ndarray:
-        """Factors (w, q) of the weightings."""
-        return np.array(
-            [
-                WEIGHTINGS[name].response(omega / (2 * np.pi)) if name else np.ones(len(omega))
-                for _, name in self.quantities
-            ]
-        ).T
+            by_parameter[:, :, i] = 2 * np.einsum("vwqk,vwqk,wq->vq", seen.conj(), moved, weights, optimize=True).real
+        return Spectra(variances, by_parameter)
 
 
 class Response:
     """Outputs by heights, H (w, q, wheels), of a vehicle at frequencies (w,), and how another one moves them."""
 
     def __init__(self, vehicle: LinearVehicle, rows: list[int], omega: np.ndarray) -> None:
-        self.vehicle, self.rows, self.s = vehicle, rows, 1j * omega[:, None, None]
+        self.rows, self.s = rows, 1j * omega[:, None, None]
+        self.vehicle = self._asked(vehicle)
         Z, B = self._stiffness(vehicle)
-        C, self.direct = self._outputs(vehicle)
+        C, self.direct = self._outputs(self.vehicle)
         self.q, self.back = np.linalg.solve(Z, B), np.linalg.solve(Z.mT, C.mT).mT
         self.H = C @ self.q + self.direct
 
     def slope(self, other: LinearVehicle) -> np.ndarray:
         """dH (w, q, wheels) towards another vehicle, to first order."""
-        (Z, B), (C, direct) = self._stiffness(self._less(other)), self._outputs(self._less(other))
-        return np.asarray(C @ self.q + direct - self.back @ (Z @ self.q - B))
+        other, matrices = self._asked(other), ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
+        outputs = tuple(_less(a, b, Rows._fields) for a, b in zip(other.outputs, self.vehicle.outputs, strict=True))
+        less = replace(_less(other, self.vehicle, matrices), outputs=outputs)
+        (Z, B), (C, direct) = self._stiffness(less), self._outputs(less)
+        return C @ self.q + direct - self.back @ (Z @ self.q - B)
 
-    def _less(self, other: LinearVehicle) -> LinearVehicle:
-        keys = ("acceleration", "rate", "displacement", "road", "road_rate")
-        outputs = tuple(
-            replace(a, **{key: getattr(a, key) - getattr(b, key) for key in keys})
-            for a, b in zip(other.outputs, self.vehicle.outputs, strict=True)
-        )
-        matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
-        return replace(
-            other, outputs=outputs, **{key: getattr(other, key) - getattr(self.vehicle, key) for key in matrices}
-        )
+    def _asked(self, vehicle: LinearVehicle) -> LinearVehicle:
+        """The vehicle with the outputs that are asked for."""
+        return replace(vehicle, outputs=tuple(vehicle.outputs[row] for row in self.rows))
 
     def _stiffness(self, vehicle: LinearVehicle) -> tuple[np.ndarray, np.ndarray]:
         Z = vehicle.stiffness + self.s * vehicle.damping + self.s**2 * vehicle.mass
         return Z, vehicle.road_stiffness + self.s * vehicle.road_damping
 
     def _outputs(self, vehicle: LinearVehicle) -> tuple[np.ndarray, np.ndarray]:
-        of = {
-            key: np.array([getattr(vehicle.outputs[row], key) for row in self.rows])
-            for key in ("acceleration", "rate", "displacement", "road", "road_rate")
-        }
-        C = of["displacement"] + self.s * of["rate"] + self.s**2 * of["acceleration"]
-        return C, of["road"] + self.s * of["road_rate"]
+        read = vehicle.read
+        C = read.displacement + self.s * read.rate + self.s**2 * read.acceleration
+        return C, read.road + self.s * read.road_rate
 
 
-def _off(held: Held, factors: Mapping[Parameter, float]) -> Held:
-    return replace(held, vehicle=changed(held.vehicle, factors)) if factors else held
+def _less(one: Any, other: Any, keys: Iterable[str]) -> Any:
+    """One less another in some of its arrays."""
+    return replace(one, **{key: getattr(one, key) - getattr(other, key) for key in keys})
+
+
+def _off(scene: ReducedScene, factors: Mapping[Parameter, float]) -> ReducedScene:
+    return replace(scene, vehicle=changed(scene.vehicle, factors)) if factors else scene
 
 
 def _rates(vehicle: LinearVehicle) -> np.ndarray:
@@ -201,6 +187,6 @@ def _rates(vehicle: LinearVehicle) -> np.ndarray:
     n = len(vehicle.mass)
     left = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), vehicle.mass]])
     right = np.block([[np.zeros((n, n)), np.eye(n)], [-vehicle.stiffness, -vehicle.damping]])
-    found = eigvals(right, left)
-    found = found[np.isfinite(found)]
-    return np.asarray(found[abs(found) < 1e9])
+    rates = eigvals(right, left)
+    rates = rates[np.isfinite(rates)]
+    return rates[abs(rates) < 1e9]

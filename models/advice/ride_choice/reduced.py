@@ -1,11 +1,11 @@
 """A scene less some effects as a system x' = A x + B w, with the way from its state to that of the whole scene.
 
 What rigid springs, locked freedoms and bodies without mass leave of the vehicle is said in
-``models.vehicles.limits`` and ``models.ride.massless``.
+``models.vehicles.limits`` and ``models.ride.excited``.
 """
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,11 +13,10 @@ from scipy.linalg import block_diag
 
 from models.core.errors import InputError
 from models.core.scene_effects import tables_of
-from models.ride.delayed_system import DelayedSystem
-from models.ride.massless import first_order
+from models.ride.excited import DelayedSystem, first_order
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
-from models.systems.ride.reduced_scene import Held
+from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.limits import limited
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
@@ -39,81 +38,62 @@ class Reduced:
     states: int
 
 
-@dataclass(frozen=True)
-class Unweighted:
-    """``Reduced`` before weightings."""
-
-    vehicle: LinearVehicle
-    N: np.ndarray
-    excitation: Excitation
-    system: DelayedSystem
-    T: np.ndarray
-    left: np.ndarray
-
-
 class Whole:
     """A scene with all its effects at a speed (m/s), from which systems without some of them are made."""
 
-    def __init__(self, held: Held, speed: float) -> None:
-        self.held, self.speed = held, speed
-        self.linear = linearise(held.vehicle, speed)
-        self.excitation = held.excitation()
-        self._made: dict[Hashable, Unweighted] = {}
+    def __init__(self, scene: ReducedScene, speed: float) -> None:
+        self.scene, self.speed = scene, speed
+        self.linear = linearise(scene.vehicle, speed)
+        self.excitation = scene.excitation()
+        self._made: dict[Hashable, Reduced] = {}
         self._roads: dict[Hashable, tuple[Excitation, np.ndarray, np.ndarray]] = {}
-        self.full = self.reduced(held)
+        self.full = self.reduced(scene)
 
-    def reduced(self, held: Held) -> Reduced:
+    def reduced(self, scene: ReducedScene) -> Reduced:
         """What is left of the scene; raises InputError where it is no system."""
-        rest = self._unweighted(held)
-        system, T, left = rest.system, rest.T, rest.left
-        states, weightings = len(system.A), self.held.scene.weighting
-        if weightings:
-            system = weighted(system, weightings)
-            more = np.eye(len(system.A) - states)
-            T, left = block_diag(T, more), block_diag(left, more)
-        return Reduced(rest.vehicle, rest.N, rest.excitation, system, T, left, states)
-
-    def _unweighted(self, held: Held) -> "Unweighted":
-        """Made once."""
-        key = (held.vehicle, *_road(held), held.massless, held.rigid, held.locked)
+        key = (scene.vehicle, *_road(scene), scene.massless, scene.rigid, scene.locked)
         if key not in self._made:
-            self._made[key] = self._make(held)
-        return self._made[key]
+            self._made[key] = self._make(scene)
+        rest, weightings = self._made[key], self.scene.ride.weighting
+        if not weightings:
+            return rest
+        system = weighted(rest.system, weightings)
+        more = np.eye(len(system.A) - rest.states)
+        return replace(rest, system=system, T=block_diag(rest.T, more), left=block_diag(rest.left, more))
 
-    def _make(self, held: Held) -> "Unweighted":
-        constrained, N = constrain(held, self.speed)
-        excitation, Tf, left_f = self._heights(held)
+    def _make(self, scene: ReducedScene) -> Reduced:
+        """Before weightings."""
+        constrained, N = constrain(scene, self.speed)
+        excitation, Tf, left_f = self._heights(scene)
         system, Tq, back = first_order(constrained, excitation, self.speed)
         behind = np.linalg.solve(N.T @ self.linear.mass @ N, N.T @ self.linear.mass)
         n, m, x = len(self.linear.mass), len(Tf), len(system.A)
-        if x == Tf.shape[1]:
+        inert, road = len(back[0]), x - Tf.shape[1]
+        if not road:
             raise InputError("", "effects", None, "nothing is left that could move")
-        q = N @ Tq
-        f = np.hstack([np.zeros((m, x - Tf.shape[1])), Tf])
+        q, f = N @ Tq, np.hstack([np.zeros((m, road)), Tf])
         left = np.zeros((x, 2 * n + m))
-        inert = len(back[0])
         left[:inert, :n], left[inert : 2 * inert, n : 2 * n] = back[0] @ behind, back[0] @ behind
-        left[2 * inert : x - Tf.shape[1], :n] = back[1] @ behind
-        left[x - Tf.shape[1] :, 2 * n :] = left_f
-        return Unweighted(constrained, N, excitation, system, np.vstack([q, q @ system.A, f]), left)
+        left[2 * inert : road, :n], left[road:, 2 * n :] = back[1] @ behind, left_f
+        return Reduced(constrained, N, excitation, system, np.vstack([q, q @ system.A, f]), left, x)
 
-    def _heights(self, held: Held) -> tuple[Excitation, np.ndarray, np.ndarray]:
+    def _heights(self, scene: ReducedScene) -> tuple[Excitation, np.ndarray, np.ndarray]:
         """The road that is left, and ``_of_road`` of it."""
-        key = _road(held)
+        key = _road(scene)
         if key not in self._roads:
-            excitation = held.excitation()
-            self._roads[key] = (excitation, *_of_road(self.held, self.excitation, held, excitation))
+            excitation = scene.excitation()
+            self._roads[key] = (excitation, *_of_road(self.scene, self.excitation, scene, excitation))
         return self._roads[key]
 
 
-def _road(held: Held) -> tuple[Hashable, ...]:
+def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
     """What tells one road of a scene less some effects from another."""
-    return held.scene.road, tuple(tables_of(held.scene))
+    return scene.ride.road, tuple(tables_of(scene.ride))
 
 
-def constrain(held: Held, speed: float) -> tuple[LinearVehicle, np.ndarray]:
+def constrain(scene: ReducedScene, speed: float) -> tuple[LinearVehicle, np.ndarray]:
     """M, D, K and outputs in the coordinates that rigid springs and locked freedoms leave, and N with q = N r."""
-    return limited(_linear(held.vehicle, speed), held.vehicle, held.limits)
+    return limited(_linear(scene.vehicle, speed), scene.vehicle, scene.limits)
 
 
 @lru_cache(maxsize=64)
@@ -121,16 +101,18 @@ def _linear(vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     return linearise(vehicle, speed)
 
 
-def _of_road(full: Held, whole: Excitation, held: Held, rest: Excitation) -> tuple[np.ndarray, np.ndarray]:
+def _of_road(
+    scene: ReducedScene, whole: Excitation, less: ReducedScene, rest: Excitation
+) -> tuple[np.ndarray, np.ndarray]:
     """States of the whole road's filters by those that are left, axle by axle, and back; what effects add is last."""
-    count, cutoff = whole.G.shape[1], full.scene.road.cutoff
-    one: np.ndarray = np.eye(count if cutoff is None else 2 * count)
-    back: np.ndarray = one
-    if cutoff is not None and held.scene.road.cutoff is None:
-        one, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
-    added = np.eye(len(whole.F) - len(one), len(rest.F) - len(back))
-    one, back = block_diag(one, added), block_diag(back, added.T)
-    axles, left = len(whole.heights), len(rest.heights)
-    if left == axles:
-        return np.kron(np.eye(axles), one), np.kron(np.eye(axles), back)
-    return np.kron(np.ones((axles, 1)), one), np.kron(np.eye(axles)[:1], back)
+    count, cutoff = whole.G.shape[1], scene.ride.road.cutoff
+    onto: np.ndarray = np.eye(count if cutoff is None else 2 * count)
+    back: np.ndarray = onto
+    if cutoff is not None and less.ride.road.cutoff is None:
+        onto, back = np.kron(np.eye(count), [[1.0], [0.0]]), np.kron(np.eye(count), [[1.0, 1.0 / cutoff]])
+    added = np.eye(len(whole.F) - len(onto), len(rest.F) - len(back))
+    onto, back = block_diag(onto, added), block_diag(back, added.T)
+    axles = len(whole.heights)
+    if len(rest.heights) == axles:
+        return np.kron(np.eye(axles), onto), np.kron(np.eye(axles), back)
+    return np.kron(np.ones((axles, 1)), onto), np.kron(np.eye(axles)[:1], back)

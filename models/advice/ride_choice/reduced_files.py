@@ -7,7 +7,7 @@ from typing import Any
 from models.core.scene_effects import own_table
 from models.core.scene_file import parse
 from models.systems.ride.of_scene import CLOSED
-from models.systems.ride.reduced_scene import Held
+from models.systems.ride.reduced_scene import ReducedScene
 from models.vehicles.vehicle_file import vehicle_path
 
 SCENE, VEHICLE = "reduced.toml", "reduced_vehicle.toml"
@@ -15,20 +15,20 @@ ASKED = ("quantities", "tolerance", "options")
 """Keys of a scene that belong to its question."""
 
 
-def write(rest: Held, folder: Path) -> Path:
+def write(rest: ReducedScene, folder: Path) -> Path:
     """Write both into a folder; returns the scene's path."""
-    scene = own_table(rest.scene)
+    scene = own_table(rest.ride)
     whole = scene["vehicle"]["file"]
-    vehicle = reduced(parse(vehicle_path(whole, rest.scene.folder)), rest)
+    vehicle = reduced(parse(vehicle_path(whole, rest.ride.folder)), rest)
     notes = f"{vehicle.get('notes', '').strip()}\nReduced by a choice of effects; the whole vehicle is {whole}.".strip()
     with (folder / VEHICLE).open("x") as file:
         file.write(toml({**vehicle, "notes": notes}))
     table = {key: value for key, value in scene.items() if key not in ASKED and value != "auto"}
     road = dict(table.get("road", {}))
     if "file" in road:
-        road["file"] = str(rest.scene.path(road["file"], "road.file").resolve())
+        road["file"] = str(rest.ride.path(road["file"], "road.file").resolve())
     changes = {
-        "title": f"{rest.scene.title}, less what was left out",
+        "title": f"{rest.ride.title}, less what was left out",
         "system": "ride",
         "study": CLOSED,
         "vehicle": {**scene["vehicle"], "file": VEHICLE},
@@ -38,7 +38,7 @@ def write(rest: Held, folder: Path) -> Path:
     return folder / SCENE
 
 
-def reduced(table: dict[str, Any], rest: Held) -> dict[str, Any]:
+def reduced(table: dict[str, Any], rest: ReducedScene) -> dict[str, Any]:
     """The tables of the whole vehicle less bars, damping of tyres and what the limits name."""
     bars = {bar.name for bar in rest.vehicle.bars}
     undamped = {tyre.name for tyre in rest.vehicle.tyres if not tyre.damping}

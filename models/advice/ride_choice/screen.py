@@ -19,7 +19,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from models.advice.ride_choice.reduced import Reduced
 from models.core.errors import InputError
 from models.ride.covariance import FINITE, Covariance, lyapunov, noise_of, silence, stationary
-from models.ride.delayed_system import DelayedSystem
+from models.ride.excited import DelayedSystem
 from models.ride.marginal import parts
 
 SLOWEST = 1e-9

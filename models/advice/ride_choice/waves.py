@@ -1,7 +1,10 @@
 """Frequencies at which spectra of a vehicle on a road are summed, and the road's waves there at many speeds at once."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from models.ride.weighting import WEIGHTINGS
 from models.road.excitation import Excitation
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -38,7 +41,7 @@ def filtered(excitation: Excitation, speeds: np.ndarray, omega: np.ndarray) -> n
     corners, V = np.linalg.eig(excitation.F)
     driven = np.linalg.solve(V, excitation.G + 0j)
     waves = 1j * omega[:, None] - speeds[:, None, None] * corners
-    return np.asarray(speeds[:, None, None, None] ** 0.5 * (V @ (driven / waves[..., None])))
+    return speeds[:, None, None, None] ** 0.5 * (V @ (driven / waves[..., None]))
 
 
 def at_axles(
@@ -58,3 +61,9 @@ def at_axles(
         if alone.any():
             rows[:, alone, :, i * k : (i + 1) * k] = late[:, alone]
     return out
+
+
+def weighting_factors(weightings: Sequence[str], omega: np.ndarray) -> np.ndarray:
+    """Factors (q, w) of weightings by their names, 1 for "", at angular frequencies (rad/s)."""
+    frequency = omega / (2 * np.pi)
+    return np.array([WEIGHTINGS[name].response(frequency) if name else np.ones(len(omega)) for name in weightings])

@@ -60,12 +60,8 @@ def vehicle_of(scene: RideScene) -> SpatialVehicle:
 
 
 def _built(scene: RideScene) -> Built:
-    return extended(
-        Built(
-            load_vehicle(scene.vehicle.file, scene.folder, scene.file, "vehicle.file", reduced=scene.study == CLOSED)
-        ),
-        scene,
-    )
+    file, reduced = scene.vehicle.file, scene.study == CLOSED
+    return extended(Built(load_vehicle(file, scene.folder, scene.file, "vehicle.file", reduced=reduced)), scene)
 
 
 def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
@@ -78,7 +74,7 @@ def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
             None,
             "has no covariance: use the study ride_nonlinear, whose copies and engines run in time, or leave it out",
         )
-    bent = [s.name for s in vehicle.springs if s.travel_force or s.rate_force or s.friction]
+    bent = [spring.name for spring in vehicle.springs if spring.bent]
     if bent and not scene.vehicle.small_motion:
         raise InputError(
             scene.file,
@@ -87,6 +83,17 @@ def check_linear(scene: RideScene, vehicle: SpatialVehicle) -> None:
             f"has curves or friction ({', '.join(bent)}), whose slopes at rest can be 60 % wrong: "
             "use the study ride_nonlinear, or say vehicle.small_motion = true",
         )
+
+
+def goes_in_time(scene: RideScene) -> bool:
+    """Whether springs of the scene's vehicle are bent and nobody said that their slopes shall stand for them, or tyres
+    may lift."""
+    return not scene.vehicle.small_motion and in_time_only(vehicle_of(scene))
+
+
+def in_time_only(vehicle: SpatialVehicle) -> bool:
+    """Whether springs are bent or tyres may lift, for which no linear vehicle stands."""
+    return vehicle.lifts or any(spring.bent for spring in vehicle.springs)
 
 
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
@@ -141,14 +148,14 @@ def excitation_of(scene: RideScene, wheels: tuple[Wheel, ...], case: tuple[str, 
     left_right, front_rear = case or (scene.road.left_right, scene.road.front_rear)
     placed = placed_wheels(scene, wheels)
     try:
-        found = excitation(road_of(scene, wheels), placed, left_right, front_rear)
+        heights = excitation(road_of(scene, wheels), placed, left_right, front_rear)
     except InputError as error:
         if error.file:
             raise
         raise InputError(scene.file, f"road.{error.place}", error.value, error.allowed) from None
     for change in _built(scene).road if scene.effects else ():
-        found = change(found)
-    return found
+        heights = change(heights)
+    return heights
 
 
 @contextmanager

@@ -1,12 +1,12 @@
 """What a scene of ride will compute: printed by ``twinrig show``, checked before any run."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
-from models.road.two_track import half_track
-from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
+from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.limits import NONE
 from models.vehicles.linear_vehicle import Wheel
@@ -40,15 +40,18 @@ def findings(scene: RideScene) -> tuple[Finding, ...]:
 def describe(scene: RideScene) -> str:
     """The scene's plan as text: vehicle, freedoms, road, cases, outputs and what is not computed."""
     vehicle = vehicle_of(scene)
-    lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
-    lines += [_line("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}")]
-    lines += _bodies(vehicle)
-    lines += [_line("road", road_of(scene, wheels(vehicle)).label(_track(scene, vehicle)))]
-    lines += [_line("", text) for text in met(scene, wheels(vehicle))]
-    lines += [_line("speed", _speed(scene))]
-    lines += [_line("outputs", ", ".join(output.name for output in vehicle.outputs))]
-    lines += [_line("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none")]
-    return "\n".join([*lines, *effect_lines(scene)])
+    there = wheels(vehicle)
+    lines = [
+        ("scene", f"{scene.file}, study {scene.study}"),
+        ("vehicle", f"{vehicle.name} ({scene.vehicle.file}), {scene.vehicle.operating_point}"),
+        *_bodies(vehicle),
+        ("road", road_of(scene, there).label(half_track_of(scene, there))),
+        *(("", text) for text in met(scene, there)),
+        ("speed", _speed(scene)),
+        ("outputs", ", ".join(output.name for output in vehicle.outputs)),
+        ("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none"),
+    ]
+    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene)])
 
 
 LEFT_RIGHT = {
@@ -75,32 +78,18 @@ def met(scene: RideScene, wheels: tuple[Wheel, ...]) -> tuple[str, str]:
     )
 
 
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
-
-
-def _track(scene: RideScene, vehicle: SpatialVehicle) -> float:
-    if scene.road.file is not None:
-        return scene.road.track_width / 2.0
-    return scene.road.half_track or half_track(wheels(vehicle))
-
-
-def _bodies(vehicle: SpatialVehicle) -> list[str]:
+def _bodies(vehicle: SpatialVehicle) -> Iterator[tuple[str, str]]:
     """A line per body, then the number of freedoms and their frequencies where no speed is needed."""
-    lines = []
     for body in vehicle.bodies:
         on = f" on {body.parent}" if body.parent else ""
-        lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"))
+        yield "  body", f"{body.name:<12} {body.mass:g} kg, {' '.join(body.freedoms)}{on}"
     parts = (len(vehicle.springs), len(vehicle.bars), len(vehicle.tyres))
-    lines.append(_line("  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)))
-    lines += [_line("freedoms", f"{len(vehicle.coordinates())}{_frequencies(vehicle)}")]
-    return [*lines, *(_line("question", text) for text in doubts(vehicle))]
-
-
-def _frequencies(vehicle: SpatialVehicle) -> str:
-    if vehicle.side_forces or vehicle.drags:
-        return ", frequencies depend on the speed"
-    return f", undamped {', '.join(f'{f:.3g}' for f in undamped(vehicle))} Hz"
+    yield "  parts", "{} spring-dampers, {} anti-roll bars, {} tyres".format(*parts)
+    frequencies = "frequencies depend on the speed"
+    if not (vehicle.side_forces or vehicle.drags):
+        frequencies = f"undamped {', '.join(f'{f:.3g}' for f in undamped(vehicle))} Hz"
+    yield "freedoms", f"{len(vehicle.coordinates())}, {frequencies}"
+    yield from (("question", text) for text in doubts(vehicle))
 
 
 def undamped(vehicle: SpatialVehicle) -> list[float]:
@@ -121,8 +110,7 @@ FREE = 1e-4
 
 def doubts(vehicle: SpatialVehicle) -> list[str]:
     """A question where the vehicle has motions that no road vehicle has, as with a value in other units than SI."""
-    found = [f for f in undamped(vehicle) if f > FREE]
-    odd = [f for f in found if not USUAL[0] <= f <= USUAL[1]]
+    odd = [f for f in undamped(vehicle) if f > FREE and not USUAL[0] <= f <= USUAL[1]]
     if not odd:
         return []
     listed = ", ".join(f"{f:.3g}" for f in odd[:4])

@@ -18,7 +18,7 @@ from models.advice.price.problem import Setting
 from models.engines.catalogue import CATALOGUE
 from models.engines.spatial_protocol import SpatialRun, build
 from models.engines.spatial_reference import SpatialReference
-from models.systems.ride.in_engines import row_of
+from models.systems.ride.nonlinear import row_of
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.price.problems.road_excited import setting, settings_of

@@ -9,8 +9,6 @@ from validation.price import ride
 from validation.price.sheets.page import Value, matrices
 from validation.price.sheets.page import write as write_page
 
-PARTS = {"A": "acceleration", "V": "rate", "P": "displacement", "H": "road", "E": "road_rate"}
-
 
 def write(folder: Path) -> list[Value]:
     """The sheet and its matrices; the standard deviation of every output."""
@@ -25,7 +23,7 @@ def write(folder: Path) -> list[Value]:
             "K": vehicle.stiffness,
             "R": vehicle.road_stiffness,
             "S": vehicle.road_damping,
-            **{key: np.array([getattr(output, name) for output in vehicle.outputs]) for key, name in PARTS.items()},
+            **dict(zip("AVPHE", vehicle.read, strict=True)),
         },
     )
     sure = problem.truth * max(0.5 * problem.uncertainty, float(np.abs(ride.direct(problem) / problem.truth - 1).max()))

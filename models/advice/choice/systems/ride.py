@@ -9,8 +9,8 @@ from models.advice.choice.answer import Answer, Quantity
 from models.advice.ride_choice.in_time import UNIT, InTime, in_time
 from models.core.errors import InputError
 from models.engines.spatial_protocol import curves
-from models.systems.ride.of_scene import told_by, vehicle_of
-from models.systems.ride.reduced_scene import Held
+from models.systems.ride.of_scene import told_by
+from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import RideScene
 
 ENGINE, WINDOWED = "reference", True
@@ -21,20 +21,20 @@ def opened(scene: RideScene | InTime) -> InTime:
     if isinstance(scene, InTime):
         return scene
     with told_by(scene):
-        return in_time(Held(scene, vehicle_of(scene)))
+        return in_time(ReducedScene.whole(scene))
 
 
 def answer(scene: InTime, engine: str) -> Answer:
     """March the copies at every speed, by their own equations; InputError for another engine."""
     if engine != ENGINE:
         raise InputError("--engine", "", engine, "marches no copies of a vehicle with bent springs: leave it out")
-    found, seconds = dict[str, list[np.ndarray]](), 0.0
+    squares_of, seconds = dict[str, list[np.ndarray]](), 0.0
     for pace in scene.paces:
         roads, begun = scene.roads(pace), time.process_time()
         outputs, squares = scene.squares(pace, roads)
         seconds += time.process_time() - begun
-        for output, own in zip(outputs, squares.T, strict=True):
-            found.setdefault(output.name, []).append(own)
+        for output, of_copies in zip(outputs, squares.T, strict=True):
+            squares_of.setdefault(output.name, []).append(of_copies)
     units = {output.name: output.unit for output in outputs}
     vehicle = scene.vehicle(scene.paces[0])
     counts = {
@@ -43,7 +43,8 @@ def answer(scene: InTime, engine: str) -> Answer:
         "states": 2 * len(vehicle.coordinates()),
         "terms": curves(vehicle) + sum(tyre.pushes_only for tyre in vehicle.tyres),
     }
-    return Answer({name: Quantity(units[name], tuple(cases), True) for name, cases in found.items()}, counts, seconds)
+    quantities = {name: Quantity(units[name], tuple(cases), True) for name, cases in squares_of.items()}
+    return Answer(quantities, counts, seconds)
 
 
 def steps(scene: InTime) -> int:

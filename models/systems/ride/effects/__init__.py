@@ -1,6 +1,171 @@
-"""Effects of scenes of ride, one file each: see ``models.core.scene_effects``. Counts are those of the linear system.
+"""Effects of scenes of ride: see ``models.core.scene_effects``; what of them a choice may leave out, ``omissions``."""
 
-Those that a choice of effects may leave out of a linear scene have found(held) besides: what of the effect the scene's
-vehicle and road hold, part by part, such as bar by bar, what leaving it out means, and which others must be left out
-with it or may not be (``models.systems.ride.reduced_scene.Effect``).
-"""
+from collections.abc import Callable
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.scene_effects import Entry, Table
+
+
+def _of_vehicle(says: str, cost: str, there: Callable[[Any], bool]) -> Entry:
+    """An effect that a vehicle file has, and no table of the scene."""
+    return Entry(says, "vehicle.file", cost, there=there, leave_out=_keep_vehicle)
+
+
+def _keep_vehicle(table: Table, scene: Any) -> None:
+    """InputError: another file must take its place."""
+    allowed = 'has it: name a file without it, or let effects = "auto" leave it out'
+    raise InputError(scene.file, "vehicle.file", scene.vehicle.file, allowed)
+
+
+def _holds(sort: str) -> Callable[[Any], bool]:
+    """Whether a scene's vehicle and road hold omissions of a sort."""
+
+    def there(scene: Any) -> bool:
+        from models.systems.ride.omissions import has
+
+        return has(scene, sort)
+
+    return there
+
+
+def _vehicle(scene: Any) -> Any:
+    from models.systems.ride.of_scene import vehicle_of
+
+    return vehicle_of(scene)
+
+
+def _equal(key: str) -> Callable[[Table, Any], None]:
+    """The word of [road] without which wheels meet different heights."""
+
+    def leave_out(table: Table, scene: Any) -> None:
+        table.setdefault("road", {})[key] = "equal"
+
+    return leave_out
+
+
+def _straighten(table: Table, scene: Any) -> None:
+    """Slopes at rest stand for the curves."""
+    table["vehicle"]["small_motion"] = True
+
+
+def _take_papers_road(table: Table, scene: Any) -> None:
+    for key in ("file", "track_width", "first", "last"):
+        table["road"].pop(key, None)
+
+
+def _hold_mean_speed(table: Table, scene: Any) -> None:
+    drive = table.pop("drive")
+    times, speeds = drive["time"], drive["speed"]
+    way = sum((b - a) * (v + w) / 2.0 for a, b, v, w in zip(times, times[1:], speeds, speeds[1:], strict=False))
+    table["speeds"] = {"values": [way / (times[-1] - times[0])]}
+
+
+def _weigh(table: Table, scene: Any) -> None:
+    """The first acceleration by Wk."""
+    name = next(output.name for output in _vehicle(scene).outputs if output.kind == "acceleration")
+    table["weighting"] = {name: "Wk"}
+
+
+BY_SPEED = "a linear vehicle of its own at every speed"
+TABLE = {
+    "anti_roll_bars": _of_vehicle("Anti-roll bars, one by one", "a product per bar", _holds("anti_roll_bars")),
+    "body_mass": _of_vehicle(
+        "Mass of the wheels, of one axle or of all, and of every other light body: what moves then follows its springs",
+        "two states per freedom of a light body",
+        _holds("body_mass"),
+    ),
+    "bushings": _of_vehicle(
+        "Bushings of the wheels: the stiffer springs between wheels and what they carry, rigid along their direction",
+        "a product per bushing, and the fastest modes of the vehicle",
+        _holds("bushings"),
+    ),
+    "curves": Entry(
+        "Curves and friction of springs and dampers, beyond their slopes at rest",
+        "vehicle.small_motion",
+        "runs in time by an engine in place of one covariance",
+        {"bent springs": 1},
+        modules=("models.ride.statistical_linearisation",),
+        there=_holds("curves"),
+        leave_out=_straighten,
+    ),
+    "delay": Entry(
+        "The delay from front to rear: every axle meets at once what the first one meets",
+        "road.front_rear",
+        "a filter of the road per axle",
+        {"delays": 1},
+        usual="delayed",
+        there=_holds("delay"),
+        leave_out=_equal("front_rear"),
+    ),
+    "drag": _of_vehicle(
+        "Drag of the air, which loads the axles by the speed", BY_SPEED, lambda scene: bool(_vehicle(scene).drags)
+    ),
+    "freedoms": _of_vehicle(
+        "Single freedoms of bodies: locked. Wheels keep their up and down; their other freedoms are locked together",
+        "two states per freedom",
+        _holds("freedoms"),
+    ),
+    "gravity_and_preload": Entry(
+        "Gravity, and the preload of the springs that carry the bodies",
+        "vehicle.operating_point",
+        "a stiffness per preloaded spring",
+        {"preloads": 1},
+        usual="loaded",
+        there=lambda scene: scene.vehicle.operating_point == "loaded",
+    ),
+    "measured_road": Entry(
+        "A road that is fitted to a measured one",
+        "road.file",
+        "a fit before all, no more in the runs",
+        {"fits": 1},
+        modules=("models.road.fitted",),
+        leave_out=_take_papers_road,
+    ),
+    "mounts": _of_vehicle(
+        "Mounts and seats: a body that carries no tyre sits rigidly on the one that its springs join it to",
+        "a product per mount, and the freedoms of what it carries",
+        _holds("mounts"),
+    ),
+    "second_corner": Entry(
+        "The road's second corner: its filters of second order become those of first order",
+        "road.cutoff",
+        "a state more per filter of the road",
+        {"states": 4},
+        usual=20.0,
+    ),
+    "second_track": Entry(
+        "The second track: left and right wheels of an axle meet the same height",
+        "road.left_right",
+        "a second filter of the road per axle",
+        {"heights": 2},
+        usual="modelled",
+        there=_holds("second_track"),
+        leave_out=_equal("left_right"),
+    ),
+    "side_forces": _of_vehicle(
+        "Side forces of tyres, by slip angle", BY_SPEED, lambda scene: bool(_vehicle(scene).side_forces)
+    ),
+    "tyre_damping": _of_vehicle(
+        "Damping of the tyres: nothing but their springs is left",
+        "a product per tyre; without a second corner white noise at the outputs",
+        _holds("tyre_damping"),
+    ),
+    "varying_speed": Entry(
+        "A speed that varies along the road",
+        "drive",
+        "a covariance that is marched, in place of one that is solved",
+        {"drives": 1},
+        modules=("models.ride.varying_speed",),
+        leave_out=_hold_mean_speed,
+    ),
+    "weighting": Entry(
+        "Outputs weighted for people, by ISO 2631-1",
+        "weighting",
+        "eight states per weighted output by Wk, six by Wd",
+        {"states": 8},
+        there=lambda scene: bool(scene.weighting),
+        put_in=_weigh,
+    ),
+}
+"""Usual values: the road's second corner is at 20 rad/m, a wavelength of a third of a metre."""

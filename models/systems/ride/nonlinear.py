@@ -1,0 +1,216 @@
+"""Rides that no linear vehicle stands for: statistical linearisation with copies in time beside, and engines in time.
+
+Everything nonlinear is there, and gravity where the vehicle has it. Where tyres may lift, the answer is that of the
+copies and the engines: what stands for the vehicle over speed keeps them on the road.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field
+
+from models.core.result import Channel, Result, result
+from models.core.strict import Strict, quantity
+from models.engines.protocol import Settings
+from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
+from models.ride.covariance import stationary
+from models.ride.excited import excited
+from models.ride.nonlinear_copies import Copies, copies_in_time, followed
+from models.ride.road_path import RoadPath, check_rates, road_path
+from models.ride.statistical_linearisation import StatisticallyLinear, statistically_linear
+from models.systems.ride.of_scene import excitation_of, linear_vehicle
+from models.systems.ride.scene import RideScene
+from models.vehicles.linear_vehicle import Output
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise, preloads, wheels
+
+STEP = 2e-3
+"""Longest step (s) of the engines' runs; steep springs want a shorter one."""
+Progress = Callable[[str, float], None]
+
+
+class Sampling(Strict):
+    """What is run in time, and at which speeds."""
+
+    beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
+    copies: int = Field(default=200, ge=2, le=100_000, description="of the vehicle, each on a road of its own")
+    lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
+    speed: float | None = quantity("m/s", "of the engines' runs and tables; the middle one if not given", default=None)
+    driven: float = quantity("s", "length of the engines' runs", default=30.0)
+    skipped: float = quantity("s", "left out at their beginning", default=4.0, zero=True)
+    seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads in time")
+
+    def shown(self, speeds: np.ndarray) -> float:
+        """Speed (m/s) of the engines' runs, one of the ``speeds`` where none is asked for."""
+        return self.speed or float(speeds[len(speeds) // 2])
+
+
+@dataclass(frozen=True)
+class Nonlinear:
+    """By speed: the vehicle of small motion (N, p), the replaced one, and Monte Carlo where it was asked for.
+
+    shown : the replaced vehicle at the speed of the engines' runs; lifts : whether tyres may, in Monte Carlo alone.
+    """
+
+    speeds: np.ndarray
+    small: np.ndarray
+    replaced: list[StatisticallyLinear]
+    copies: dict[float, Copies]
+    shown: StatisticallyLinear
+    lifts: bool = False
+
+    def of(self, part: str) -> np.ndarray:
+        """One part (N, p) of what was found of the replaced vehicles."""
+        return np.array([getattr(each, part) for each in self.replaced])
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Deviations (N, p) by statistical linearisation."""
+        return np.array([each.covariance.deviation for each in self.replaced])
+
+
+def linearised(scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress) -> Result:
+    """Small motion and statistical linearisation at all speeds, Monte Carlo at some; detail: ``Nonlinear``."""
+    assert scene.speeds is not None
+    speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
+    linear, on_road, begun = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
+    small, replaced, copies = [], [], {}
+    for i, speed in enumerate(speeds):
+        progress("statistical linearisation", 0.3 * i / len(speeds))
+        small.append(stationary(excited(linear(speed), road, speed)).deviation)
+        replaced.append(statistically_linear(on_road, road, speed))
+    shown = sampling.shown(speeds)
+    beside = sampling.beside or [shown]
+    for i, speed in enumerate(beside):
+        progress(f"Monte Carlo at {speed:g} m/s", 0.3 + 0.4 * i / len(beside))
+        lasting, count, seed = sampling.lasting, sampling.copies, sampling.seed
+        copies[speed] = copies_in_time(vehicle, road, speed, lasting, copies=count, seed=seed)
+    at_shown = statistically_linear(on_road, road, shown)
+    found = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
+    by_speed = {"deviation": found.deviation, "small_motion": found.small}
+    by_speed |= {part: found.of(part) for part in ("mean", "left_out")}
+    of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
+    channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
+    channels |= {
+        f"copies_{name}": Channel(("speed_of_copies", "output"), [getattr(each, part) for each in copies.values()])
+        for name, part in of_copies.items()
+    }
+    return result(
+        scene,
+        channels,
+        {
+            "speed": Channel("speed", speeds, "m/s"),
+            "output": Channel("output", list(at_shown.covariance.names)),
+            "unit": Channel("output", [output.unit for output in at_shown.vehicle.outputs]),
+            "speed_of_copies": Channel("speed_of_copies", list(copies), "m/s"),
+        },
+        engine="reference",
+        counts={"iterations": sum(len(each.changes) for each in replaced)},
+        seconds=time.process_time() - begun,
+        detail=found,
+        **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
+    )
+
+
+def in_engine(scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling) -> Result:
+    """One path of the road through an engine, at the speed that is shown; detail: ``Ride``."""
+    assert scene.speeds is not None
+    speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
+    path, begun = road_path(road, speed, min(STEP, followed(vehicle, speed))), time.process_time()
+    every, seed, skipped = max(1, round(2.0 * STEP / path.step)), sampling.seed, sampling.skipped
+    ride = ridden(engine, vehicle, path, sampling.driven, seed=seed, skipped=skipped, every=every)
+    return result(
+        scene,
+        {"output_value": Channel(("time", "output"), ride.outputs)},
+        {
+            "time": Channel("time", ride.times, "s"),
+            "output": Channel("output", list(ride.names)),
+            "unit": Channel("output", [output.unit for output in linearise(vehicle, speed).outputs]),
+        },
+        engine=engine,
+        counts={"steps": len(ride.run.positions) - 1},
+        seconds=time.process_time() - begun,
+        detail=ride,
+        speed=speed,
+        step=path.step,
+    )
+
+
+@dataclass(frozen=True)
+class Ride:
+    """A run: states at every step, and outputs (m, p) at ``times`` (m,) in s, counted from the first one.
+
+    Outputs are read by the rows of ``spatial_linear`` from the engine's own positions, rates and accelerations; those
+    of small motion, which a ride is. The force of a bent spring is no linear function of them: it is left nan.
+    """
+
+    names: tuple[str, ...]
+    run: SpatialRun
+    times: np.ndarray
+    outputs: np.ndarray
+
+    def of(self, name: str) -> np.ndarray:
+        """One output (m,)."""
+        return self.outputs[:, self.names.index(name)]
+
+    @property
+    def interval(self) -> float:
+        """Time (s) from one row of outputs to the next."""
+        return float(self.times[1] - self.times[0])
+
+    def densities(self, highest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (f,) in Hz and one-sided densities (f, p) of the outputs by Welch's method.
+
+        They end at ``highest`` (Hz), and begin where windows no longer leak.
+        """
+        from scipy.signal import welch
+
+        f, density = welch(self.outputs, 1 / self.interval, nperseg=round(4 / self.interval), axis=0)
+        shown = (f > 0.4) & (f <= highest)
+        return f[shown], density[shown]
+
+
+def ridden(
+    engine: str,
+    vehicle: SpatialVehicle,
+    road: RoadPath,
+    duration: float,
+    *,
+    seed: int = 0,
+    path: int = 0,
+    skipped: float = 0.0,
+    every: int = 1,
+) -> Ride:
+    """Drive over a road from rest for about ``duration`` (s); outputs ``every`` so many steps after ``skipped`` (s).
+
+    Raises InputError for damped tyres on a road whose heights have no rates.
+    """
+    check_rates(vehicle, road.excitation)
+    steps = int(np.ceil(duration / road.step))
+    table = road.table(steps, seed, path)
+    settings = Settings(INTEGRATORS[engine], road.step, steps * road.step)
+    model = build(engine, vehicle, settings, road.speed, table)
+    zero = np.zeros(len(vehicle.coordinates()))
+    run = model.run(zero, zero)
+    linear = linearise(vehicle, road.speed)
+    at = np.arange(int(np.ceil(skipped / road.step)), steps + 1, every)
+    accelerations = np.array([model.acceleration(run.positions[i], run.rates[i], table[2 * i]) for i in at])
+    rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
+    outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
+    bent = {spring.name for spring in vehicle.springs if spring.bent}
+    pushing = {tyre.name for tyre in vehicle.tyres if tyre.pushes_only}
+    for spec, output, values in zip(vehicle.outputs, linear.outputs, outputs.T, strict=True):
+        if spec.kind == "force" and spec.part in bent:
+            values[:] = np.nan
+        elif spec.kind == "tyre force" and spec.tyre in pushing:
+            elastic = rows @ row_of(replace(output, rate=0.0 * output.rate, road_rate=0.0 * output.road_rate))
+            load = preloads(vehicle).tyres[spec.tyre]
+            values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
+    return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs)
+
+
+def row_of(output: Output) -> np.ndarray:
+    """Factors (3 n + 2 w,) of accelerations, rates, positions, road heights and their rates."""
+    return np.concatenate([output.acceleration, output.rate, output.displacement, output.road, output.road_rate])

@@ -1,0 +1,77 @@
+"""What is read of the results of a ride: loads beside deviations, errors of simpler roads, vehicles and methods."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from models.ride.sweep import Sweep
+from models.ride.varying_speed import VaryingSpeed
+from models.systems.ride.of_scene import GRAVITY, half_track_of, linear_vehicle, placed_wheels, road_of
+from models.systems.ride.scene import RideScene
+from models.vehicles.spatial import SpatialVehicle, TyreOutput
+from models.vehicles.spatial_linear import preloads, wheels
+
+LONGEST, SHORTEST = 1e-2, 500.0
+"""Band of the comparison with the isotropic road: a share of the smallest corner, and rad/m."""
+
+
+def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
+    """Static load (N) of the tyre behind each output that is a tyre force."""
+    loads = preloads(replace(vehicle, gravity=GRAVITY)).tyres
+    forces = (out for out in vehicle.outputs if isinstance(out, TyreOutput) and out.kind == "tyre force")
+    return {output.name: loads[output.tyre] for output in forces}
+
+
+def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) -> dict[str, float]:
+    """What an isotropic road with the same track spectrum makes of every output, relative, both up to SHORTEST.
+
+    Empty where there is none: a vehicle without a width, a road of second order, axles or tracks not as modelled.
+    """
+    from models.ride.frequency import variances
+    from models.road.isotropic import isotropic_like, spectral_matrix
+
+    placed = placed_wheels(scene, wheels(vehicle))
+    road, y = road_of(scene, placed), half_track_of(scene, placed)
+    modelled = (scene.road.left_right, scene.road.front_rear) == ("modelled", "delayed")
+    if not modelled or road.mean.cutoff is not None or len({wheel.y for wheel in placed}) < 2:
+        return {}
+    linear = linear_vehicle(vehicle)(speed)
+    low = LONGEST * min(f.corner for f in (road.mean, road.roll) if f.corner) if road.mean.corner else 0.01
+    of_road, of_isotropic = (
+        variances(linear, partial(spectral_matrix, each, placed), speed, low, SHORTEST)
+        for each in (road, isotropic_like(road, y))
+    )
+    pairs = zip(linear.names, of_road, of_isotropic, strict=True)
+    return {name: float(np.sqrt(isotropic / own) - 1.0) for name, own, isotropic in pairs if own > 0}
+
+
+def largest_gap(sweep: Sweep, reference: Sweep) -> float:
+    """Largest difference of standard deviations where both are finite, by the output's largest on any of the roads."""
+    finite = np.isfinite(reference.deviation) & np.isfinite(sweep.deviation)
+    known, others = (np.where(finite, each.deviation, 0.0) for each in (reference, sweep))
+    largest = known.max(axis=(0, 1))  # an output may be zero on one of the roads
+    return float(np.max(np.abs(others - known) / np.where(largest > 0, largest, 1.0)))
+
+
+def largest_errors(sweep: Sweep, case: int, truth: np.ndarray, names: list[str]) -> np.ndarray:
+    """Relative errors (outputs,), each the largest over the speeds, of a case beside true deviations (speeds, outputs).
+
+    nan for an output that the sweep's vehicle does not have.
+    """
+    errors = np.full(len(names), np.nan)
+    for i, name in enumerate(names):
+        if name in sweep.outputs:
+            deviation = sweep.deviation[case, :, sweep.outputs.index(name)]
+            both = np.isfinite(deviation) & np.isfinite(truth[:, i]) & (truth[:, i] > 0)
+            gaps = deviation[both] / truth[both, i] - 1.0
+            errors[i] = gaps[np.argmax(np.abs(gaps))] if len(gaps) else np.nan
+    return errors
+
+
+def quasi_stationary_gaps(drive: VaryingSpeed, alone: np.ndarray) -> np.ndarray:
+    """Error (N, p) of each speed taken by itself, by the largest deviation of the drive; 0 where there is none."""
+    both = np.isfinite(alone) & np.isfinite(drive.deviation)
+    known = np.where(both, drive.deviation, 0.0)
+    largest = known.max(axis=0)
+    return (np.where(both, alone, 0.0) - known) / np.where(largest > 0, largest, 1.0)

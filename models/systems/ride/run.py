@@ -1,0 +1,120 @@
+"""A scene of ride, run: the only place where one is.
+
+What a scene calls for decides how. At constant speeds a linear vehicle has exact variances, in several correlations of
+the road at once; along a drive it has them at every instant; vehicles that nothing linear stands for go in time.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.core.result import Channel, Result, result
+from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, told_by, vehicle_of
+from models.systems.ride.scene import RideScene
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import wheels
+
+if TYPE_CHECKING:
+    from models.systems.ride.nonlinear import Progress, Sampling
+
+AS_WRITTEN = "as in the scene"
+ANY = 1.0
+"""m/s: the matrices of vehicles that are driven at a varying speed are the same at every one."""
+QUASI_STATIONARY = 90
+"""Speeds at which each is taken by itself beside a drive, from standstill on; straight between them."""
+
+
+def run(
+    scene: RideScene,
+    engine: str = "",
+    *,
+    vehicle: SpatialVehicle | None = None,
+    speeds: Sequence[float] | None = None,
+    correlations: Mapping[str, tuple[str, str] | None] | None = None,
+    sampling: "Sampling | None" = None,
+    progress: "Progress" = lambda text, share: None,
+) -> Result:
+    """Run a scene by the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
+
+    vehicle, speeds (m/s) : in place of the scene's own.
+    correlations : of the road, left to right and front to rear, by name; None is the scene's own, the only one if none
+    are named. sampling : asks for a run in time, as springs do that are bent and tyres that may lift; the reference
+    then answers by statistical linearisation with copies beside, an engine by one path of the road. progress : of it.
+
+    The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
+    """
+    engine = engine or "reference"
+    with told_by(scene):
+        if scene.drive is not None:
+            return _driven(scene, engine, vehicle or vehicle_of(scene))
+        if vehicle is not None or not (sampling or goes_in_time(scene)):
+            return _swept(scene, engine, vehicle or vehicle_of(scene), speeds, correlations or {AS_WRITTEN: None})
+        from models.systems.ride import nonlinear
+
+        vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
+        if engine == "reference":
+            return nonlinear.linearised(scene, vehicle, sampling, progress)
+        return nonlinear.in_engine(scene, engine, vehicle, sampling)
+
+
+def _swept(
+    scene: RideScene,
+    engine: str,
+    vehicle: SpatialVehicle,
+    speeds: Sequence[float] | None,
+    correlations: Mapping[str, tuple[str, str] | None],
+) -> Result:
+    """Standard deviations (correlation, speed, output)."""
+    from models.ride.sweep import sweep
+
+    assert scene.speeds is not None
+    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in correlations.items()}
+    begun = time.process_time()
+    swept = sweep(linear_vehicle(vehicle, engine), roads, speeds or scene.speeds.all(), scene.weighting)
+    return result(
+        scene,
+        {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},
+        {
+            "correlation": Channel("correlation", list(swept.cases)),
+            "speed": Channel("speed", swept.speeds, "m/s"),
+            "output": Channel("output", list(swept.outputs)),
+            "unit": Channel("output", list(swept.units)),
+        },
+        engine=engine,
+        counts={"points": swept.variance[..., 0].size, "direct": sum(swept.direct.values())},
+        seconds=time.process_time() - begun,
+        detail=swept,
+    )
+
+
+def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle) -> Result:
+    """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
+    from models.ride.varying_speed import quasi_stationary, varying_speed
+
+    assert scene.drive is not None
+    begun, weightings = time.process_time(), scene.weighting
+    linear, road = linear_vehicle(vehicle, engine)(ANY), excitation_of(scene, wheels(vehicle))
+    drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
+    speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
+    each = quasi_stationary(linear, road, speeds, weightings=weightings)
+    alone = np.column_stack([np.interp(drive.speed, speeds, column) for column in each.T])
+    return result(
+        scene,
+        {
+            "deviation": Channel(("time", "output"), drive.deviation),
+            "quasi_stationary": Channel(("time", "output"), alone),
+            "speed": Channel("time", drive.speed, "m/s"),
+            "path": Channel("time", drive.path, "m"),
+        },
+        {
+            "time": Channel("time", drive.time, "s"),
+            "output": Channel("output", list(drive.names)),
+            "unit": Channel("output", [output.unit for output in linear.outputs] + ["m/s^2"] * len(weightings)),
+        },
+        engine=engine,
+        counts={"instants": len(drive.time)},
+        seconds=time.process_time() - begun,
+        detail=drive,
+    )

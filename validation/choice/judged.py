@@ -1,0 +1,107 @@
+"""Choices looked at by other routes than their own.
+
+Of linear rides: near the scene by the exact solve, by sums over frequencies, and at equal accuracy by the covariance of
+what runs sample; of scenes that are run: by two runs more.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.advice.choice.choose import Choice as ChoiceByRuns
+from models.advice.choice.choose import Chooser as ChooserByRuns
+from models.advice.ride_choice.candidates import Set, largest
+from models.advice.ride_choice.choose import Choice, Chooser
+from models.advice.ride_choice.march import longest_step
+from models.advice.ride_choice.neighbourhood import OFF, changed, parameters
+from models.advice.ride_choice.reduced import Whole
+from models.advice.ride_choice.screen import confirmed
+from models.ride.frequency import spectra
+from models.systems.ride.reduced_scene import ReducedScene, without
+from validation.choice.drawn_scenes import Asked
+from validation.choice.sampled import Sampled
+from validation.ride.drawn_rides import Bent, Drawn
+
+RANGE = (0.7, 1.0, 1.3)
+"""Speeds of a scene by the one that is drawn."""
+OMEGA = np.geomspace(1e-2, 3e5, 3000)
+"""rad/s of the frequency route: its sums are good to 1e-3 of a change, being the same grid for both."""
+
+
+def asked(drawn: Drawn) -> Chooser:
+    """Of a range of speeds about that of the scene."""
+    return Chooser(drawn.scene, [share * drawn.speed for share in RANGE], drawn.quantities, drawn.tolerance)
+
+
+def changes_by_frequency(chooser: Chooser, choice: Choice) -> np.ndarray:
+    """Changes (quantities,) of the worst listed speed."""
+    left = without(chooser.scene, choice.left_out)
+    ratios = [
+        _by_frequency(whole, left, chooser.rows) / _by_frequency(whole, chooser.scene, chooser.rows)
+        for whole in chooser.wholes
+    ]
+    return largest(np.sqrt(ratios) - 1)
+
+
+def _by_frequency(whole: Whole, scene: ReducedScene, rows: list[int]) -> np.ndarray:
+    """Variances (quantities,) as sums over frequencies, from M, D, K as they are: singular ones need no state."""
+    rest = whole.reduced(scene)
+    densities = spectra(rest.vehicle, rest.excitation, whole.speed, OMEGA)[:, rows]
+    return 2 * np.trapezoid(densities, OMEGA, axis=0)
+
+
+def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
+    """Largest change, by the tolerance, at random speeds of the range and with every parameter off at random."""
+    random, rest, worst = np.random.default_rng(seed), chooser.rest(chosen), 0.0
+    low, high = chooser.wholes[0].speed, chooser.wholes[-1].speed
+    names = parameters(chooser.scene.vehicle)
+    for _ in range(draws):
+        factors = dict(zip(names, 1.0 + OFF * random.uniform(-1.0, 1.0, len(names)), strict=True))
+        full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (chooser.scene, rest))
+        whole = Whole(full, float(random.uniform(low, high)))
+        ratio = confirmed(whole.reduced(left), chooser.rows) / confirmed(whole.full, chooser.rows)
+        worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))
+    return worst / chooser.tolerance
+
+
+def measured_step(chooser: Chooser, chosen: Set) -> float:
+    """Longest step (s) that keeps the tolerance, by the covariance of what runs sample; no quantity is weighted."""
+    return longest_step([Sampled(march) for march in chooser.marches(chosen)], chooser.exact(), chooser.tolerance)
+
+
+@dataclass(frozen=True)
+class JudgedByRuns:
+    """A scene with its choice, and changes (quantities,) by two runs of its own, made after the choice; of rides, on
+    fresh roads and less what chance may add there."""
+
+    system: str
+    engine: str
+    asked: Asked | Bent
+    choice: ChoiceByRuns
+    again: np.ndarray
+
+    @property
+    def honest(self) -> bool:
+        """Whether no tolerance is broken that was reported as kept."""
+        return not self.choice.kept or bool((self.again <= self.asked.tolerance * (1 + 1e-9)).all())
+
+
+def judged_of(asked: Asked, system: str, engine: str) -> JudgedByRuns:
+    """Choose, and run the scene and what is left once more."""
+    chooser = ChooserByRuns(asked.scene(), engine, list(asked.quantities), asked.tolerance)
+    choice, runs = chooser.choose(), chooser.whole.variants
+    whole = runs.system.answer(asked.scene(), engine)
+    rest = runs.system.answer(runs.changed(frozenset(choice.left_out), choice.times), engine)
+    again = [change(whole.of(name).cases, rest.of(name).cases) for name in asked.quantities]
+    return JudgedByRuns(system, engine, asked, choice, np.array(again))
+
+
+def change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float:
+    """Worst case: rms of the difference where both have a row, by the path's deviation, or a number's by its size."""
+    worst = 0.0
+    for full, left in zip(whole, rest, strict=True):
+        rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)
+        size = full.std() if len(full) > 1 else abs(full[0])
+        largest = max(one.std() if len(one) > 1 else abs(one[0]) for one in whole)
+        worst = max(worst, float(np.sqrt(np.mean((left - full[rows]) ** 2)) / max(size, 1e-3 * largest)))
+    return worst

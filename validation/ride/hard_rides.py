@@ -1,0 +1,92 @@
+"""Vehicles and exact answers of ride's hard cases."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import expm
+
+from models.core.scene_file import parse
+from models.ride.closed_forms import QuarterCar
+from models.ride.covariance import stationary
+from models.ride.excited import DelayedSystem, excited
+from models.systems.ride.of_scene import linear_vehicle
+from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper, TurnOutput, Tyre
+from models.vehicles.vehicle_file import SHIPPED, build_vehicle, load_vehicle
+from validation.ride.rides import INTENSITY, off, one_track
+
+SPEED = 20.0
+CORNER = (300.0, 40.0, 2e4, 1500.0, 2e5)
+"""Masses of body and wheel, spring, damper and tyre of a quarter car."""
+BODY, UP = (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+"""Where a body of one freedom lies, and its axis."""
+
+
+def linear(vehicle: SpatialVehicle, implementation: str, speed: float = SPEED) -> LinearVehicle:
+    """The linear vehicle of an implementation."""
+    return linear_vehicle(vehicle, implementation)(speed)
+
+
+def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car: float) -> Callable[..., float]:
+    """A case of a quarter car with some of its values changed: acceleration and travel, relative."""
+    exact = replace(QuarterCar(*CORNER), **car)
+
+    def error(implementation: str, folder: Path) -> float:
+        worst, vehicle = 0.0, quarter(*vars(exact).values())
+        for speed in speeds:
+            found = stationary(excited(linear(vehicle, implementation), one_track((0.0,), corner), speed))
+            q, w = INTENSITY * speed, corner * speed
+            worst = max(worst, off(found.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)]))
+        return worst
+
+    return error
+
+
+def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
+    """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
+    own = replace(load_vehicle("quarter_car"), name="quarter")
+    bodies = tuple(replace(body, mass=m) for body, m in zip(own.bodies, (m_s, m_u), strict=True))
+    springs = (replace(own.springs[0], stiffness=k, damping=c),)
+    return replace(own, bodies=bodies, springs=springs, tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))
+
+
+def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:
+    """A body on a tyre, held by a damper to the ground; outputs: its acceleration and its height."""
+    outputs = tuple(PointOutput(kind, kind, "body", BODY, UP) for kind in ("acceleration", "displacement"))
+    damper = SpringDamper("damper", "body", None, BODY, BODY, UP, 0.0, damping)
+    return SpatialVehicle(
+        "single",
+        (Body("body", mass, BODY, ("z",)),),
+        (damper,),
+        (Tyre("tyre", "body", BODY, 0, stiffness),),
+        (0.0,),
+        outputs=outputs,
+    )
+
+
+@cache
+def steered() -> SpatialVehicle:
+    """R19-free with roll steer in front; outputs: its heading and its place sideways."""
+    table = parse(SHIPPED / "r19_free.toml")
+    table["axles"][0]["roll_steer"] = 0.05
+    vehicle = build_vehicle(table, "steered")
+    outputs = (
+        TurnOutput("heading", "angle", "body", UP),
+        PointOutput("place", "displacement", "body", vehicle.body("body").position, (0.0, 1.0, 0.0)),
+    )
+    return replace(vehicle, outputs=outputs)
+
+
+def after_hours(system: DelayedSystem) -> tuple[np.ndarray, np.ndarray]:
+    """Variances (p,) 1 and 2 hours after rest, axles independent: a step of 3 ms by van Loan's block, then doubled."""
+    n, Q, step = len(system.A), sum(b @ b.T for b in system.B), 3600.0 / 2**20
+    block = expm(np.block([[-system.A, Q], [np.zeros((n, n)), system.A.T]]) * step)
+    E, P = block[n:, n:].T, block[n:, n:].T @ block[:n, n:]
+    variances = []
+    for _ in range(22):
+        variances.append(np.einsum("pi,ij,pj->p", system.C, P, system.C))
+        E, P = E @ E, P + E @ P @ E.T
+    return variances[-2], variances[-1]

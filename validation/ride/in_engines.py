@@ -1,0 +1,185 @@
+"""Rides in time through both engines: their paths beside each other, and beside what replaced vehicles say."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from models.ride.covariance import stationary
+from models.ride.excited import excited
+from models.ride.frequency import one_sided, standard_errors
+from models.ride.road_path import road_path
+from models.ride.statistical_linearisation import promised, statistically_linear
+from models.road.excitation import Excitation
+from models.road.two_track import LEVEL
+from models.systems.ride.nonlinear import Ride, ridden
+from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise, wheels
+from models.vehicles.vehicle_file import load_vehicle
+from validation.common.rows import Row, System, at_most
+from validation.ride.rides import paper_road
+
+SYSTEM: System = "ride"
+ENGINES = ("exudyn", "mujoco")
+SEED, GRAVITY, SPEED = 2211, 9.81, 20.0
+NONLINEAR = "quarter_car_nonlinear"
+STEP, DRIVEN, SKIPPED = 2.5e-3, 24.0, 4.0
+"""Of the engines' runs with 19 freedoms (s): longest step, length, and what is left out at the beginning."""
+NONLINEAR_STEP, NONLINEAR_DRIVEN = 2e-3, (1.0, 60.0)
+SHOWN = ("body centre", "left occupant", "travel front left", "tyre force front left")
+SAME = "the same tableau, road and laws; the sums are taken in another order"
+
+
+@cache
+def ride(name: str, level: float = 1.0, gravity: float = GRAVITY) -> tuple[SpatialVehicle, Excitation]:
+    """A shipped vehicle and a road of some times the paper's level, one without a width on one track."""
+    vehicle = replace(load_vehicle(name), gravity=gravity)
+    return vehicle, paper_road(wheels(vehicle), level=level * LEVEL)
+
+
+def bent_in_engines(quick: bool) -> list[Row]:
+    """The nonlinear quarter car under gravity in both engines; its mean travel where the damper pulls it."""
+    vehicle, excitation_ = ride(NONLINEAR)
+    road = road_path(excitation_, SPEED, NONLINEAR_STEP)
+    runs = {
+        engine: ridden(
+            engine, vehicle, road, NONLINEAR_DRIVEN[not quick], seed=SEED, skipped=SKIPPED * (not quick), every=5
+        )
+        for engine in ENGINES
+    }
+    rows = [_apart("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
+    if quick:
+        return rows
+    found = statistically_linear(vehicle, excitation_, SPEED)
+    travel, force = (found.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
+    size, left = found.covariance.deviation, found.left_out
+    error, _ = standard_errors(found.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
+    for engine, run in runs.items():
+        shift = abs(run.outputs[:, travel].mean() - found.mean[travel]) / size[travel]
+        rows.append(
+            at_most(
+                f"ride_nonlinear.mean.{engine}",
+                SYSTEM,
+                f"the same in {engine}: mean travel, predicted {1e3 * found.mean[travel]:.2f} mm, by its deviation",
+                float(shift),
+                "",
+                promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
+                "what its sentence promises, and 4 standard errors",
+                "none",
+            )
+        )
+        mean = abs(run.outputs[:, force].mean()) / error[force]
+        rows.append(
+            at_most(
+                f"ride_nonlinear.load.{engine}",
+                SYSTEM,
+                "the same: mean of the dynamic tyre force, |z|",
+                float(mean),
+                "",
+                4.0,
+                "the tyre bears the weight, however the damper pulls",
+                "none",
+            )
+        )
+    return rows
+
+
+def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
+    one, other = (runs[engine].run for engine in ENGINES)
+    gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
+    return at_most(
+        f"ride_nonlinear.path.{id}",
+        SYSTEM,
+        f"{what} on one random road: exudyn against mujoco, all states",
+        float(gap),
+        "m, rad, m/s, rad/s",
+        1e-12,
+        SAME,
+        "native",
+    )
+
+
+def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
+    """19 freedoms, gravity on, one path of the random road: variances and means against the covariance."""
+    vehicle, excitation_ = ride("r19_ride")
+    road = road_path(excitation_, SPEED, STEP)
+    runs = {engine: ridden(engine, vehicle, road, DRIVEN, seed=SEED, skipped=SKIPPED, every=2) for engine in ENGINES}
+    linear = linearise(vehicle)
+    exact = stationary(excited(linear, excitation_, SPEED))
+    errors = standard_errors(linear, excitation_, SPEED, DRIVEN - SKIPPED)
+    rows = [_apart("r19_ride", f"r19_ride under gravity, {DRIVEN:g} s", runs)]
+    for engine, run in runs.items():
+        mean = run.outputs.mean(axis=0) / errors[0]
+        square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]
+        share = float(np.median(errors[1] / exact.variance / 2.0))
+        rows += [
+            at_most(
+                f"ride_nonlinear.variance.{engine}",
+                SYSTEM,
+                f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
+                f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
+                float(np.abs(square).max()),
+                "",
+                4.0,
+                "standard errors by the densities: samples of a path know of each other",
+                "none",
+            ),
+            at_most(
+                f"ride_nonlinear.zero.{engine}",
+                SYSTEM,
+                "the same: means about the equilibrium, largest |z| of 16",
+                float(np.abs(mean).max()),
+                "",
+                4.0,
+                "the road has no mean, and gravity is carried",
+                "none",
+            ),
+        ]
+    return rows, _spectra(runs, linear, excitation_)
+
+
+def _spectra(runs: dict[str, Ride], linear: LinearVehicle, excitation: Excitation) -> dict[str, Any]:
+    """One-sided densities over Hz of shown outputs: the covariance's own, and each engine's by Welch's method."""
+    frequency = np.geomspace(0.2, 40.0, 300)
+    sides = {"own": (frequency, one_sided(linear, excitation, SPEED, frequency))}
+    sides |= {engine: run.densities(frequency[-1]) for engine, run in runs.items()}
+    return {
+        side: {"frequency": f.tolist(), **{name: density[:, linear.names.index(name)].tolist() for name in SHOWN}}
+        for side, (f, density) in sides.items()
+    }
+
+
+def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Spectra of both engines' runs over the covariance's own."""
+    if not data["spectra"]:
+        return []
+    from models.drawing.figures import COLOURS, LABELS, plt
+
+    shown = data["spectra"]
+    units = ("(m/s$^2$)$^2$/Hz", "(m/s$^2$)$^2$/Hz", "m$^2$/Hz", "N$^2$/Hz")
+    figure, axes = plt.subplots(2, 2, figsize=(10.0, 6.4), sharex=True)
+    for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
+        for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
+            own = shown[engine]
+            axis.loglog(
+                own["frequency"],
+                own[name],
+                style,
+                color=COLOURS[engine],
+                linewidth=width,
+                label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
+            )
+        axis.loglog(shown["own"]["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
+        top = max(shown["own"][name])
+        axis.set(title=name.capitalize(), ylabel=f"one-sided density [{unit}]", ylim=(1e-5 * top, 5 * top))
+    for axis in axes[1]:
+        axis.set_xlabel("frequency [Hz]")
+    axes[0, 0].legend(fontsize=8)
+    figure.suptitle(f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
+    caption = (
+        "Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
+        "method; black, what the covariance's own linear vehicle and road say."
+    )
+    return [(caption, figure)]

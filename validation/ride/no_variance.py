@@ -1,0 +1,183 @@
+"""Outputs that have no variance, motions that nothing pulls back, and weightings behind a vehicle: rows of a case."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.ride.closed_forms import QuarterCar
+from models.ride.covariance import FINITE, stationary
+from models.ride.excited import DelayedSystem, excited
+from models.ride.frequency import quadrature, spectra
+from models.ride.marginal import Unstable, parts
+from models.ride.weighting import WEIGHTINGS, weighted
+from models.vehicles.spatial_linear import linearise
+from models.vehicles.vehicle_file import load_vehicle
+from validation.common.rows import Row, System, at_most, behaves, within
+from validation.ride.rides import corners, off, one_track, paper_road, twin
+
+SYSTEM: System = "ride"
+CORNER = QuarterCar(300.0, 40.0, 2e4, 1500.0, 2e5)
+
+
+def weighting_rows(seed: int) -> list[Row]:
+    """Weighted seats of an asymmetric twin by states and by their frequency response."""
+    vehicle = linearise(twin(load_vehicle("r19_ride"), seed))
+    road, rows = paper_road(vehicle.wheels), []
+    for name in ("Wk", "Wd"):
+        deviation = stationary(weighted(excited(vehicle, road, 20.0), {"left occupant": name})).deviation[-1]
+        integrals = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
+        at = vehicle.names.index("left occupant")
+        rows.append(
+            at_most(
+                f"ride_covariance.weighting.{name}",
+                SYSTEM,
+                f"{name} of a seat as states behind the vehicle, against its frequency response in the quadrature",
+                deviation / integrals.variance[at] ** 0.5 - 1,
+                "",
+                1e-8,
+                "asked of the cascade; as one polynomial it is 2e-4 off",
+                "native",
+            )
+        )
+    return rows
+
+
+def without_variance() -> list[Row]:
+    """White noise in an output, places that walk, and a vehicle that is unstable."""
+    return [*_white_rows(), *_free_rows(), _unstable_row()]
+
+
+def _white_rows() -> list[Row]:
+    """Tyre damping: what has no variance is said, with its reason, and what has one is right."""
+    vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
+    found = stationary(excited(vehicle, one_track((0.0,), 0.3), 20.0))
+    other = quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
+    rows = [
+        behaves(
+            f"ride_covariance.white.{name}",
+            SYSTEM,
+            f"tyre damping under a road of first order: {what}",
+            found.status[i],
+            expected,
+            found.reason[i],
+        )
+        for name, what, i, expected in (
+            ("body", "body acceleration", 0, "finite"),
+            ("load", "wheel load", 4, "infinite"),
+            ("wheel", "wheel acceleration", 5, "infinite"),
+        )
+    ]
+    return [
+        *rows,
+        at_most(
+            "ride_covariance.white.value",
+            SYSTEM,
+            "the outputs that stay finite, against quadrature",
+            off(found.variance[:4], other.variance[:4]),
+            "",
+            1e-10,
+            "both routes at their best",
+            "native",
+        ),
+    ]
+
+
+def _free_rows() -> list[Row]:
+    """Three zero eigenvalues: found, harmless, the same with slycot, and a heading that roll steer lets walk."""
+    free = load_vehicle("r19_free")
+    vehicle = linearise(free, 20.0)
+    road = paper_road(vehicle.wheels)
+    system = excited(vehicle, road, 20.0)
+    split, found = parts(system.A), stationary(system)
+    same = np.array_equal(_with_slycot(system), found.variance)
+    steer = {"fl": 0.05, "fr": 0.05}
+    forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)
+    turning = linearise(replace(free, side_forces=forces), 20.0)
+    walking = stationary(excited(turning, road, 20.0))
+    side = walking.names.index("lateral position")
+    others = {status for i, status in enumerate(walking.status) if i != side}
+    rate, after = walking.rate[side], float(np.sqrt(walking.rate[side] * 100.0 ** walking.power[side]))
+    omega = 1e-3  # a place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies
+    density = spectra(turning, road, 20.0, np.array([omega]))[0, side]
+    return [
+        within(
+            "ride_covariance.free.zeros",
+            SYSTEM,
+            "zero eigenvalues that are found in R19-free",
+            split.zeros,
+            "",
+            3,
+            0,
+            "place along and across, heading",
+            "closed form",
+        ),
+        behaves(
+            "ride_covariance.free.status",
+            SYSTEM,
+            "all outputs of R19-free",
+            " and ".join(set(found.status)),
+            FINITE,
+            found.reason[0],
+        ),
+        behaves(
+            "ride_covariance.free.slycot",
+            SYSTEM,
+            "R19-free where slycot seems installed, bit by bit",
+            "same" if same else "different",
+            "same",
+            "the method is named; its routines would raise here",
+        ),
+        behaves(
+            "ride_covariance.free.steered",
+            SYSTEM,
+            "front roll steer 0.05: lateral position",
+            walking.status[side] if others == {FINITE} else "others too",
+            "diffusing",
+            walking.reason[side],
+        ),
+        within(
+            "ride_covariance.free.walk",
+            SYSTEM,
+            "its standard deviation after 100 s",
+            after,
+            "m",
+            7.0,
+            0.5,
+            "known to one digit, from the same law worked out beforehand",
+            "closed form",
+        ),
+        at_most(
+            "ride_covariance.free.rate",
+            SYSTEM,
+            "growth of its variance, rate t^3, against 2 pi w^4 / 3 times its density at 0.001 rad/s",
+            float(rate) / (2 * np.pi * omega**4 * density / 3) - 1,
+            "",
+            1e-4,
+            "the next term is smaller by the square of frequency over the slowest pole",
+            "native",
+        ),
+    ]
+
+
+def _with_slycot(system: DelayedSystem) -> np.ndarray:
+    """Variances where python-control believes that slycot is installed, with routines that cannot be called."""
+    import control.exception as installed
+    import control.mateqn as solvers
+
+    kept = installed.slycot_installed, solvers.sb03md, solvers.sb04md
+    installed.slycot_installed, solvers.sb03md, solvers.sb04md = True, None, None
+    try:
+        return stationary(system).variance
+    finally:
+        installed.slycot_installed, solvers.sb03md, solvers.sb04md = kept
+
+
+def _unstable_row() -> Row:
+    said, why = "answered", "it swings up"
+    try:
+        stationary(excited(corners([(0.0, replace(CORNER, c=-5.0))]), one_track((0.0,), 0.3), 20.0))
+    except Unstable as error:
+        why = str(error)
+        said = "refused" if "swings at 11.8" in why and "grows" in why else "refused without its mode"
+    what = "a quarter car with a damper of -5 N s/m"
+    return behaves("ride_covariance.unstable", SYSTEM, what, said, "refused", why)

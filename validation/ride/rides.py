@@ -1,0 +1,154 @@
+"""Vehicles and roads that cases and tests of ride share: the paper's road, quarter cars of the closed forms, twins.
+
+Quarter cars, alone or under one body, are written down by hand. A twin has every mass, spring, damper and tyre changed
+by its own share, reproducibly: a symmetric vehicle hides a swap of left and right, and one with alike axles a swap of
+front and rear.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models.ride.closed_forms import QuarterCar
+from models.road.excitation import Excitation
+from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, half_track, on_track, road_of_level
+from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
+from models.vehicles.spatial import SpatialVehicle
+
+INTENSITY = 1e-4
+"""Of the road of one track, m^2 per m."""
+R19_FREQUENCIES = (
+    1.357622,
+    1.47076,
+    2.152076,
+    2.738235,
+    2.89083,
+    5.917883,
+    6.426765,
+    9.707712,
+    10.419969,
+    10.434258,
+    11.280234,
+    11.401383,
+    11.656264,
+    12.007752,
+    12.667486,
+    15.478222,
+    15.487798,
+    15.526984,
+    15.535278,
+)
+"""|lambda| / 2 pi (Hz) of R19-ride, given with its data."""
+STANDARD = (
+    (0.5, 418, 853),
+    (0.63, 459, 944),
+    (0.8, 477, 992),
+    (1.0, 482, 1011),
+    (1.25, 484, 1008),
+    (1.6, 494, 968),
+    (2.0, 531, 890),
+    (2.5, 631, 776),
+    (3.15, 804, 642),
+    (4.0, 967, 512),
+    (5.0, 1039, 409),
+    (6.3, 1054, 323),
+    (8.0, 1036, 253),
+    (10.0, 988, 212),
+    (12.5, 902, 161),
+    (16.0, 768, 125),
+    (20.0, 636, 100),
+    (25.0, 513, 80.0),
+    (31.5, 405, 63.2),
+    (40.0, 314, 49.4),
+    (50.0, 246, 38.8),
+    (63.0, 186, 29.5),
+    (80.0, 132, 21.1),
+)
+"""ISO 2631-1:1997, Table 3, from two copies of it in print: Hz, 1000 Wk, 1000 Wd. The standard itself was not read."""
+
+
+def off(values: ArrayLike, expected: ArrayLike) -> float:
+    """Largest relative error of values beside expected ones."""
+    return float(np.abs(np.asarray(values) / np.asarray(expected) - 1.0).max())
+
+
+def one_track(places: tuple[float, ...], corner: float = 0.0) -> Excitation:
+    """One track under axles at ``places``, z' = -corner z + w."""
+    heights = tuple(np.eye(len(places))[:, [i]] for i in range(len(places)))
+    filter_ = np.array([[-corner]]), np.array([[INTENSITY**0.5]])
+    return Excitation(*filter_, heights, tuple(places[0] - x for x in places))
+
+
+def paper_road(wheels: Sequence[Wheel], *words: str, level: float = LEVEL, cutoff: float | None = None) -> Excitation:
+    """The paper's road under wheels, in words of a case; wheels without a width run on one track."""
+    y = half_track(wheels)
+    placed = wheels if y else on_track(wheels, 1.0)
+    return excitation(road_of_level(y or 1.0, level, cutoff=cutoff), placed, *words)
+
+
+def five_cases(wheels: Sequence[Wheel], road: TwoTrackRoad | None = None) -> dict[str, Excitation]:
+    """The paper's road, or another one, in the paper's five cases of correlation by their numbers."""
+    road = road or road_of_level(half_track(wheels))
+    return {str(number): excitation(road, wheels, *case) for number, case in CASES.items()}
+
+
+def corners(
+    places: Sequence[tuple[float, QuarterCar]], mass: np.ndarray | None = None, tyre_damping: float = 0.0
+) -> LinearVehicle:
+    """Corners (x in m, quarter car), one per axle, under a body with the mass matrix of z or of z and pitch.
+
+    tyre_damping in N s/m. Outputs: body acceleration; travel, tyre deflection, body height; load and acceleration of
+    the first wheel.
+    """
+    body = np.array([[places[0][1].m_s]]) if mass is None else mass
+    b, w = len(body), len(places)
+    n = b + w
+    M = np.diag([*np.diag(body), *(corner.m_u for _, corner in places)])
+    D, K, R, S = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, w)), np.zeros((n, w))
+    for i, (x, corner) in enumerate(places):
+        travel = np.array([*[1.0, -x][:b], *(-np.eye(w)[i])])
+        K += corner.k * np.outer(travel, travel)
+        D += corner.c * np.outer(travel, travel)
+        K[b + i, b + i] += corner.k_t
+        D[b + i, b + i] += tyre_damping
+        R[b + i, i], S[b + i, i] = corner.k_t, tyre_damping
+    unit, no, none, first = np.eye(n), np.zeros(n), np.zeros(w), np.eye(w)[0]
+    k_t, c_t = R[b, 0], S[b, 0]
+    outputs = (
+        Output("body", "m/s2", "acceleration", unit[0], no, no, none, none),
+        Output("travel", "m", "travel", no, no, unit[0] - unit[b], none, none),
+        Output("tyre", "m", "deflection", no, no, unit[b], -first, none),
+        Output("height", "m", "displacement", no, no, unit[0], none, none),
+        Output("load", "N", "force", no, -c_t * unit[b], -k_t * unit[b], k_t * first, c_t * first),
+        Output("wheel", "m/s2", "acceleration", unit[b], no, no, none, none),
+    )
+    wheels = tuple(Wheel(f"wheel {i}", x, 0.0, i) for i, (x, _) in enumerate(places))
+    return LinearVehicle(M, D, K, R, S, tuple(("body", str(i)) for i in range(n)), wheels, outputs)
+
+
+SHARE = 0.2
+"""Largest change of any value."""
+
+
+def twin(vehicle: SpatialVehicle, seed: int) -> SpatialVehicle:
+    """The vehicle with its masses, stiffnesses and dampings changed by up to SHARE each, named a twin."""
+    rng = np.random.default_rng(seed)
+
+    def changed(value: float) -> float:
+        return value * (1 + SHARE * rng.uniform(-1, 1))
+
+    bodies = []
+    for body in vehicle.bodies:
+        factor = changed(1.0)
+        inertia = tuple(tuple(factor * entry for entry in row) for row in body.inertia)
+        bodies.append(replace(body, mass=factor * body.mass, inertia=inertia))  # type: ignore[arg-type]
+    return replace(
+        vehicle,
+        name=f"{vehicle.name}, asymmetric twin {seed}",
+        bodies=tuple(bodies),
+        springs=tuple(replace(s, stiffness=changed(s.stiffness), damping=changed(s.damping)) for s in vehicle.springs),
+        bars=tuple(replace(bar, stiffness=changed(bar.stiffness)) for bar in vehicle.bars),
+        tyres=tuple(replace(tyre, stiffness=changed(tyre.stiffness)) for tyre in vehicle.tyres),
+    )
