@@ -1,7 +1,7 @@
 """A vehicle cut at its wheels in an engine: what is the same in every one.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
-forces of ``hub_forces.kernel``. The reference solves the written-out equations instead.
+forces of ``models.multibody.cut_kernel``. The reference solves the written-out equations instead.
 """
 
 from abc import ABC, abstractmethod
@@ -10,12 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
-from models.core.steps import divides, fitting
 from models.engines.free_vehicle import Driven, free_model
 from models.engines.protocol import Settings, guard
-from models.engines.spatial_protocol import _check_step
+from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
-from models.multibody.cut_mechanics import PER_MOTION
 from models.multibody.cut_table import Drive, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
@@ -46,12 +44,7 @@ class HubModel(ABC):
 
     def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step."""
-        if not divides(step, duration):
-            raise Refused(
-                engine,
-                f"the step {step:g} s does not divide the duration {duration:g} s; use for "
-                f"example {fitting(step, duration)} s",
-            )
+        check_divides(engine, Settings("RK4", step, duration))
         self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
         _check(engine, vehicle, drive, 2 * self.steps + 1)
         check_step(engine, vehicle, step, duration)
@@ -79,28 +72,22 @@ class HubModel(ABC):
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
-        vehicle = self.vehicle
-        inside, moments = np.empty((len(times), len(vehicle.elements))), np.empty((len(times), 2))
-        wrenches = np.empty((len(times), len(vehicle.hubs), WRENCH))
+        rows, vehicle = len(times), self.vehicle
+        inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
+        wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
         report(self.numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
         return HubRun(times, states, inside, wrenches, moments)
 
-    def work(self) -> tuple[np.ndarray, ...]:
-        """Room for the compiled forces: motion of the joints, their forces, those of elements, hubs, stabiliser."""
-        own = self.vehicle
-        return (
-            np.empty((self.size + 1, PER_MOTION)),
-            np.zeros(self.size),
-            np.empty(len(own.elements)),
-            np.empty((len(own.hubs), WRENCH)),
-            np.empty(2),
-        )
+    def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
+        """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""
+        block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
+        set_joint_forces(block.ctypes.data, 0.0, self.size)
+        return block[: self.size].copy()
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
     """Refused where a mode of the vehicle on its tyres, which are stiffer than none, would grow at a step (s)."""
-    linear = linearise(replace(vehicle.whole, side_forces=()))
-    _check_step(engine, linear, Settings("RK4", step, duration))
+    check_modes(engine, linearise(replace(vehicle.whole, side_forces=())), Settings("RK4", step, duration))
 
 
 def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
@@ -116,9 +103,9 @@ class ReferenceHubs(HubModel):
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from the mass matrix of ``mechanics``."""
-        found = np.empty(self.size)
-        accelerate(self.numbers, time, np.ascontiguousarray(q), np.ascontiguousarray(v), found)
-        return found
+        rates = np.empty(self.size)
+        accelerate(self.numbers, time, np.ascontiguousarray(q), np.ascontiguousarray(v), rates)
+        return rates
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
@@ -137,7 +124,7 @@ class EngineHubs(HubModel):
         self.model = free_model(engine, Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) by the engine."""
+        """Accelerations (n,) by the engine at a time (s), coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
     def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:

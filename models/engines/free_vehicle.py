@@ -20,7 +20,7 @@ from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
 from models.vehicles.spatial import SpatialVehicle
 
-MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
+ENGINES = ("exudyn", "mujoco")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,8 @@ class FreeModel(ABC):
 
 def free_model(engine: str, driven: Driven) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
-    if engine not in MODELS:
-        raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
-    found: FreeModel = getattr(import_module(f"models.engines.free_vehicle_{engine}"), MODELS[engine])(driven)
-    return found
+    if engine not in ENGINES:
+        raise InputError("", "engine", engine, "no such engine", ENGINES)
+    module = import_module(f"models.engines.free_vehicle_{engine}")
+    model: FreeModel = getattr(module, f"Free{engine.capitalize()}")(driven)
+    return model

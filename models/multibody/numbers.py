@@ -10,9 +10,8 @@ from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART
 from models.tyre.bristles import net, shape_factor
-from models.vehicles.curve import Curve
 from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
-from models.vehicles.spatial import SpatialVehicle, Vector
+from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import Preloads, preloads
 
 Control = tuple[tuple[float, float], ...]

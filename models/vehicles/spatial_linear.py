@@ -1,16 +1,19 @@
 """M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 
 from models.core.errors import InputError
-from models.vehicles.kinematics import Kinematics
-from models.vehicles.limits import limited
 from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import (
+    FREEDOMS,
     AntiRollBar,
+    Body,
+    Limits,
     PartOutput,
     PointOutput,
     SpatialOutput,
@@ -18,10 +21,75 @@ from models.vehicles.spatial import (
     SpringDamper,
     TurnOutput,
     TyreOutput,
+    Vector,
 )
 
+NOTHING = 1e-10
+"""Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
+
+
+UNIT = np.eye(3)
+TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
+"""(3, 3, 3): e_i x v = TURN[i] @ v."""
+
+
+class Kinematics:
+    """Where the points of a vehicle go when its coordinates are small: exact to second order.
+
+    A body moves by its own coordinates after those of the bodies it rides on, so that an outer turn also turns every
+    inner motion: d2p / dq_a dq_b = e_a x dp/dq_b for an outer (or the same) turn a about e_a, 0 for an outer shift.
+    """
+
+    def __init__(self, vehicle: SpatialVehicle) -> None:
+        self._bodies = {body.name: body for body in vehicle.bodies}
+        self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
+        self.size = len(self._index)
+
+    def coordinate(self, body: str, freedom: str) -> np.ndarray:
+        """Row (n,) that picks one coordinate out of q, zeros where the body does not have it."""
+        row = np.zeros(self.size)
+        if (body, freedom) in self._index:
+            row[self._index[body, freedom]] = 1.0  # type: ignore[index]
+        return row
+
+    def shift(self, body: str | None, point: Vector) -> np.ndarray:
+        """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
+        columns = np.zeros((3, self.size))
+        for rider, freedom, i in self._motions(body):
+            along = FREEDOMS.index(freedom)
+            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
+        return columns
+
+    def turn(self, body: str) -> np.ndarray:
+        """(3, n): small rotation of a body (rad) by the coordinates."""
+        columns = np.zeros((3, self.size))
+        for _, freedom, i in self._motions(body):
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
+                columns[:, i] = UNIT[along - 3]
+        return columns
+
+    def bend(self, body: str | None, point: Vector) -> np.ndarray:
+        """(3, n, n): second derivatives of a point (m) by the coordinates."""
+        first = self.shift(body, point)
+        second = np.zeros((3, self.size, self.size))
+        motions = self._motions(body)
+        for k, (_, freedom, outer) in enumerate(motions):
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
+                for _, _, inner in motions[k:]:
+                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
+        return second
+
+    def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
+        """Coordinates that move a body, from the ground outwards: (the body that has it, freedom, index)."""
+        if body is None:
+            return []
+        rider = self._bodies[body]
+        own = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
+        return self._motions(rider.parent) + own
 
 
 def linearise(
@@ -255,3 +323,49 @@ def _tyre_rows(spec: TyreOutput, part: Part, rows: np.ndarray, road: np.ndarray)
     gains = {"tyre force": (k, c), "tyre deflection": (1.0, 0.0)}[spec.kind]
     rows[:2] = -np.outer(gains, row)
     road[:] = gains
+
+
+def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> tuple[LinearVehicle, np.ndarray]:
+    """M, D, K and outputs in what coordinates are left, and N (n, r) with q = N r; M may be singular.
+
+    linear : the vehicle without limits. InputError where nothing is left that could move.
+    """
+    M, N = massless(linear.mass, vehicle, limits.massless), _free(vehicle, limits)
+    if not N.size:
+        raise InputError("", "effects", None, "nothing is left that could move")
+    outputs = tuple(
+        replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
+        for o in linear.outputs
+    )
+    return replace(
+        linear,
+        mass=N.T @ M @ N,
+        damping=N.T @ linear.damping @ N,
+        stiffness=N.T @ linear.stiffness @ N,
+        road_stiffness=N.T @ linear.road_stiffness,
+        road_damping=N.T @ linear.road_damping,
+        coordinates=tuple(("", str(i)) for i in range(N.shape[1])),
+        outputs=outputs,
+    ), N
+
+
+def massless(matrix: np.ndarray, vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+    """The mass matrix (n, n) less that of these bodies; rounding leaves no trace of them."""
+    if not names:
+        return matrix
+    light = tuple(
+        replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
+    )
+    return mass(replace(vehicle, bodies=light))
+
+
+def _free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+    """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
+    coordinates, motion = vehicle.coordinates(), Kinematics(vehicle)
+    kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
+    rows = [
+        np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
+        for s in vehicle.springs
+        if s.name in limits.rigid
+    ]
+    return kept @ null_space(np.array(rows), rcond=NOTHING) if rows else kept

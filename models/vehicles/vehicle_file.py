@@ -12,12 +12,12 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.scene_file import existing, parse
 from models.core.strict import read
-from models.vehicles.curve import Curve
-from models.vehicles.limits import Limits
 from models.vehicles.spatial import (
     AntiRollBar,
     Body,
+    Curve,
     Drag,
+    Limits,
     PartOutput,
     PointOutput,
     SideForce,

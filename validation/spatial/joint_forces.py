@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.engines.mujoco_quiet import quiet
-from models.engines.spatial_mujoco import Numbers, _spec, _weigh
+from models.engines.mujoco_tree import Numbers, spec_of, weigh
 from models.systems.measured.sections import guided
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
@@ -80,7 +80,7 @@ class _Loaded:
     """A MuJoCo model of a cut vehicle with loads on its bodies, at a state."""
 
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
-        self.vehicle, spec = vehicle, _spec(vehicle.tree, 1e-3)
+        self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
         names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
         for number in (names[name] for name in guided(vehicle)):
             spec.body(number).add_site(name=number)
@@ -88,7 +88,7 @@ class _Loaded:
                 spec.add_sensor(name=f"{kind} {number}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=number)
         with quiet():
             self.model = spec.compile()
-            _weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
+            weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
             self.data = mujoco.MjData(self.model)
             self.ids = {name: int(self.model.body(number).id) for name, number in names.items()}
             self.data.qpos[:], self.data.qvel[:] = q, v

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.advice.ride_choice.reduced import Whole
 from models.ride.covariance import stationary
-from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial_linear import Kinematics
 from models.vehicles.spatial import FREEDOMS
 from models.vehicles.spatial_linear import slopes_at_rest
 

@@ -14,12 +14,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.signals import Sampled
 from models.drift.score import SURPRISED
-from models.multibody.cut_rigid import rigid
 from models.multibody.cut_table import Drive
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
 from models.systems.hub_forces.tilt_march import march
-from models.vehicles.cut_vehicle import CutVehicle
+from models.vehicles.cut_vehicle import CutVehicle, rigid
 
 SURPRISE = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""

@@ -1,0 +1,74 @@
+"""R19-free cut at its wheels, a twin without any symmetry, and the states and hub forces that both are checked by."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+import numpy as np
+
+from models.engines.cut_vehicle import EngineHubs
+from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_table import Drive
+from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+
+SEED = 31
+"""Of the wrenches that shake a vehicle."""
+
+
+@cache
+def r19() -> CutVehicle:
+    """The shipped car, cut."""
+    return cut(load_vehicle("r19_free"), "body")
+
+
+def twin() -> SpatialVehicle:
+    """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
+    whole = load_vehicle("r19_free")
+    springs = tuple(
+        replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
+        for i, s in enumerate(whole.springs)
+    )
+    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
+    chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
+    return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
+
+
+def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:
+    """Hub forces that carry the vehicle at rest."""
+    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
+    forces[:, 2::WRENCH] = vehicle.loads
+    return Drive(forces, frame)
+
+
+def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates at random, the chassis turned by any heading and by up to a radian."""
+    rng = np.random.default_rng(seed)
+    q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
+    q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
+    return q, v
+
+
+def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
+    """A row of six random components per hub, with a stabiliser or without."""
+    rng = np.random.default_rng(SEED)
+    drive = static(vehicle, 3, frame)
+    hubs = drive.hubs + rng.normal(0, 500.0, drive.hubs.shape[1])
+    return replace(drive, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+
+
+def by_jacobians(built: EngineHubs, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
+    """Joint forces (n,) of wrenches (6 h,) at the hubs, in axes of these or "inertial" ones, by MuJoCo's Jacobians."""
+    assert isinstance(built.model, FreeMujoco)
+    model, names = built.model.model, [body.name for body in built.vehicle.tree.bodies]
+    data, forces = mujoco.MjData(model), np.zeros(built.size)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    for tyre, wrench in zip(built.vehicle.whole.tyres, wrenches.reshape(-1, 2, 3), strict=True):
+        body = int(model.body(str(names.index(tyre.body))).id)
+        force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
+        mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)
+    return forces
