@@ -20,7 +20,7 @@ from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
 from validation.cases import hub_forces as case
-from validation.spatial.cut_cars import r19, static, twin
+from validation.spatial.cars import r19, static, twin
 
 ALL = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {}}
 

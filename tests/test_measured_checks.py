@@ -26,7 +26,7 @@ from models.systems.measured.verdict import surprised
 from models.systems.measured.virtual import VirtualMeasurement, recording
 from models.vehicles.cut_vehicle import rigid
 from validation.cases import measured_checks as case
-from validation.spatial.cut_cars import r19
+from validation.spatial.cars import r19
 
 PERIOD = 2e-3
 

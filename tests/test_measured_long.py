@@ -26,7 +26,7 @@ from models.systems.measured.sections import Point, Sections, points
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
 from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of
-from validation.spatial.cut_cars import r19
+from validation.spatial.cars import r19
 
 SECONDS = 0.2
 

@@ -8,7 +8,7 @@ import numpy as np
 from models.engines.protocol import guard
 from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
-from models.systems.handling.in_engines import build
+from models.systems.handling.run import build
 from validation.absence import hand_built_handling, handling
 from validation.absence.of_systems import bare
 

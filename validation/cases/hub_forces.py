@@ -23,7 +23,7 @@ from models.systems.hub_forces.tilt_filter import estimate
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
 from models.vehicles.spatial import SpringDamper
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
-from validation.spatial.cut_cars import anywhere, by_jacobians, r19, shaken, static, twin
+from validation.spatial.cars import anywhere, by_jacobians, r19, shaken, static, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"

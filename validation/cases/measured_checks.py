@@ -21,7 +21,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, behaves, finding, not_run, within
 from validation.measured import measured_car
 from validation.measured import recording as car
-from validation.spatial.cut_cars import r19, twin
+from validation.spatial.cars import r19, twin
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"

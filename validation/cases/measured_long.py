@@ -18,7 +18,7 @@ from models.systems.measured.sections import Sections, guided
 from models.vehicles.cut_vehicle import cut
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
-from validation.spatial.cut_cars import anywhere, shaken, twin
+from validation.spatial.cars import anywhere, shaken, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"

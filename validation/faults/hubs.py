@@ -12,7 +12,7 @@ from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import CutVehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
-from validation.spatial.cut_cars import by_jacobians, r19, static
+from validation.spatial.cars import by_jacobians, r19, static
 
 
 def _driven(hubs: np.ndarray) -> EngineHubs:

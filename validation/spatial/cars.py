@@ -1,4 +1,4 @@
-"""R19-free cut at its wheels, a twin without any symmetry, and the states and hub forces that both are checked by."""
+"""R19-free on its tyres or cut at its wheels, a twin without any symmetry, and what all of them are checked by."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,8 +8,11 @@ import numpy as np
 
 from models.engines.cut_vehicle import EngineHubs
 from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.multibody import forces as at
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
+from models.multibody.numbers import Handling
+from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
@@ -72,3 +75,31 @@ def by_jacobians(built: EngineHubs, q: np.ndarray, wrenches: np.ndarray, frame: 
         force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
         mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)
     return forces
+
+
+def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
+    """Largest error of a tyre's cornering stiffness at its static load, out of its table, by the ride vehicle's."""
+    wanted, worst = {force.name: force.stiffness for force in handling.given.side_forces}, 0.0
+    for i, tyre in enumerate(handling.vehicle.tyres):
+        n = handling.tyre_numbers(i)
+        half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
+        slides = np.array([[0, slip, 0, 1.0]])
+        force = brush(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], slides)[0, 1]
+        worst = max(worst, abs(float(-force / slip) / wanted[tyre.name] - 1.0))
+    return worst
+
+
+def mirrored(handling: Handling, values: np.ndarray) -> np.ndarray:
+    """Values (..., n) of the coordinates of a car as those of its mirror image, left and right exchanged."""
+    places = handling.vehicle.coordinates()
+    swap = [places.index((_opposite(name), freedom)) for name, freedom in places]
+    return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places]) * values[..., swap]
+
+
+def _opposite(name: str) -> str:
+    """The body on the other side."""
+    for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
+        for side, other in ((left, right), (right, left)):
+            if name.startswith(side):
+                return name.replace(side, other, 1)
+    return name
