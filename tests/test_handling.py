@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from models.core.errors import InputError, RunFailed
-from models.multibody import forces, kernel
+from models.multibody import forces
 from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.road.plane_waves import plane_waves
 from models.systems.handling.run import Drive, driven
@@ -115,7 +115,7 @@ def test_what_pushes_a_rotor_pushes_all_that_it_rides_on() -> None:
         at_centre = Push(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
         found[body] = still.copy()
         report, ledger = np.zeros((4, forces.REPORTED)), np.zeros(forces.LEDGER)
-        kernel.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)
+        forces.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)
     assert np.abs(found["fl"][2]) > 100.0  # N m about the vertical
     assert np.abs(found["fl"] - found["fl rotor"]).max() < 1e-9
 

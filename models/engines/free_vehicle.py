@@ -2,7 +2,7 @@
 
 The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
 positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
-of ``models.multibody.kernel`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
+of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
 method.
 """
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from models.multibody import forces as at
-from models.multibody.kernel import reports
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.run import bodies_energy, build
 from models.vehicles.vehicle_file import load_vehicle
@@ -47,7 +46,7 @@ def _mirror() -> float:
 
 def _read(own: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     report, ledger = np.empty((1, len(own.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+    at.reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 

@@ -12,7 +12,6 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.spatial_protocol import SpatialRun
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
-from models.multibody import kernel
 from models.multibody.numbers import GRAVITY, Handling
 from models.systems.handling.scene import HandlingScene
 from models.tyre.bristles import SLOW
@@ -118,7 +117,7 @@ def build(engine: str, handling: Handling) -> FreeModel:
 
 def driven_by(handling: Handling) -> Driven:
     """What an engine builds: the bodies, and the compiled forces with their table."""
-    return Driven(handling.vehicle, handling.gravity, handling.numbers, kernel.forces, kernel.set_forces)
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
 
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
@@ -139,7 +138,7 @@ def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float =
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
-    kernel.reports(handling.numbers, run.times, *states, report, ledger)
+    at.reports(handling.numbers, run.times, *states, report, ledger)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     drive = Drive(handling, run, report, ledger, seconds)
