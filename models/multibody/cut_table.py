@@ -48,8 +48,9 @@ def joints(vehicle: CutVehicle) -> Joints:
     """Joints in the order of the coordinates; those of one body share the place of the first."""
     kind, below, *arm = free_joints(vehicle.tree).T
     anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
-    last, origin = ({name: own[i] for name, own in anchors.items()} for i in range(2))
-    return Joints(np.column_stack([below, kind >= 3, kind % 3, *arm]), last, origin)
+    rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
+    origin = {name: place for name, (_, place) in anchors.items()}
+    return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
 def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
-from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, steiner
+from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import preloads
 
 GRAVITY = 9.81
@@ -77,38 +77,16 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     _check(vehicle, chassis)
     whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
     held = preloads(whole)
-    springs = [_spring(spring, held.parts[spring.name]) for spring in whole.springs]
-    bars = [
-        Element(
-            bar.name,
-            bar.left,
-            bar.right,
-            np.array(bar.point_left),
-            np.array(bar.point_right),
-            np.array([0.0, 0.0, 1.0 / bar.track]),
-            bar.stiffness,
-            bar.damping,
-            held.parts[bar.name],
-        )
-        for bar in whole.bars
-    ]
+
+    def element(part: SpringDamper | AntiRollBar, one: str, two: str, *places: Vector) -> Element:
+        first, second, axis = map(np.array, places)
+        force = held.parts[part.name]
+        return Element(part.name, one, two, first, second, axis, part.stiffness, part.damping, force)
+
+    springs = (element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis) for s in whole.springs)
+    bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in whole.bars)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
     return CutVehicle(chassis, _tree(whole, chassis), whole, (*springs, *bars), loads)
-
-
-def _spring(s: SpringDamper, held: float) -> Element:
-    assert s.two is not None
-    return Element(
-        s.name,
-        s.one,
-        s.two,
-        np.array(s.point_one),
-        np.array(s.point_two),
-        np.array(s.axis),
-        s.stiffness,
-        s.damping,
-        held,
-    )
 
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:

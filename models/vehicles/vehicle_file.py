@@ -123,7 +123,8 @@ class _Builder:
         springs = (*map(self._spring, tables.springs), *self._mounts(), *map(self._seat_spring, tables.seats))
         bars = tuple(map(self._bar, tables.anti_roll_bars))
         self._unique("springs, mounts, seats, anti_roll_bars", (*springs, *bars))
-        parts, drag = tuple(part.name for part in (*springs, *bars)), tables.drag
+        parts = (*(spring.name for spring in springs), *(bar.name for bar in bars))
+        drag = tables.drag
         vehicle = SpatialVehicle(
             name=self.file,
             bodies=tuple(self.bodies.values()),
@@ -211,8 +212,10 @@ class _Builder:
         gains = spring.stiffness, spring.damping
         acts = any((*gains, spring.friction, spring.travel_force, spring.rate_force))
         self._need(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
-        curves = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
-        return SpringDamper(spring.name, *ends, *points, axis, *gains, *curves, spring.friction, spring.friction_rate)
+        travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
+        return SpringDamper(
+            spring.name, *ends, *points, axis, *gains, travel, rate, spring.friction, spring.friction_rate
+        )
 
     def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""
@@ -258,8 +261,8 @@ class _Builder:
             acts = any(mount.stiffness) or any(mount.damping)
             place = _place("mounts", mount.name, "stiffness")
             self._need(acts, place, mount.stiffness, "has neither spring nor damper")
-            for name, axis, *gains in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
-                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), *gains)
+            for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
+                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c)
 
     def _seat_spring(self, seat: SeatTable) -> SpringDamper:
         """Carrier below, occupant above: turned round so that force is positive in compression."""
@@ -320,7 +323,7 @@ class _Builder:
         self._known(f"{place}.{needed}", name, needed, known)
         if needed != "body":
             read_of: Any = PartOutput if needed == "part" else TyreOutput
-            return read_of(output.name, kind, name)  # type: ignore[no-any-return]
+            return read_of(output.name, kind, name)
         axis = self._unit(f"{place}.direction", output.direction)
         if kind.startswith("ang"):
             return TurnOutput(output.name, kind, name, axis)  # type: ignore[arg-type]

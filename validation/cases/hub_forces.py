@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from models.core.errors import InputError
 from models.core.signals import Interpolation
-from models.engines.cut_vehicle import ENGINES, EngineHubs, HubRun, build
+from models.engines.cut_vehicle import ENGINES, HubModel, HubRun, build
 from models.engines.spatial_reference import SpatialReference
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
@@ -100,7 +100,7 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     for frame in ("hub", "inertial"):
         drive = shaken(vehicle, frame, guide=False)
         built, bare = (
-            EngineHubs("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
+            HubModel("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
         )
         expected = by_jacobians(built, q, drive.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.cut_vehicle import EngineHubs
+from models.engines.cut_vehicle import HubModel
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import CutVehicle
@@ -15,9 +15,9 @@ from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import by_jacobians, r19, static
 
 
-def _driven(hubs: np.ndarray) -> EngineHubs:
+def _driven(hubs: np.ndarray) -> HubModel:
     """R19-free in MuJoCo with these wrenches (3, 6 h) on its hubs."""
-    return EngineHubs("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
+    return HubModel("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
 
 
 def _jacobians() -> float:

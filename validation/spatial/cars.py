@@ -6,7 +6,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from models.engines.cut_vehicle import EngineHubs
+from models.engines.cut_vehicle import HubModel
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.multibody import forces as at
 from models.multibody.cut_kernel import WRENCH
@@ -62,7 +62,7 @@ def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
     return replace(drive, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
 
 
-def by_jacobians(built: EngineHubs, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
+def by_jacobians(built: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
     """Joint forces (n,) of wrenches (6 h,) at the hubs, in axes of these or "inertial" ones, by MuJoCo's Jacobians."""
     assert isinstance(built.model, FreeMujoco)
     model, names = built.model.model, [body.name for body in built.vehicle.tree.bodies]

@@ -33,10 +33,10 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
     """The same (guides, 6) in the axes of what carries each body, at rest; exact where at most one angle is free."""
     import exudyn as exu
-    import exudyn.itemInterface as items
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
-    exu.config.printToConsole = False
+    from models.engines.exudyn_system import KINDS, items
+
     loaded, container = _Loaded(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
     mbs: Any = container.AddSystem()
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
@@ -48,9 +48,9 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
             items.ObjectRigidBody(mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node)
         )
         centres[body.name] = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.name]))
-        force, moment = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
-        mbs.AddLoad(items.LoadForceVector(markerNumber=centres[body.name], loadVector=force.tolist()))
-        mbs.AddLoad(items.LoadTorqueVector(markerNumber=centres[body.name], loadVector=moment.tolist()))
+        loads = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
+        for kind, load in zip((items.LoadForceVector, items.LoadTorqueVector), loads, strict=True):
+            mbs.AddLoad(kind(markerNumber=centres[body.name], loadVector=load.tolist()))
     for body in (vehicle.whole.body(name) for name in guided(vehicle)):
         assert body.parent is not None
         arm = np.subtract(body.position, vehicle.whole.body(body.parent).position)
@@ -65,7 +65,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
             mbs.AddSensor(
                 items.SensorObject(objectNumber=joint, storeInternal=True, writeToFile=False, outputVariableType=kind)
             )
-            for kind in (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)
+            for kind in (KINDS.ForceLocal, KINDS.TorqueLocal)
         ]
     mbs.Assemble()
     options = exu.SimulationSettings()

@@ -12,7 +12,7 @@ from models.core.scene_effects import extended, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
-from models.multibody.numbers import Control, Controls, Handling, Tyres
+from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import SHORTEST, plane_waves
 from models.vehicles.vehicle_file import load_vehicle
@@ -20,6 +20,8 @@ from models.vehicles.vehicle_file import load_vehicle
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
 AT_REST = [[0.0, 0.0]]
+LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0, 1e5, "N m")}
+"""What values of each control may be."""
 
 
 class HandlingVehicle(Strict):
@@ -73,7 +75,9 @@ class Manoeuvre(Strict):
 
     def controls(self) -> Controls:
         """What the driver does."""
-        steer, brake, drive = (_control(knots) for knots in (self.steer, self.brake, self.drive))
+        steer, brake, drive = (
+            tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
+        )
         return Controls(steer, brake, drive, self.front_brake, self.front_drive)
 
 
@@ -98,19 +102,14 @@ class HandlingScene(SceneFile):
         return extended(built, self)
 
 
-def _control(knots: list[Pair]) -> Control:
-    return tuple((float(time), float(value)) for time, value in knots)
-
-
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(HandlingScene, table, file, folder)
     for name, own in scene.manoeuvres.items():
         place = f"manoeuvres.{name}"
         _check_times(scene, place, own)
-        for control in ("steer", "brake", "drive"):
-            _check_knots(file, f"{place}.{control}", getattr(own, control), 1.2 if control == "steer" else None)
-            _check_pace(file, f"{place}.{control}", getattr(own, control), scene.run.step)
+        for control, limits in LIMITS.items():
+            _check_knots(scene, f"{place}.{control}", getattr(own, control), *limits)
         _check_way(scene, place, own)
     return with_own(scene)
 
@@ -125,20 +124,13 @@ def _check_times(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
         raise InputError(scene.file, "run.step", step, allowed)
 
 
-def _check_knots(file: str, place: str, knots: list[Pair], most: float | None) -> None:
-    """Times that rise; angles that wheels have; torques that are not negative."""
-    times, values = np.array(knots, float).T
+def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
+    """Refuse times that do not rise, values beyond the limits, and a change that no step of the run sees."""
+    (times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")
-    low, high = (-most, most) if most is not None else (0.0, 1e5)
     if not ((values >= low) & (values <= high)).all():
-        unit = "rad" if most is not None else "N m"
         raise InputError(file, place, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
-
-
-def _check_pace(file: str, place: str, knots: list[Pair], step: float) -> None:
-    """Refuse a control that goes to another value in less than a step."""
-    times, values = np.array(knots, float).T
     shortest = float(np.diff(times)[np.diff(values) != 0.0].min(initial=np.inf))
     if shortest < step * (1.0 - 1e-9):
         allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"

@@ -98,12 +98,10 @@ class TiltFilter:
         if np.isnan(own.x[0]):
             own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
         level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
-        turning = self.rigid.moments(level)
-        turning = turning @ self.inverse.T
+        turning, (states, spread) = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
-        states, spread = np.empty((count, 4)), np.empty((count, 4))
-        given = turning, angles, self.period, self.noise, self.variances
-        own.surprise += march(own.x, own.p, *given, own.sums, states, spread)
+        measured = turning, angles, self.period, self.noise, self.variances
+        own.surprise += march(own.x, own.p, *measured, own.sums, states, spread)
         if not self.surprise <= SURPRISE:
             raise InputError(
                 self.file,
@@ -166,28 +164,18 @@ class TiltFilter:
             self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(own, axis=0)
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
-        for name, found in zip(("roll", "pitch"), share, strict=True):
-            if not found <= UNEXPLAINED:
-                raise InputError(
-                    self.file,
-                    f"angles.{name}_rate",
-                    None,
-                    f"contradicts the hub forces: {found:.0%} of "
-                    "it is not the integral of their moment "
-                    f"(at most {UNEXPLAINED:.0%}): {REMEDY}",
-                )
+        for name, part in zip(("roll", "pitch"), share, strict=True):
+            if not part <= UNEXPLAINED:
+                said = f"{part:.0%} of it is not the integral of their moment (at most {UNEXPLAINED:.0%}): {REMEDY}"
+                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {said}")
 
 
 def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
     """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
-    for name, value in (
-        ("period", period),
-        ("angle_deviations", min(angle_deviations)),
-        ("model", model),
-        ("angle_deviations", max(angle_deviations)),
-    ):
+    told = {"period": (period,), "angle_deviations": angle_deviations, "model": (model,)}
+    for name, value in ((name, value) for name, values in told.items() for value in sorted(values)):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
 
