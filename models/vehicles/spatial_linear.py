@@ -20,7 +20,6 @@ from models.vehicles.spatial import (
     SpatialVehicle,
     SpringDamper,
     TurnOutput,
-    TyreOutput,
     Vector,
 )
 
@@ -103,7 +102,7 @@ def linearise(
     rest, as statistical linearisation finds them; InputError for a name that no spring has.
     """
     motion = Kinematics(vehicle)
-    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+    gains = _gains(vehicle)
     for name in set(equivalent or {}) - set(gains):
         raise InputError(vehicle.name, "equivalent", name, "no such spring", tuple(gains))
     gains |= equivalent or {}
@@ -137,8 +136,7 @@ def outputs(
     vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains] | None = None
 ) -> tuple[Output, ...]:
     """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
-    own = gains or {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
-    parts, tyres = _parts(vehicle, motion, own), _tyres(vehicle, motion)
+    parts, tyres = _parts(vehicle, motion, gains or _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
@@ -176,10 +174,9 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     and would have to pull.
     """
     motion = Kinematics(vehicle)
-    parts = _parts(vehicle, motion, {spring.name: slopes_at_rest(spring) for spring in vehicle.springs})
-    tyres = _tyres(vehicle, motion)
-    stiffness = sum(k * np.outer(row, row) for row, k, _ in (*parts.values(), *tyres.values()))
-    weight = sum(body.mass * vehicle.gravity * _height(motion, body.name, body.position) for body in vehicle.bodies)
+    parts, tyres = _parts(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
+    stiffness = static_stiffness(vehicle, motion)
+    weight = sum(body.mass * vehicle.gravity * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
     left = np.abs(stiffness @ sunk + weight)
     if left.max() > 1e-8 * np.abs(weight).max():
@@ -201,28 +198,32 @@ Part = tuple[np.ndarray, float, float]
 """Row (n,) of a deformation by the coordinates, stiffness, damping."""
 
 
+def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
+    return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+
+
 def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
     """Spring-dampers and bars by name."""
-    springs = {spring.name: (_travel(motion, spring), *gains[spring.name]) for spring in vehicle.springs}
-    return springs | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
-
-
-def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
-    return {t.name: (_height(motion, t.body, t.point), t.stiffness, t.damping) for t in vehicle.tyres}
-
-
-def _height(motion: Kinematics, body: str, point: tuple[float, float, float]) -> np.ndarray:
-    return motion.shift(body, point)[2]
-
-
-def _travel(motion: Kinematics, spring: SpringDamper) -> np.ndarray:
-    apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-    return np.array(spring.axis) @ apart
+    rows = dict[str, Part]()
+    for spring in vehicle.springs:
+        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+        rows[spring.name] = np.array(spring.axis) @ apart, *gains[spring.name]
+    return rows | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
-    risen = _height(motion, bar.left, bar.point_left) - _height(motion, bar.right, bar.point_right)
+    risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
     return motion.coordinate(bar.body, "rx") - risen / bar.track
+
+
+def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
+    return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
+
+
+def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+    """Stiffness (n, n) of springs, bars and tyres at rest, without gravity: N/m, N, N m."""
+    parts = (*_parts(vehicle, motion, _gains(vehicle)).values(), *_tyres(vehicle, motion).values())
+    return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
 def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
@@ -278,15 +279,6 @@ UNITS = {
 }
 """Unit of each kind of output; of an anti-roll bar rad, rad/s and N m."""
 
-_ORDER = {
-    "acceleration": 2,
-    "velocity": 1,
-    "displacement": 0,
-    "angular acceleration": 2,
-    "angular velocity": 1,
-    "angle": 0,
-}
-
 
 def _output(
     spec: SpatialOutput,
@@ -298,31 +290,22 @@ def _output(
     """Rows of one output."""
     rows = np.zeros((3, motion.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
-    unit = UNITS[spec.kind]
+    unit, order = UNITS[spec.kind], 2 if "acceleration" in spec.kind else int("velocity" in spec.kind)
     if isinstance(spec, PointOutput):
-        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
+        rows[order] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
     elif isinstance(spec, TurnOutput):
-        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.turn(spec.body)
+        rows[order] = np.array(spec.axis) @ motion.turn(spec.body)
     elif isinstance(spec, PartOutput):
-        _part_rows(spec, parts[spec.part], rows)
+        row, *own = parts[spec.part]
+        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": own}[spec.kind]
+        rows[:2] = np.outer(gains, row)
         if any(bar.name == spec.part for bar in vehicle.bars):
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
-        _tyre_rows(spec, tyres[spec.tyre], rows, road[:, list(tyres).index(spec.tyre)])
+        row, *own = tyres[spec.tyre]
+        gains = {"tyre force": own, "tyre deflection": (1.0, 0.0)}[spec.kind]
+        rows[:2], road[:, list(tyres).index(spec.tyre)] = -np.outer(gains, row), gains
     return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
-
-
-def _part_rows(spec: PartOutput, part: Part, rows: np.ndarray) -> None:
-    row, k, c = part
-    gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": (k, c)}[spec.kind]
-    rows[:2] = np.outer(gains, row)
-
-
-def _tyre_rows(spec: TyreOutput, part: Part, rows: np.ndarray, road: np.ndarray) -> None:
-    row, k, c = part
-    gains = {"tyre force": (k, c), "tyre deflection": (1.0, 0.0)}[spec.kind]
-    rows[:2] = -np.outer(gains, row)
-    road[:] = gains
 
 
 def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> tuple[LinearVehicle, np.ndarray]:
