@@ -101,7 +101,7 @@ def test_equations_by_hand_keep_energy():
 
     def energy(t):
         at, rate = q + t[0] * v + t[0] ** 2 / 2 * a, v + t[0] * a
-        motions = model._motions(at, rate)
+        motions = model.motions_of(at, rate)
         kinetic = sum(
             0.5 * body.mass * np.sum((m.shift @ rate) ** 2)
             + 0.5 * (w := m.rotation.T @ m.turn @ rate) @ np.array(body.inertia) @ w
