@@ -17,12 +17,12 @@ BARE: dict[str, Any] = {
 def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a manoeuvre as both engines are handed it, and its path."""
     path = run(scene, engine)
-    own = path.detail.handling
-    controls = (own.controls.steer, own.controls.brake, own.controls.drive)
+    handling = path.detail.handling
+    controls = (handling.controls.steer, handling.controls.brake, handling.controls.drive)
     counts = {
-        "waves": len(own.waves),
+        "waves": len(handling.waves),
         "controls": sum(any(value for _, value in knots) for knots in controls),
-        "pushes": len(own.pushes),
-        "leaning wheels": len(own.vehicle.tyres) * (own.tyres.inclination != 0.0),
+        "pushes": len(handling.pushes),
+        "leaning wheels": len(handling.vehicle.tyres) * (handling.tyres.inclination != 0.0),
     }
     return counts, path["positions"].tobytes()

@@ -94,8 +94,8 @@ def locked_error() -> float:
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
     slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()
-    found = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
-    return float(np.abs(found / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
+    forces = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
+    return float(np.abs(forces / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
 
 
 def _tyre_rows() -> list[Row]:
@@ -168,7 +168,7 @@ def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 
 
 
 def _turn_rows() -> list[Row]:
-    found = steady_turn(Handling(NO_DRAG), 20.0)
+    turn = steady_turn(Handling(NO_DRAG), 20.0)
     return [
         at_most(
             "handling.turn",
@@ -184,7 +184,7 @@ def _turn_rows() -> list[Row]:
             "handling.understeer",
             SYSTEM,
             "its understeer gradient",
-            found.understeer,
+            turn.understeer,
             "s^2/m",
             "positive: understeering",
             "closed form at the static loads",
@@ -363,11 +363,11 @@ def _price_row() -> Row:
 def _threads_row() -> Row:
     """Lane changes at three speeds, together in MuJoCo's loop."""
     handling = lane_change()
-    own = FreeMujoco(driven_by(handling))
-    own.model.opt.timestep = 1e-3
+    built = FreeMujoco(driven_by(handling))
+    built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
-    with installed(own.law):
-        serial, both = (Marcher(own.model, threads).run(starts, 50) for threads in (1, 2))
+    with installed(built.law):
+        serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaves(
         "handling.threads",
@@ -382,12 +382,12 @@ def _threads_row() -> Row:
 
 def _march(handling: Handling, steps: int) -> Callable[[], Any]:
     """Steps of MuJoCo's own loop, and nothing else."""
-    own = FreeMujoco(driven_by(handling))
-    own.model.opt.timestep = 1e-4
-    start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(own.model)
+    built = FreeMujoco(driven_by(handling))
+    built.model.opt.timestep = 1e-4
+    start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
-        with installed(own.law):
+        with installed(built.law):
             marcher.run(start, steps)
 
     return job
@@ -396,13 +396,13 @@ def _march(handling: Handling, steps: int) -> Callable[[], Any]:
 def _repeat_tyres(times: int) -> None:
     """Four tyres that roll with a little slip."""
     of = net(21)
-    contacts, found = np.zeros((4, 10)), np.empty((4, 4))
+    contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST:] = 2e-8
-    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, found, times)
+    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
 
 
 @njit(cache=True, error_model="numpy")
-def _many(contacts, slides, strips, cells, middle, found, times):
+def _many(contacts, slides, strips, cells, middle, forces, times):
     for _ in range(times):
-        tyre_forces(contacts, slides, strips, cells, middle, found)
+        tyre_forces(contacts, slides, strips, cells, middle, forces)

@@ -66,10 +66,10 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
         worst = max(worst, *(float(np.abs(a - written).max() / np.abs(written).max()) for a in engines))
     q, v = anywhere(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
-    own = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
+    written = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
     slack = SpringDamper("none", vehicle.chassis, vehicle.whole.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
-    other = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
-    other -= GRAVITY * np.eye(len(q))[Z]
+    expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
+    expected -= GRAVITY * np.eye(len(q))[Z]
     return [
         at_most(
             f"hub_forces.accelerations_{name}",
@@ -85,7 +85,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
             f"hub_forces.free_fall_{name}",
             SYSTEM,
             "accelerations of the freely falling, turning tree beside a second set of equations",
-            float(np.abs(own - other).max()),
+            float(np.abs(written - expected).max()),
             "m/s^2, rad/s^2",
             1e-9,
             "written separately; gravity moves all alike",
@@ -242,9 +242,9 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
             for path in range(COPIES)
         ]
     )
-    own, at = rigid(vehicle), np.array([LASTING])
-    law = own.angle_variance(deviation, step, at)[0]
-    sliding = own.position_variance(deviation, step, at, "hub")[0, 1]
+    body, at = rigid(vehicle), np.array([LASTING])
+    law = body.angle_variance(deviation, step, at)[0]
+    sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
     low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
@@ -335,11 +335,11 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
 
 def _exact(frame: str, comparison: Comparison) -> Row:
     """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
-    own = comparison.measurement
-    assert own.truth is not None
-    steps = own.scene.steps
-    drive = held(own.forces.drive(STEP, steps), own.truth.states[:, [ROLL, PITCH]], STEP, STEP)
-    run = build("mujoco", own.vehicle, drive, STEP, steps * STEP).run()
+    measurement = comparison.measurement
+    assert measurement.truth is not None
+    steps = measurement.scene.steps
+    drive = held(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
+    run = build("mujoco", measurement.vehicle, drive, STEP, steps * STEP).run()
     ratios = np.array([*comparison.damages(run.elements).values()])
     return at_most(
         f"hub_forces.prescribed_{frame}",
@@ -361,8 +361,8 @@ def _faults(scene: HubScene) -> list[Row]:
     vehicle, duration = r19(), 5.0
     drive = _rough(vehicle, duration)
     clean, angles = recorded(truth("mujoco", vehicle, drive, "hub", STEP, duration), "hub", 2)
-    other, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
-    parts, of_space = (own.samples.reshape(len(own.samples), -1, WRENCH) for own in (clean, other))
+    in_space, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
+    parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {
         "left and right exchanged": parts[:, [1, 0, 3, 2]],
@@ -395,12 +395,12 @@ def _faults(scene: HubScene) -> list[Row]:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Damage of every section force, run by run."""
-    found = []
+    shown = []
     for frame, of_runs in data.items():
         runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}
         elements = next(iter(runs.values()))
-        rows = tuple((element, *(f"{own[element]:.3g}" for own in runs.values())) for element in elements)
-        found.append(
+        rows = tuple((element, *(f"{damages[element]:.3g}" for damages in runs.values())) for element in elements)
+        shown.append(
             Table(
                 f"Damage by the true one, hub forces in the frame '{frame}'",
                 "Section forces in the chassis' axes, slope 5; roll and pitch are prescribed as measured.",
@@ -408,4 +408,4 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 rows,
             )
         )
-    return found
+    return shown

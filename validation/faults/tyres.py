@@ -16,9 +16,9 @@ from validation.spatial.cars import cornering_error, mirrored
 
 def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
     """R19-free in a turn at 25 m/s, and a state in it."""
-    own = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
-    q, v = own.straight(25.0)
-    places, part = own.vehicle.coordinates(), np.sign(steer)
+    car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
+    q, v = car.straight(25.0)
+    places, part = car.vehicle.coordinates(), np.sign(steer)
     for name, freedom, move, rate in (
         ("carrier", "y", 0.1, 0.4),
         ("carrier", "rz", 0.02, 0.3),
@@ -27,12 +27,12 @@ def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
         k = places.index((name, freedom))
         q[k], v[k] = part * move, part * rate
     q[places.index(("sway", "z"))], v[places.index(("sway", "z"))] = -5e-3, 0.1
-    return own, q, v
+    return car, q, v
 
 
 def _accelerations(engine: str, steer: float = 0.05) -> np.ndarray:
-    own, q, v = turning(steer)
-    return build(engine, own).acceleration(0.0, q, v)
+    car, q, v = turning(steer)
+    return build(engine, car).acceleration(0.0, q, v)
 
 
 @cache
@@ -44,18 +44,18 @@ def _mirror() -> float:
     return off(mirrored(turning()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco"))
 
 
-def _read(own: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    report, ledger = np.empty((1, len(own.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    at.reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+def _read(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    report, ledger = np.empty((1, len(car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
+    at.reports(car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
 def _balance() -> float:
     """Change of the energy along the motion, less the powers."""
-    own, q, v = turning()
-    a, (report, ledger) = build("mujoco", own).acceleration(0.0, q, v), _read(own, q, v)
+    car, q, v = turning()
+    a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read(car, q, v)
     ends = [
-        bodies_energy(own, here, rate) + _read(own, here, rate)[1][at.POTENTIAL]
+        bodies_energy(car, here, rate) + _read(car, here, rate)[1][at.POTENTIAL]
         for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))
     ]
     power = ledger[at.DISSIPATED] + ledger[at.TORQUE_POWER] + ledger[at.STEER_POWER] + report[:, at.POWER].sum()
@@ -64,9 +64,9 @@ def _balance() -> float:
 
 def _sliding() -> float:
     """Locked wheels: their force beside mu N against the sliding."""
-    own = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
-    report, _ = _read(own, *own.straight(15.0))
-    return float(np.abs(report[:, at.FX] / (own.tyres.friction * report[:, at.PRESS]) + 1.0).max())
+    car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
+    report, _ = _read(car, *car.straight(15.0))
+    return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
 
 
 CHECKS = {
@@ -92,8 +92,8 @@ def tyre(column: int, factor: float, which: tuple[int, ...] = (0,), more: float 
     """One number of tyres by a factor and something more in the table."""
 
     def table(real: Any) -> Any:
-        def made(own: Handling) -> np.ndarray:
-            numbers: np.ndarray = real(own)
+        def made(car: Handling) -> np.ndarray:
+            numbers: np.ndarray = real(car)
             for i in which:
                 place = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
                 numbers[place] = factor * numbers[place] + more

@@ -99,7 +99,7 @@ def mirrored(handling: Handling, values: np.ndarray) -> np.ndarray:
 def _opposite(name: str) -> str:
     """The body on the other side."""
     for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
-        for side, other in ((left, right), (right, left)):
+        for side, opposite in ((left, right), (right, left)):
             if name.startswith(side):
-                return name.replace(side, other, 1)
+                return name.replace(side, opposite, 1)
     return name
