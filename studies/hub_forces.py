@@ -75,10 +75,12 @@ def _table(scene: HubScene, comparison: Comparison) -> list[str]:
 
 def save(comparison: Comparison, folder: Path) -> None:
     """The measurement as a user would give it, and every run: ``runs.nc``, and its chassis as ``runs.csv``."""
-    own = comparison.measurement
-    names = [(f"{hub}_{name}", next(iter(units))) for hub in own.vehicle.hubs for name, units in COMPONENTS.items()]
-    _write(folder / "hub_forces.csv", names, own.forces)
-    _write(folder / "angles.csv", [(name, next(iter(units))) for name, units in ANGLES.items()], own.angles)
+    measurement = comparison.measurement
+    names = [
+        (f"{hub}_{name}", next(iter(units))) for hub in measurement.vehicle.hubs for name, units in COMPONENTS.items()
+    ]
+    _write(folder / "hub_forces.csv", names, measurement.forces)
+    _write(folder / "angles.csv", [(name, next(iter(units))) for name, units in ANGLES.items()], measurement.angles)
     runs = {**({"true": comparison.truth} if comparison.truth else {}), **comparison.runs}
     angles, places = list(MOTION)[:3], list(MOTION)[3:]
     columns = {

@@ -25,8 +25,8 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
     for axis, (name, channel, factor, unit) in zip(axes.flat, panels, strict=True):
         for run, label, colour in _shown(comparison):
-            own = comparison.runs[run]
-            axis.plot(own.times, factor * own[channel], color=colour, label=label)
+            drawn = comparison.runs[run]
+            axis.plot(drawn.times, factor * drawn[channel], color=colour, label=label)
         if true := comparison.truth:
             axis.plot(true.times, factor * true[channel], "--", color="0.2", label="true", linewidth=0.9)
         axis.set(title=name.capitalize(), ylabel=f"[{unit}]")

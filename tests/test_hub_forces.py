@@ -13,7 +13,7 @@ from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
-from models.systems.hub_forces.run import check_halved, held, measure
+from models.systems.hub_forces.run import check_halved, measure, with_angles
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import estimate, pulled
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
@@ -67,7 +67,7 @@ def measured():
 def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
     car, true, forces, angles = measured
     less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
-    drives = [held(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
+    drives = [with_angles(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
     whole, run = (build("mujoco", car, drive, 2e-3, 1.0).run() for drive in drives)
     assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6
     # 0.5 %: the heading, which is free, takes a little through the product of inertia

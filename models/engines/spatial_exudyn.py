@@ -81,8 +81,8 @@ class SpatialExudyn:
         exceptions.parameterRangeChecks = False  # a negative step is outside of the range
         numerical.relativeEpsilon, numerical.minimumCoordinateSize = step, 1.0
         exceptions.parameterRangeChecks = checks
-        own = np.ix_(self._columns, self._columns)
-        return [np.asarray(part)[own] for part in self.mbs.ComputeLinearizedSystem(simulationSettings=options)]
+        rows = np.ix_(self._columns, self._columns)
+        return [np.asarray(part)[rows] for part in self.mbs.ComputeLinearizedSystem(simulationSettings=options)]
 
     def _road_columns(self) -> np.ndarray:
         """Generalised forces (n, 2 w) per metre and per m/s of the road under each tyre: loads are linear in it."""

@@ -91,12 +91,12 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
 
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
     """Heading and pitch on carriers without mass, roll on the chassis, all others behind it."""
-    own = vehicle.body(chassis)
+    body = vehicle.body(chassis)
     carriers = (
-        Body(f"{chassis} heading", 0.0, own.position, ("x", "y", "z", "rz")),
-        Body(f"{chassis} pitch", 0.0, own.position, ("ry",), parent=f"{chassis} heading"),
+        Body(f"{chassis} heading", 0.0, body.position, ("x", "y", "z", "rz")),
+        Body(f"{chassis} pitch", 0.0, body.position, ("ry",), parent=f"{chassis} heading"),
     )
-    turned = replace(own, freedoms=("rx",), parent=f"{chassis} pitch")
+    turned = replace(body, freedoms=("rx",), parent=f"{chassis} pitch")
     others = tuple(body for body in vehicle.bodies if body.name != chassis)
     return SpatialVehicle(vehicle.name, (*carriers, turned, *others), (), (), vehicle.axles, gravity=vehicle.gravity)
 
@@ -105,12 +105,12 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
     names = tuple(body.name for body in vehicle.bodies)
     if chassis not in names:
         raise InputError(vehicle.name, "chassis", chassis, "no such body", names)
-    own = vehicle.body(chassis)
-    if len(own.freedoms) != 6 or own.parent is not None:
+    body = vehicle.body(chassis)
+    if len(body.freedoms) != 6 or body.parent is not None:
         raise InputError(
             vehicle.name,
             f"bodies[{chassis}].freedoms",
-            own.freedoms,
+            body.freedoms,
             "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz",
         )
     for spring in vehicle.springs:

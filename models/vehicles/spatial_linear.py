@@ -87,8 +87,8 @@ class Kinematics:
         if body is None:
             return []
         rider = self._bodies[body]
-        own = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
-        return self._motions(rider.parent) + own
+        coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
+        return self._motions(rider.parent) + coordinates
 
 
 def linearise(
@@ -296,14 +296,14 @@ def _output(
     elif isinstance(spec, TurnOutput):
         rows[order] = np.array(spec.axis) @ motion.turn(spec.body)
     elif isinstance(spec, PartOutput):
-        row, *own = parts[spec.part]
-        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": own}[spec.kind]
+        row, *force_gains = parts[spec.part]
+        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[spec.kind]
         rows[:2] = np.outer(gains, row)
         if any(bar.name == spec.part for bar in vehicle.bars):
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
-        row, *own = tyres[spec.tyre]
-        gains = {"tyre force": own, "tyre deflection": (1.0, 0.0)}[spec.kind]
+        row, *force_gains = tyres[spec.tyre]
+        gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[spec.kind]
         rows[:2], road[:, list(tyres).index(spec.tyre)] = -np.outer(gains, row), gains
     return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
 

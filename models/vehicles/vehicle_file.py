@@ -219,16 +219,16 @@ class _Builder:
 
     def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""
-        (one, two), place = bodies, f"{place}.bodies"
-        self._need(one != two, place, bodies, "connects a body with itself")
-        self._need(one != GROUND, place, bodies, "name the ground second")
-        return self._body(place, one), None if two == GROUND else self._body(place, two)
+        (first, second), place = bodies, f"{place}.bodies"
+        self._need(first != second, place, bodies, "connects a body with itself")
+        self._need(first != GROUND, place, bodies, "name the ground second")
+        return self._body(place, first), None if second == GROUND else self._body(place, second)
 
     def _points(self, place: str, spring: SpringTable) -> tuple[Vector, Vector]:
         both = (spring.point is None) != (spring.points is None)
         self._need(both, f"{place}.point", None, "give either point, the place of both ends, or points, both")
-        one, two = (spring.point, spring.point) if spring.points is None else spring.points
-        return _vector(one), _vector(two)
+        first, second = (spring.point, spring.point) if spring.points is None else spring.points
+        return _vector(first), _vector(second)
 
     def _axis(self, place: str, spring: SpringTable, points: tuple[Vector, Vector]) -> Vector:
         """Unit direction: as given, or from the second point to the first, or up."""

@@ -16,7 +16,7 @@ from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import FILTER, Comparison, compare
 from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
-from models.systems.hub_forces.run import held
+from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import estimate
@@ -338,7 +338,7 @@ def _exact(frame: str, comparison: Comparison) -> Row:
     measurement = comparison.measurement
     assert measurement.truth is not None
     steps = measurement.scene.steps
-    drive = held(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
+    drive = with_angles(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
     run = build("mujoco", measurement.vehicle, drive, STEP, steps * STEP).run()
     ratios = np.array([*comparison.damages(run.elements).values()])
     return at_most(

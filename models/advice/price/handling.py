@@ -85,7 +85,11 @@ def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) ->
     """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
     name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)
-    manoeuvre, step, others = scene.manoeuvres[name], scene.run.step, [one for one in scene.manoeuvres if one != name]
+    manoeuvre, step, others = (
+        scene.manoeuvres[name],
+        scene.run.step,
+        [each for each in scene.manoeuvres if each != name],
+    )
     note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
     return OwnHandling(
         scene.title,

@@ -94,8 +94,8 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None) -> Resu
     Raises RunFailed where it does not end well.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
-    own, handling = scene.manoeuvres[name], scene.handling(name)
-    drive = driven(engine, handling, own.speed, own.duration, scene.run.step)
+    asked, handling = scene.manoeuvres[name], scene.handling(name)
+    drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
     channels = {
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
         for key, per in (("positions", ""), ("rates", ", per s"))

@@ -95,32 +95,34 @@ class HandlingScene(SceneFile):
 
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
-        own, road = self.manoeuvres[name], self.road
-        waves = plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if own.rough else np.empty((0, 4))
+        manoeuvre, road = self.manoeuvres[name], self.road
+        waves = (
+            plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
+        )
         vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), own.controls(), waves)
+        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
         return extended(built, self)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(HandlingScene, table, file, folder)
-    for name, own in scene.manoeuvres.items():
+    for name, manoeuvre in scene.manoeuvres.items():
         place = f"manoeuvres.{name}"
-        _check_times(scene, place, own)
+        _check_times(scene, place, manoeuvre)
         for control, limits in LIMITS.items():
-            _check_knots(scene, f"{place}.{control}", getattr(own, control), *limits)
-        _check_way(scene, place, own)
+            _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
+        _check_way(scene, place, manoeuvre)
     return with_own(scene)
 
 
-def _check_times(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
-    step = scene.run.step
-    if own.duration / step > MOST_STEPS:
-        allowed = f"needs {own.duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
-        raise InputError(scene.file, f"{place}.duration", own.duration, allowed)
-    if not divides(step, own.duration):
-        allowed = f"must divide {place}.duration = {own.duration:g} s; use for example {fitting(step, own.duration)}"
+def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
+    step, duration = scene.run.step, manoeuvre.duration
+    if duration / step > MOST_STEPS:
+        allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
+        raise InputError(scene.file, f"{place}.duration", duration, allowed)
+    if not divides(step, duration):
+        allowed = f"must divide {place}.duration = {duration:g} s; use for example {fitting(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 
 
@@ -137,12 +139,12 @@ def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float
         raise InputError(file, place, None, allowed)
 
 
-def _check_way(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
+def _check_way(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
     """Refuse steps within which a rough road has whole waves."""
-    way, fastest = own.speed * scene.run.step, SHORTEST / scene.run.step
-    if own.rough and way > SHORTEST:
+    way, fastest = manoeuvre.speed * scene.run.step, SHORTEST / scene.run.step
+    if manoeuvre.rough and way > SHORTEST:
         allowed = (
             f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at "
             f"most {fastest:.4g} m/s, or a smaller run.step"
         )
-        raise InputError(scene.file, f"{place}.speed", own.speed, allowed)
+        raise InputError(scene.file, f"{place}.speed", manoeuvre.speed, allowed)

@@ -55,14 +55,14 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
 def describe(scene: HubScene) -> str:
     """The scene's plan as text."""
     vehicle, forces = scene.cut_vehicle(), scene.forces
-    own = rigid(vehicle)
+    body = rigid(vehicle)
     source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
     lines = [
         scene.title,
         _line("scene", f"{scene.file}, study {scene.study}"),
         _line(
             "vehicle",
-            f"{vehicle.tree.name}: {vehicle.size} freedoms, {own.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
+            f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
         _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
@@ -99,7 +99,7 @@ def _noise(scene: HubScene) -> str:
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
-    said = [text for own, text in ((forces, of_forces), (angles, of_angles)) if own.noise == "white"]
+    said = [text for table, text in ((forces, of_forces), (angles, of_angles)) if table.noise == "white"]
     return ", ".join(said) or "none"
 
 

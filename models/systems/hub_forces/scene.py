@@ -127,13 +127,13 @@ class HubScene(SceneFile):
                 "in milliseconds, not in seconds, correct the unit that heads them"
             )
             raise InputError(self.file, "forces.file", self.forces.file, allowed)
-        angles, other = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
-        if abs(other - period) > 1e-9 * period:
+        angles, spacing = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
+        if abs(spacing - period) > 1e-9 * period:
             raise InputError(
                 self.file,
                 "angles.file",
                 self.angles.file,
-                f"is sampled every {other:g} s and the forces every {period:g} s: they must agree",
+                f"is sampled every {spacing:g} s and the forces every {period:g} s: they must agree",
             )
         last = period * (min(len(forces), len(angles)) - 1)
         if last < self.run.duration * (1 - 1e-9):

@@ -94,14 +94,14 @@ class TiltFilter:
         one another, or are infinite.
         """
         _check_numbers(wrenches, angles, self.file)
-        own, count = self.state, len(angles)
-        if np.isnan(own.x[0]):
-            own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
+        state, count = self.state, len(angles)
+        if np.isnan(state.x[0]):
+            state.x, state.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
         level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
         turning, (states, spread) = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
         measured = turning, angles, self.period, self.noise, self.variances
-        own.surprise += march(own.x, own.p, *measured, own.sums, states, spread)
+        state.surprise += march(state.x, state.p, *measured, state.sums, states, spread)
         if not self.surprise <= SURPRISE:
             raise InputError(
                 self.file,
@@ -138,10 +138,10 @@ class TiltFilter:
         )
         mean, error = self.biases()
         biased = [
-            f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
+            f"the filter's innovations of {name} have a mean of {average:+.2g} deviations (of a right filter at most "
             f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
-            for name, own, wide in zip(VALUES, mean, error, strict=True)
-            if abs(own) > max(BIASED, SURE * wide)
+            for name, average, wide in zip(VALUES, mean, error, strict=True)
+            if abs(average) > max(BIASED, SURE * wide)
         ]
         return (*([large] if self.surprise > SURPRISED else []), *biased)
 
@@ -155,13 +155,13 @@ class TiltFilter:
         """
         dt, length = self.period, round(BALANCED / self.period)
         for first in range(0, len(rates) - 1, length):
-            part, own = turning[first : first + length + 1], rates[first : first + length + 1]
-            if not np.isfinite(own).all():
+            part, measured = turning[first : first + length + 1], rates[first : first + length + 1]
+            if not np.isfinite(measured).all():
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
-            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(own) / 6
-            left = np.var(_level_line(own - integral), axis=0)
-            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(own, axis=0)
+            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
+            left = np.var(_level_line(measured - integral), axis=0)
+            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
         for name, part in zip(("roll", "pitch"), share, strict=True):
@@ -210,9 +210,9 @@ def estimate(
         )
     if np.isnan(angles.samples).all():
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
-    own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
-    states, spread = own.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, own.surprise, own.doubts())
+    tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
+    states, spread = tilt_filter.advance(forces.samples, angles.samples)
+    return Tilt(states, spread, forces.period, tilt_filter.surprise, tilt_filter.doubts())
 
 
 def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:

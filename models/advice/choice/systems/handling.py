@@ -36,7 +36,7 @@ def answer(scene: HandlingScene, engine: str) -> Answer:
 
 def steps(scene: HandlingScene) -> int:
     """Steps of the shortest manoeuvre."""
-    return min(round(own.duration / scene.run.step) for own in scene.manoeuvres.values())
+    return min(round(manoeuvre.duration / scene.run.step) for manoeuvre in scene.manoeuvres.values())
 
 
 parts = steps
@@ -44,8 +44,8 @@ parts = steps
 
 def shorten(table: dict[str, Any], scene: HandlingScene, steps: int) -> None:
     """At most so many steps of the scene's own in every manoeuvre."""
-    for name, own in table["manoeuvres"].items():
-        own["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
+    for name, manoeuvre in table["manoeuvres"].items():
+        manoeuvre["duration"] = min(scene.manoeuvres[name].duration, steps * scene.run.step)
 
 
 def coarsen(table: dict[str, Any], scene: HandlingScene, times: int) -> None:
