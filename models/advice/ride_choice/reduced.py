@@ -17,10 +17,9 @@ from models.ride.excited import DelayedSystem, first_order
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
-from models.vehicles.spatial_linear import limited
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise
+from models.vehicles.spatial_linear import limited, linearise
 
 
 @dataclass(frozen=True)
