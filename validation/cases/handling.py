@@ -23,7 +23,7 @@ from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding
+from validation.common.rows import Row, System, aim, at_most, behaves, finding
 from validation.spatial.cars import cornering_error, mirrored
 
 TITLE = "A car on four rolling tyres"
@@ -59,16 +59,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             _price_row(),
         ]
     return rows, {}
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
-    """None: the rows say all."""
-    return []
-
-
-def draw(data: dict[str, Any]) -> dict[str, Any]:
-    """None."""
-    return {}
 
 
 def _gap(a: Drive, b: Drive) -> float:

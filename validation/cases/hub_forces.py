@@ -265,17 +265,8 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
 
 def _scene(frame: str) -> HubScene:
     """That of the study, 8 s long."""
-    return scene_of(
-        {
-            "title": TITLE,
-            "system": "hub-forces",
-            "study": "hub_forces",
-            "vehicle": {"file": "r19_free"},
-            "run": {"duration": 8.0},
-            "road": {},
-            "forces": {"frame": frame},
-        }
-    )
+    tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame}}
+    return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
 def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
@@ -371,25 +362,15 @@ def _faults(scene: HubScene) -> list[Row]:
         "another frame": of_space,
         "nothing": parts,
     }
-    rows = []
+    rows, why = [], "the innovations of the filter tell"
     for i, (name, samples) in enumerate(planted.items()):
-        faulty = replace(clean, samples=samples.reshape(len(samples), -1))
-        said = "accepted"
+        faulty, said = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
             estimate(vehicle, faulty, angles, scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0)
         except InputError:
             said = "refused"
-        expected = "accepted" if name == "nothing" else "refused"
-        rows.append(
-            behaves(
-                f"hub_forces.fault_{i}",
-                SYSTEM,
-                f"measurement with {name} planted",
-                said,
-                expected,
-                "the innovations of the filter tell",
-            )
-        )
+        expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"
+        rows.append(behaves(f"hub_forces.fault_{i}", SYSTEM, quantity, said, expected, why))
     return rows
 
 
