@@ -1,34 +1,30 @@
 """Figure of a manoeuvre: path, motion, slip angles, wheel loads, and tyre forces in their friction circle."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from models.drawing.figures import save
-from models.multibody import forces as at
-from models.systems.handling.in_engines import Drive
+from models.systems.handling.run import Drive
 
 TYRES = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00")
 
 
 def manoeuvre_figure(drive: Drive, title: str, path: Path) -> Path:
     """Six panels over time, or over the path; one colour for each tyre."""
-    from studies.handling import slip_angles
-
     figure, axes = plt.subplots(2, 3, figsize=(13, 7))
-    time, own = drive.run.times, drive.tyres
-    names = [tyre.name for tyre in drive.handling.vehicle.tyres]
     figure.suptitle(f"{title}: from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}")
     _path(axes[0, 0], drive)
     _motion(axes[0, 1], drive)
     for axis, values, label, heading in (
-        (axes[0, 2], np.degrees(slip_angles(drive)), "slip angle [deg]", "Slip angles"),
-        (axes[1, 0], own[:, :, at.PRESS] / 1e3, "load [kN]", "Wheel loads"),
-        (axes[1, 1], own[:, :, at.MZ], "moment [N m]", "Aligning moments"),
+        (axes[0, 2], np.degrees(drive.slip_angles()), "slip angle [deg]", "Slip angles"),
+        (axes[1, 0], drive["load"] / 1e3, "load [kN]", "Wheel loads"),
+        (axes[1, 1], drive["mz"], "moment [N m]", "Aligning moments"),
     ):
-        for i, name in enumerate(names):
-            axis.plot(time, values[:, i], color=TYRES[i % 4], label=name)
+        for i, tyre in enumerate(drive.handling.vehicle.tyres):
+            axis.plot(drive.run.times, values[:, i], color=TYRES[i % 4], label=tyre.name)
         axis.set(xlabel="time [s]", ylabel=label, title=heading)
     axes[0, 2].legend(ncols=2)
     _circle(axes[1, 2], drive)
@@ -38,18 +34,9 @@ def manoeuvre_figure(drive: Drive, title: str, path: Path) -> Path:
 def _path(axis: plt.Axes, drive: Drive) -> None:
     x, y, yaw = drive.path.T
     axis.plot(x, y, color="#222222")
-    every = slice(0, None, max(1, len(x) // 8))
-    axis.quiver(
-        x[every],
-        y[every],
-        np.cos(yaw[every]),
-        np.sin(yaw[every]),
-        angles="xy",
-        scale=14,
-        width=5e-3,
-        color="#009e73",
-        zorder=3,
-    )
+    x, y_few, yaw = drive.path[:: max(1, len(x) // 8)].T
+    arrows: dict[str, Any] = {"angles": "xy", "scale": 14, "width": 5e-3, "color": "#009e73", "zorder": 3}
+    axis.quiver(x, y_few, np.cos(yaw), np.sin(yaw), **arrows)
     axis.set(xlabel="x [m]", ylabel="y [m]", title="Path on the road, and where the car points")
     low, high = y.min(), y.max()
     axis.set_ylim(low - 0.25 * (high - low) - 0.5, high + 0.25 * (high - low) + 0.5)
@@ -59,7 +46,7 @@ def _motion(axis: plt.Axes, drive: Drive) -> None:
     time = drive.run.times
     axis.plot(time, drive.velocity()[:, 2], color="#0072b2", label="yaw rate [rad/s]")
     axis.plot(time, drive.lateral_acceleration() / 10.0, color="#d55e00", label="lateral acceleration [10 m/s²]")
-    axis.plot(time, drive.tyres[:, 0, at.ANGLE] * 10.0, color="#222222", ls=":", label="steer angle [0.1 rad]")
+    axis.plot(time, drive["steer"][:, 0] * 10.0, color="#222222", ls=":", label="steer angle [0.1 rad]")
     axis.set(xlabel="time [s]", ylabel="see legend", title="Motion of the car")
     axis.legend()
 
@@ -68,10 +55,9 @@ def _circle(axis: plt.Axes, drive: Drive) -> None:
     """Forces of each tyre by mu N: inside of the unit circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axis.plot(np.cos(turn), np.sin(turn), color="#222222", lw=0.8)
-    own, mu = drive.tyres, drive.handling.tyres.friction
-    bound = np.where(own[:, :, at.PRESS] > 0.0, mu * own[:, :, at.PRESS], 1.0)
-    for i in range(own.shape[1]):
-        axis.plot(own[:, i, at.FY] / bound[:, i], own[:, i, at.FX] / bound[:, i], color=TYRES[i % 4], lw=0.9)
+    bound = np.where(drive["load"] > 0.0, drive.grip(), 1.0)
+    for i, (side, ahead) in enumerate(zip((drive["fy"] / bound).T, (drive["fx"] / bound).T, strict=True)):
+        axis.plot(side, ahead, color=TYRES[i % 4], lw=0.9)
     axis.set(
         xlabel="side force / mu N",
         ylabel="force ahead / mu N",

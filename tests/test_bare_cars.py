@@ -8,7 +8,7 @@ import pytest
 from models.engines import free_vehicle_mujoco
 from models.engines.free_vehicle_mujoco import FreeMujoco
 from models.multibody.numbers import Handling
-from models.systems.handling.in_engines import driven_by
+from models.systems.handling.run import driven_by
 from validation.absence import bare_cars, hand_built_handling, machinery
 
 

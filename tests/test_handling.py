@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import quad
 
 from models.core.errors import InputError, RunFailed
-from models.multibody import forces, kernel
+from models.multibody import forces
 from models.multibody.numbers import Controls, Handling, Push, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.in_engines import Drive, driven
+from models.systems.handling.run import Drive, driven
 from models.systems.handling.scene import build
 from models.tyre.bristles import SLOW, brush
 from models.vehicles.free_vehicle import SWAY, free_vehicle
@@ -115,7 +115,7 @@ def test_what_pushes_a_rotor_pushes_all_that_it_rides_on() -> None:
         at_centre = Push(body, R19.body("fl").position, (0.6, 0.8, 0.0), ((0.0, 1000.0),))
         found[body] = still.copy()
         report, ledger = np.zeros((4, forces.REPORTED)), np.zeros(forces.LEDGER)
-        kernel.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)
+        forces.all_forces(Handling(R19, pushes=(at_centre,)).numbers, 0.0, still, still, found[body], report, ledger)
     assert np.abs(found["fl"][2]) > 100.0  # N m about the vertical
     assert np.abs(found["fl"] - found["fl rotor"]).max() < 1e-9
 
@@ -147,15 +147,12 @@ def test_bad_manoeuvres_are_told(change: dict, message: str) -> None:
 @pytest.mark.full
 def test_engines_agree_where_all_wheels_slide_and_lift() -> None:
     """Off a kerb-like road at full lock, brakes on: rounding alone, and no contact gains energy."""
-    from models.multibody import forces as at
-    from models.systems.handling.in_engines import driven
-
     controls = Controls(steer=((0.0, 0.0), (0.2, 0.4)), brake=((0.0, 0.0), (0.1, 4000.0)))
     wild = Handling(R19, controls=controls, waves=plane_waves(2e-4, 24, 2))
     one, two = (driven(engine, wild, 20.0, 0.4) for engine in ("mujoco", "exudyn"))
     assert np.abs(one.run.positions - two.run.positions).max() < 1e-10
-    assert one.tyres[:, :, at.PRESS].min() == 0.0
-    assert one.tyres[:, :, at.POWER].max() <= 0.0
+    assert one["load"].min() == 0.0
+    assert one["power"].max() <= 0.0
 
 
 @pytest.fixture(scope="module")
@@ -188,9 +185,6 @@ def test_lateral_acceleration_is_that_of_the_place_below_the_chassis(braked_turn
 
 @pytest.mark.full
 def test_a_step_that_cannot_follow_slow_tyres_is_told() -> None:
-    from models.core.errors import RunFailed
-    from models.systems.handling.in_engines import driven
-
     with pytest.raises(RunFailed, match=r"damps its wheel faster than steps of 0\.001 s"):
         driven("mujoco", Handling(R19, Tyres(fixed=("fl", "fr", "rl", "rr")), slope=0.05), 0.0, 0.05, 1e-3)
 

@@ -7,17 +7,20 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused, RunFailed
+from models.core.result import load
 from models.engines.cut_vehicle import HubRun, build
-from models.multibody.cut_rigid import rigid
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.enforced import held
+from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
+from models.systems.hub_forces.run import check_halved, measure, with_angles
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import estimate, pulled
-from models.vehicles.cut_vehicle import PITCH, ROLL, cut
+from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
 from models.vehicles.spatial_linear import linearise
+from studies.hub_forces import save
 from validation.cases import hub_forces as case
+from validation.spatial.cars import r19, static, twin
 
 ALL = {"title": "t", "system": "hub-forces", "study": "hub_forces", "vehicle": {"file": "r19_free"}, "road": {}}
 
@@ -29,11 +32,11 @@ def test_the_quick_share_passes(tmp_path):
 
 def test_without_symmetry_the_engines_agree_too():
     # 1e-10: a wrong product of inertia or arm would show at 1e-2
-    assert all(row.status == "passed" for row in case._accelerations("twin", cut(case.twin(), "body")))
+    assert all(row.status == "passed" for row in case._accelerations("twin", cut(twin(), "body")))
 
 
 def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
-    car = case.r19()
+    car = r19()
     linear, n = linearise(replace(car.whole, gravity=0.0), 20.0), car.size
     places = {place: i for i, place in enumerate(car.whole.coordinates())}
     order = [places["body", f] for f in ("x", "y", "z", "rz", "ry", "rx")]
@@ -55,7 +58,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
 
 @pytest.fixture(scope="module")
 def measured():
-    car, step = case.r19(), 2e-3
+    car, step = r19(), 2e-3
     drive = two_tracks(car, *(iso8608_road("C", seed) for seed in (1, 2)), 20.0, step, 500)
     true = truth("mujoco", car, drive, "hub", step, 1.0)
     return car, true, *recorded(true, "hub", 1)
@@ -64,7 +67,7 @@ def measured():
 def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
     car, true, forces, angles = measured
     less = replace(forces, samples=forces.samples - np.eye(24)[3] * 200.0)  # 200 N m about x at one hub
-    drives = [held(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
+    drives = [with_angles(own.drive(2e-3, 500), angles.samples[:, :2], 2e-3, 2e-3) for own in (forces, less)]
     whole, run = (build("mujoco", car, drive, 2e-3, 1.0).run() for drive in drives)
     assert np.abs(run.states[:, [ROLL, PITCH]] - true.states[:, [ROLL, PITCH]]).max() < 1e-6
     # 0.5 %: the heading, which is free, takes a little through the product of inertia
@@ -89,7 +92,7 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
 
 
 def test_the_laws_of_the_rigid_vehicle():
-    car = rigid(case.r19())
+    car = rigid(r19())
     # two equal forces up, left and right, do not roll; one alone does by its arm
     both = np.zeros((2, 24))
     both[0, [2, 8]], both[1, 2] = 100.0, 100.0
@@ -131,54 +134,51 @@ def test_one_clear_message(change, told):
 
 
 def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told():
-    car = case.r19()
+    car = r19()
     with pytest.raises(Refused, match="rows"):
-        build("mujoco", car, case.static(car, 7), 1e-3, 1.0)
+        build("mujoco", car, static(car, 7), 1e-3, 1.0)
     start = np.zeros(38)
     start[19 + PITCH] = 3.0
     with pytest.raises(RunFailed, match="pitches by more than"):
-        build("mujoco", car, case.static(car, 1201), 1e-3, 0.6).run(start)
+        build("mujoco", car, static(car, 1201), 1e-3, 0.6).run(start)
 
 
 def test_steps_that_the_road_is_too_fast_for_are_told():
     """Steps of 4 ms at 60 m/s on class F mistake the bushes' forces by a tenth, on class C at 20 m/s by nothing."""
-    from models.systems.hub_forces.of_scene import measured
-
     for road, held_true in (({}, True), ({"speed": 60.0, "iso8608": "F"}, False)):
         own = scene_of(
             {**ALL, "road": road, "run": {"duration": 1.0, "step": 4e-3}, "forces": {"sampling_rate": 250.0}}, "s.toml"
         )
         with nullcontext() if held_true else pytest.raises(RunFailed, match=r"bush' by 0\.1 of its largest"):
-            measured(own, case.r19(), "mujoco")
+            measure(own, "mujoco")
 
 
 def test_no_step_is_too_long_for_a_vehicle_without_springs():
-    from models.systems.hub_forces.halved import check_halved
-
     run = HubRun(np.arange(3.0), np.zeros((3, 12)), np.empty((3, 0)), np.zeros((3, 4, 6)), np.zeros((3, 2)))
     check_halved("mujoco", run, [], lambda step, steps: run)
 
 
 def test_a_file_of_ones_own(tmp_path, measured):
-    from studies.hub_forces import _save, compute
-
     scene = scene_of({**ALL, "run": {"duration": 0.5}}, "s.toml")
-    found = compute(scene, ("mujoco",))
-    _save(found, tmp_path)
+    comparison = compare(scene, ("mujoco",))
+    save(comparison, tmp_path)
     own = {**ALL, "run": {"duration": 0.5}, "forces": {"file": "hub_forces.csv"}, "angles": {"file": "angles.csv"}}
     del own["road"]
-    again = compute(scene_of(own, "s.toml", tmp_path), ("mujoco",))
-    assert np.array_equal(again.runs["filter"].states, found.runs["filter"].states)
+    again = compare(scene_of(own, "s.toml", tmp_path), ("mujoco",))
+    assert np.array_equal(again.runs["filter"].detail.states, comparison.runs["filter"].detail.states)
+    saved = load(tmp_path / "runs.nc")
+    assert list(saved.data["run"].values) == ["true", *comparison.runs] and saved.data.attrs["system"] == "hub-forces"
+    assert np.array_equal(saved.data["roll"].sel(run="filter").values, comparison.runs["filter"]["roll"])
     header, *rows = (tmp_path / "hub_forces.csv").read_text().splitlines()
     (tmp_path / "hub_forces.csv").write_text("\n".join([header.replace("fl_fx [N]", "fl_fx [lbf]"), *rows]) + "\n")
     with pytest.raises(InputError, match="lbf"):
-        scene_of(own, "s.toml", tmp_path).measured(case.r19())
+        scene_of(own, "s.toml", tmp_path).measured(r19())
 
 
 @pytest.mark.parametrize("unit, factor, said", [("s", 1e3, "in milliseconds, not"), ("ms", 1.0, "in seconds, not")])
 def test_files_with_times_of_another_unit_are_refused_with_the_remedy(tmp_path, unit, factor, said):
     """The smoothing of angles was refused, or the duration of the run."""
-    heads = [f"{hub}_{f}{axis} [N{' m' * (f == 'm')}]" for hub in case.r19().hubs for f in "fm" for axis in "xyz"]
+    heads = [f"{hub}_{f}{axis} [N{' m' * (f == 'm')}]" for hub in r19().hubs for f in "fm" for axis in "xyz"]
     angles = ["roll [rad]", "pitch [rad]", "roll_rate [rad/s]", "pitch_rate [rad/s]"]
     for name, columns in (("forces", heads), ("angles", angles)):
         rows = [",".join([f"{factor * 1e-3 * i:g}", *["0"] * len(columns)]) for i in range(2000)]

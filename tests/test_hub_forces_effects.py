@@ -9,12 +9,11 @@ import pytest
 from models.advice.choice.systems.hub_forces import answer
 from models.core.errors import InputError
 from models.core.scene_effects import beside, legal, named, without
+from models.systems.hub_forces.comparison import planned_runs
 from models.systems.hub_forces.measurement import recorded
-from models.systems.hub_forces.of_scene import measured
+from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.scene import build
-from models.systems.hub_forces.stabilised import Stabilised
 from studies.asked import plan_of
-from studies.hub_forces import _planned
 
 NOISES = ("angle_noise", "force_noise")
 ON_ROAD = {
@@ -33,10 +32,11 @@ def scene(**more):
 
 def test_each_noise_leaves_alone_and_without_both_transducers_tell_the_truth():
     own = scene()
-    car = own.cut_vehicle()
-    truth, *both = measured(own, car, "mujoco")
-    true = recorded(truth, own.forces.frame, 2)
-    told = [measured(without(own, *out), car, "mujoco")[1:] for out in (*((name,) for name in NOISES), NOISES)]
+    with_noise = measure(own, "mujoco")
+    assert with_noise.truth is not None
+    true, both = recorded(with_noise.truth, own.forces.frame, 2), (with_noise.forces, with_noise.angles)
+    left_out = (measure(without(own, *out), "mujoco") for out in (*((name,) for name in NOISES), NOISES))
+    told = [(measurement.forces, measurement.angles) for measurement in left_out]
     same = [[np.array_equal(a.samples, b.samples) for a, b in zip(one, true, strict=True)] for one in (both, *told)]
     assert same == [[False, False], [False, True], [True, False], [True, True]]
     assert np.array_equal(told[0][0].samples, both[0].samples)  # its own noise is what it was
@@ -102,19 +102,17 @@ def test_a_scene_that_names_no_stabiliser_makes_no_estimate(monkeypatch):
         raise AssertionError("was made")
 
     monkeypatch.setattr("models.systems.hub_forces.tilt_filter.estimate", missing)
-    monkeypatch.setattr("models.systems.hub_forces.enforced.enforced", missing)
-    own = scene()
-    car = own.cut_vehicle()
-    stabilised = Stabilised(own, car, *measured(own, car, "mujoco")[1:])
-    assert stabilised.drive("none", 1e-3, 100).guide is None
+    monkeypatch.setattr("models.systems.hub_forces.run.enforced", missing)
+    measurement = measure(scene(), "mujoco")
+    assert measurement.drive("none", 1e-3, 100).guide is None
     for method in ("kalman", "prescribed"):
         with pytest.raises(AssertionError, match="was made"):
-            replace(stabilised).drive(method, 1e-3, 100)
+            replace(measurement).drive(method, 1e-3, 100)
 
 
 def test_a_study_runs_the_scene_as_it_is_in_every_engine_and_the_others_in_one():
     engines = ("exudyn", "mujoco")
-    names = {method: list(_planned(scene(stabilise={"method": method}), engines)) for method in ("none", "kalman")}
+    names = {method: list(planned_runs(scene(stabilise={"method": method}), engines)) for method in ("none", "kalman")}
     assert names["none"] == ["free, exudyn", "free, mujoco", "filter", "prescribed"]
     assert names["kalman"] == ["free, mujoco", "filter, exudyn", "filter", "prescribed"]
     assert named(scene(stabilise={"method": "kalman"})) == (

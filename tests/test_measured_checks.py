@@ -18,15 +18,15 @@ from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.multibody.cut_rigid import rigid
 from models.systems.hub_forces.tilt_filter import TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, told
 from models.systems.measured.inputs import Inputs
 from models.systems.measured.section_run import Outcome
 from models.systems.measured.verdict import surprised
 from models.systems.measured.virtual import VirtualMeasurement, recording
+from models.vehicles.cut_vehicle import rigid
 from validation.cases import measured_checks as case
-from validation.cases.hub_forces import r19
+from validation.spatial.cars import r19
 
 PERIOD = 2e-3
 

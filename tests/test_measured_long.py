@@ -25,8 +25,8 @@ from models.systems.measured.section_run import Hold, SectionRun, run
 from models.systems.measured.sections import Point, Sections, points
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
-from validation.cases.hub_forces import r19
 from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of
+from validation.spatial.cars import r19
 
 SECONDS = 0.2
 

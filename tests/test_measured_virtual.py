@@ -14,7 +14,6 @@ from models.measured.faults_of_measurement import Faults, check, measured
 from models.measured.gaps import filled
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.multibody.cut_rigid import rigid
 from models.systems.measured.comparison import Band, Compared
 from models.systems.measured.inputs import Grid, Inputs
 from models.systems.measured.pitch_plane import PlaneJob
@@ -26,7 +25,7 @@ from models.systems.measured.verdict import disagreement, uncertainty
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
 from models.systems.pitch_plane.run import run as simulate
-from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.cut_vehicle import CutVehicle, cut, rigid
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.scenes import road_scene
 

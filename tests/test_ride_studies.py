@@ -14,7 +14,7 @@ from models.ride.measures import exceedances, share_beyond
 from models.systems.ride import nonlinear
 from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import build
-from models.vehicles.curve import Curve
+from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import wheels
 from studies.asked import load_scene
 

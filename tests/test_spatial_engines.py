@@ -9,9 +9,8 @@ import pytest
 from models.core.errors import InputError, Refused, RunFailed
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings
-from models.engines.spatial_protocol import INTEGRATORS, METHODS, build, jacobian
+from models.engines.spatial_protocol import INTEGRATORS, METHODS, at_speeds, build, jacobian
 from models.engines.spatial_reference import SpatialReference
-from models.engines.spatial_speeds import at_speeds
 from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, TurnOutput, Tyre
 from models.vehicles.spatial_linear import linearise
 from validation.cases.ride_engines import GRAVITY, SPEED, curved, difference, of_name, random_state, relative
@@ -102,7 +101,7 @@ def test_equations_by_hand_keep_energy():
 
     def energy(t):
         at, rate = q + t[0] * v + t[0] ** 2 / 2 * a, v + t[0] * a
-        motions = model._motions(at, rate)
+        motions = model.motions_of(at, rate)
         kinetic = sum(
             0.5 * body.mass * np.sum((m.shift @ rate) ** 2)
             + 0.5 * (w := m.rotation.T @ m.turn @ rate) @ np.array(body.inertia) @ w

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.vehicles.curve import Curve
 from models.vehicles.spatial import (
     FREEDOMS,
     AntiRollBar,
     Body,
+    Curve,
     Drag,
     PartOutput,
     PointOutput,

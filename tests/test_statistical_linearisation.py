@@ -16,7 +16,7 @@ from models.ride.road_path import road_path
 from models.ride.statistical_linearisation import GRADES, bent, promised, statistically_linear
 from models.road.two_track import CASES, excitation, half_track, input_covariance, on_track, road_of_level
 from models.systems.ride.nonlinear import ridden
-from models.vehicles.curve import Curve
+from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.cases.ride_nonlinear import expected

@@ -58,9 +58,11 @@ from models.multibody.forces import (
     WAVES,
     WAY,
     creep,
+    enter,
+    leave,
+    room,
     touch,
 )
-from models.multibody.kernel import enter, leave, room
 from models.multibody.tree import PER_LINK, dot, three, times, twist
 from models.tyre.tyre_table import place
 

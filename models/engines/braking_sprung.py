@@ -30,7 +30,7 @@ from models.brake.surfaces import under_wheels
 from models.core.errors import RunFailed
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.protocol import Settings
-from models.engines.spatial_protocol import INTEGRATORS, _check_step
+from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise, mass
 
@@ -110,7 +110,7 @@ class OnSprings:
         """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
         if step in self._allowed:
             return
-        _check_step(
+        check_modes(
             self.engine,
             linearise(self.vehicle.handling.vehicle),
             Settings(INTEGRATORS[self.engine], step, LONG_RUN * step),

@@ -12,8 +12,8 @@ from numba import cfunc, types
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.contact_bridge import Wheels, check_step, forces
-from models.engines.mujoco_callback import _array_at
 from models.engines.mujoco_layout import check, offset
+from models.machine.stack import array_at
 
 JOINTS = (
     ("slide", (1.0, 0.0, 0.0)),
@@ -54,7 +54,7 @@ def native_law(kernel: Any = forces) -> Any:
 
     @cfunc(types.void(types.voidptr, types.voidptr))
     def law(model, data):
-        kernel(_array_at(model, numbers), _array_at(data, position), _array_at(data, rate), _array_at(data, force))
+        kernel(array_at(model, numbers), array_at(data, position), array_at(data, rate), array_at(data, force))
 
     return law
 

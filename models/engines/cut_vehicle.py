@@ -1,21 +1,18 @@
 """A vehicle cut at its wheels in an engine: what is the same in every one.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
-forces of ``hub_forces.kernel``. The reference solves the written-out equations instead.
+forces of ``models.multibody.cut_kernel``. The reference solves the written-out equations instead.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
-from models.core.steps import divides, fitting
-from models.engines.free_vehicle import Driven, free_model
+from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.protocol import Settings, guard
-from models.engines.spatial_protocol import _check_step
+from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
-from models.multibody.cut_mechanics import PER_MOTION
 from models.multibody.cut_table import Drive, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
@@ -41,29 +38,52 @@ class HubRun:
     moments: np.ndarray
 
 
-class HubModel(ABC):
-    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4."""
+class Written(FreeModel):
+    """The written-out equations."""
+
+    ENGINE = "reference"
+
+    def __init__(self, driven: Driven) -> None:
+        self.driven = driven
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) from the mass matrix of ``models.multibody.cut_mechanics``."""
+        rates = np.empty(len(q))
+        accelerate(self.numbers, t, np.ascontiguousarray(q), np.ascontiguousarray(v), rates)
+        return rates
+
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
+        states = np.empty((steps + 1, 2 * len(q)))
+        states[0] = np.concatenate((q, v))
+        march(self.numbers, states, step)
+        return states
+
+
+class HubModel:
+    """A driven cut vehicle in one engine, to be marched over ``steps`` steps of ``step`` (s) by Runge-Kutta 4.
+
+    ``model`` is the free vehicle there.
+    """
 
     def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step."""
-        if not divides(step, duration):
-            raise Refused(
-                engine,
-                f"the step {step:g} s does not divide the duration {duration:g} s; use for "
-                f"example {fitting(step, duration)} s",
-            )
+        check_divides(engine, Settings("RK4", step, duration))
         self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
         _check(engine, vehicle, drive, 2 * self.steps + 1)
         check_step(engine, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
+        weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
+        driven = Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces)
+        self.model = Written(driven) if engine == "reference" else free_model(engine, driven)
 
-    @abstractmethod
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
+        return self.model.acceleration(time, q, v)
 
-    @abstractmethod
     def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each."""
+        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where it stops."""
+        return self.model.march(q, v, self.steps, self.step)
 
     def run(self, start: np.ndarray | None = None) -> HubRun:
         """March from coordinates and rates (2 n,), or from rest; RunFailed unless the vehicle stays upright."""
@@ -79,28 +99,22 @@ class HubModel(ABC):
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
-        vehicle = self.vehicle
-        inside, moments = np.empty((len(times), len(vehicle.elements))), np.empty((len(times), 2))
-        wrenches = np.empty((len(times), len(vehicle.hubs), WRENCH))
+        rows, vehicle = len(times), self.vehicle
+        inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
+        wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
         report(self.numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
         return HubRun(times, states, inside, wrenches, moments)
 
-    def work(self) -> tuple[np.ndarray, ...]:
-        """Room for the compiled forces: motion of the joints, their forces, those of elements, hubs, stabiliser."""
-        own = self.vehicle
-        return (
-            np.empty((self.size + 1, PER_MOTION)),
-            np.zeros(self.size),
-            np.empty(len(own.elements)),
-            np.empty((len(own.hubs), WRENCH)),
-            np.empty(2),
-        )
+    def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
+        """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""
+        block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
+        set_joint_forces(block.ctypes.data, 0.0, self.size)
+        return block[: self.size].copy()
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
     """Refused where a mode of the vehicle on its tyres, which are stiffer than none, would grow at a step (s)."""
-    linear = linearise(replace(vehicle.whole, side_forces=()))
-    _check_step(engine, linear, Settings("RK4", step, duration))
+    check_modes(engine, linearise(replace(vehicle.whole, side_forces=())), Settings("RK4", step, duration))
 
 
 def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
@@ -111,41 +125,5 @@ def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
         raise Refused(engine, f"a guide must be {rows} rows (half steps) of 6 finite numbers")
 
 
-class ReferenceHubs(HubModel):
-    """The written-out equations."""
-
-    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) from the mass matrix of ``mechanics``."""
-        found = np.empty(self.size)
-        accelerate(self.numbers, time, np.ascontiguousarray(q), np.ascontiguousarray(v), found)
-        return found
-
-    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) by the classical Runge-Kutta method."""
-        states = np.empty((self.steps + 1, 2 * self.size))
-        states[0] = np.concatenate((q, v))
-        march(self.numbers, states, self.step)
-        return states
-
-
-class EngineHubs(HubModel):
-    """The cut vehicle in Exudyn or MuJoCo: ``model`` is the free vehicle there."""
-
-    def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
-        super().__init__(engine, vehicle, drive, step, duration)
-        weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        self.model = free_model(engine, Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
-
-    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Accelerations (n,) by the engine."""
-        return self.model.acceleration(time, q, v)
-
-    def marched(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) by the engine's Runge-Kutta 4; RunFailed where it stops."""
-        return self.model.march(q, v, self.steps, self.step)
-
-
-def build(engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> HubModel:
-    """A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
-    kind = ReferenceHubs if engine == "reference" else EngineHubs
-    return kind(engine, vehicle, drive, step, duration)
+build = HubModel
+"""A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""

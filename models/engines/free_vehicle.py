@@ -2,7 +2,7 @@
 
 The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
 positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
-of ``models.multibody.kernel`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
+of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
 method.
 """
 
@@ -20,7 +20,7 @@ from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
 from models.vehicles.spatial import SpatialVehicle
 
-MODELS = {"exudyn": "FreeExudyn", "mujoco": "FreeMujoco"}
+ENGINES = ("exudyn", "mujoco")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,8 @@ class FreeModel(ABC):
 
 def free_model(engine: str, driven: Driven) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
-    if engine not in MODELS:
-        raise InputError("", "engine", engine, "no such engine", tuple(MODELS))
-    found: FreeModel = getattr(import_module(f"models.engines.free_vehicle_{engine}"), MODELS[engine])(driven)
-    return found
+    if engine not in ENGINES:
+        raise InputError("", "engine", engine, "no such engine", ENGINES)
+    module = import_module(f"models.engines.free_vehicle_{engine}")
+    model: FreeModel = getattr(module, f"Free{engine.capitalize()}")(driven)
+    return model

@@ -7,32 +7,32 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import carray, cfunc, types
+from numba import cfunc
 
 from models.core.errors import RunFailed
 from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.mujoco_callback import _array_at, _double_at, installed
-from models.engines.mujoco_layout import check, offset
+from models.engines.mujoco_callback import CALLBACK, installed
+from models.engines.mujoco_layout import check, offsets
 from models.engines.mujoco_native import Native, native
-from models.engines.spatial_mujoco import Numbers, _spec, _weigh
-from models.vehicles.spatial import Body, SpatialVehicle
+from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.machine.stack import array_at, double_at
+from models.vehicles.spatial import SpatialVehicle
 
 
 @cache
 def timed_law(kernel: Any) -> Any:
     """Compiled callback: a shell about a compiled kernel of (numbers, time, positions, rates, forces)."""
-    numbers, time = offset("mjModel", "numeric_data"), offset("mjData", "time")
-    position, rate, force = (offset("mjData", field) for field in ("qpos", "qvel", "qfrc_passive"))
+    numbers, time, position, rate, force = offsets("numeric_data", "time", "qpos", "qvel", "qfrc_passive")
 
-    @cfunc(types.void(types.voidptr, types.voidptr))
+    @cfunc(CALLBACK)
     def law(model, data):
         kernel(
-            _array_at(model, numbers),
-            carray(_double_at(data, time), (1,))[0],
-            _array_at(data, position),
-            _array_at(data, rate),
-            _array_at(data, force),
+            array_at(model, numbers),
+            double_at(data, time)[0],
+            array_at(data, position),
+            array_at(data, rate),
+            array_at(data, force),
         )
 
     return law
@@ -44,16 +44,16 @@ def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     They have no mass, or are points about which the other does no more than turn: either way the other's mass and
     inertia, with the point's mass, move as both do.
     """
-    found = {}
+    only = {}
     for body in vehicle.bodies:
         riders = [rider for rider in vehicle.bodies if rider.parent == body.name]
-        if len(riders) == 1 and not np.any(body.inertia) and (not body.mass or _turns_about(body, riders[0])):
-            found[body.name] = riders[0].name
-    return found
-
-
-def _turns_about(body: Body, rider: Body) -> bool:
-    return rider.position == body.position and all(freedom.startswith("r") for freedom in rider.freedoms)
+        if len(riders) != 1 or np.any(body.inertia):
+            continue
+        (rider,) = riders
+        turns_about = rider.position == body.position and all(freedom.startswith("r") for freedom in rider.freedoms)
+        if turns_about or not body.mass:
+            only[body.name] = rider.name
+    return only
 
 
 class FreeMujoco(FreeModel):
@@ -63,15 +63,15 @@ class FreeMujoco(FreeModel):
 
     def __init__(self, driven: Driven) -> None:
         self.driven, numbers, merged = driven, driven.numbers, carriers(driven.vehicle)
-        spec = _spec(driven.vehicle, 1e-3, merged)
+        spec = spec_of(driven.vehicle, 1e-3, merged)
         spec.option.gravity = driven.gravity
         spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
         self.model = spec.compile()
         self.model.numeric_data[:] = numbers
-        own = Numbers(driven.vehicle, self.model, merged)
-        if not np.array_equal(own.columns, np.arange(driven.size)):
+        places = Numbers(driven.vehicle, self.model, merged)
+        if not np.array_equal(places.columns, np.arange(driven.size)):
             raise ValueError("the bodies are not in the order of a walk through their tree")
-        _weigh(self.model, own, driven.vehicle.bodies)
+        weigh(self.model, places, driven.vehicle.bodies)
         self.data = mujoco.MjData(self.model)
         self.law = timed_law(driven.kernel)
         self._marcher = Marcher(self.model)

@@ -59,16 +59,18 @@ def offset(structure: str, field: str) -> int:
     return getattr(layout(structure), field).offset
 
 
+def offsets(*fields: str) -> list[int]:
+    """Offsets (bytes) of the model's ``numeric_data`` and of fields of the data, by their names."""
+    return [offset("mjModel" if field == "numeric_data" else "mjData", field) for field in fields]
+
+
 def check(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Compare offsets with the addresses of the bound arrays; raises RuntimeError on a mismatch."""
-    pairs = (
-        ("mjModel", model, "numeric_data"),
-        ("mjModel", model, "qpos0"),
-        ("mjData", data, "qfrc_passive"),
-        ("mjData", data, "qvel"),
-        ("mjData", data, "qpos"),
-    )
-    for structure, owner, field in pairs:
-        found = ctypes.c_void_p.from_address(owner._address + offset(structure, field)).value
-        if found != getattr(owner, field).ctypes.data:
-            raise RuntimeError(f"MuJoCo {mujoco.__version__}: {structure}.{field} is not where its description says")
+    arrays = (("mjModel", model, ("numeric_data", "qpos0")), ("mjData", data, ("qfrc_passive", "qvel", "qpos")))
+    for structure, owner, fields in arrays:
+        for field in fields:
+            pointer = ctypes.c_void_p.from_address(owner._address + offset(structure, field))
+            if pointer.value != getattr(owner, field).ctypes.data:
+                raise RuntimeError(
+                    f"MuJoCo {mujoco.__version__}: {structure}.{field} is not where its description says"
+                )

@@ -1,20 +1,29 @@
-"""The compiled MuJoCo callback of a vehicle in space: forces between points of bodies that may all turn.
+"""The compiled MuJoCo callback of a vehicle in space and its numbers: forces between points of bodies that may turn.
 
 MuJoCo's own site actuators are wrong between two turning bodies, so every force is summed here. A point of a body that
 never turns is moved by its joints' constant shares. Every other body that counts has a twist, its turning and the
 velocity that it gives the origin of space, and gathers a wrench, force and moment about that origin, so that its joints
 are gone through twice in a call, however many points it has. All numbers lie in the model's numeric data, as
-``spatial_mujoco`` packs them: the header; the bodies, parents first; the elements; the road. So one compiled function
+``packed`` gives them: the header; the bodies, parents first; the elements; the road. So one compiled function
 serves every model in the process, and holds no address that could go stale in numba's cache.
 """
 
+from dataclasses import dataclass
+from functools import cache
+from itertools import chain
+from typing import Any
+
+import mujoco
 import numpy as np
-from numba import cfunc, types
+from numba import cfunc
 from numba.extending import register_jitable
 
-from models.engines.mujoco_callback import _array_at, _double_at
-from models.engines.mujoco_layout import offset
-from models.machine.stack import beyond, doubles
+from models.engines.mujoco_callback import CALLBACK
+from models.engines.mujoco_layout import offsets
+from models.engines.mujoco_tree import AXES, Numbers
+from models.machine.stack import array_at, beyond, double_at, doubles
+from models.vehicles.spatial import Curve, SpatialVehicle, Vector
+from models.vehicles.spatial_linear import preloads
 
 PER_TIME, ROWS, TYRES, BODIES, ELEMENTS, POINTS, ROAD, HEADER = range(8)
 """Header: road rows per second; counts of rows, tyres, bodies that may turn or carry such, elements and points; where
@@ -37,6 +46,9 @@ TRAVEL, RATE, OF_ELEMENT = range(3)
 """Of an element: what its points move it by, and how fast; then its force in their place."""
 OF_POINT = 3
 """Of a point: the moment of a force of 1 along its axis about the origin of space."""
+UP: Vector = (0.0, 0.0, 1.0)
+Acting = tuple[str | None, Vector, Vector]
+"""Body, point and axis."""
 
 
 @register_jitable
@@ -170,15 +182,21 @@ def _act(e, count, road, tyres, q, v, moved, forces):
         e = beyond(e, length)
 
 
-def _compile(numeric, passive, time, position, velocity, xpos, xmat, xanchor, xaxis):
-    @cfunc(types.void(types.voidptr, types.voidptr), cache=True, error_model="numpy")
+@cache
+def spatial_law() -> Any:
+    """The callback, compiled when first asked for."""
+    numeric, passive, time, position, velocity, xpos, xmat, xanchor, xaxis = offsets(
+        "numeric_data", "qfrc_passive", "time", "qpos", "qvel", "xpos", "xmat", "xanchor", "xaxis"
+    )
+
+    @cfunc(CALLBACK, cache=True, error_model="numpy")
     def law(model, data):
-        numbers = _array_at(model, numeric)
+        numbers = array_at(model, numeric)
         count, elements, tyres = int(numbers[BODIES]), int(numbers[ELEMENTS]), int(numbers[TYRES])
-        row = int(np.rint(_double_at(data, time)[0] * numbers[PER_TIME]))
+        row = int(np.rint(double_at(data, time)[0] * numbers[PER_TIME]))
         road = beyond(numbers, int(numbers[ROAD]) + 2 * tyres * min(max(row, 0), int(numbers[ROWS]) - 1))
-        v, forces = _array_at(data, velocity), _array_at(data, passive)
-        anchors, axes = _array_at(data, xanchor), _array_at(data, xaxis)
+        v, forces = array_at(data, velocity), array_at(data, passive)
+        anchors, axes = array_at(data, xanchor), array_at(data, xaxis)
         bodies = beyond(numbers, HEADER)
         points = beyond(bodies, PER_BODY * count)
         laws = beyond(points, PER_POINT * int(numbers[POINTS]))
@@ -186,21 +204,123 @@ def _compile(numeric, passive, time, position, velocity, xpos, xmat, xanchor, xa
         levers = doubles(OF_POINT * int(numbers[POINTS]))
         for i in range(OF_ELEMENT * elements):
             moved[i] = 0.0
-        centres, turned = _array_at(data, xpos), _array_at(data, xmat)
+        centres, turned = array_at(data, xpos), array_at(data, xmat)
         _move(bodies, count, points, v, centres, turned, anchors, axes, room, moved, levers)
-        _act(laws, elements, road, tyres, _array_at(data, position), v, moved, forces)
+        _act(laws, elements, road, tyres, array_at(data, position), v, moved, forces)
         _press(bodies, count, points, moved, levers, anchors, axes, room, forces)
 
     return law
 
 
-_COMPILED: dict[str, object] = {}
+@dataclass(frozen=True)
+class Element:
+    """A force F against the travel s = own coordinate + sum of axis . point - value at rest, less the tyre's road.
+
+    F = held + stiffness s + damping s' + curves + friction + sum of gain * coordinate (``steered``): what acts on
+    every coordinate q is -F ds/dq. A tyre that only pushes is ``one_sided``: F is negative where it does.
+    """
+
+    points: tuple[Acting, ...]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    held: float = 0.0
+    friction: tuple[float, float] = (0.0, 1.0)
+    tyre: int = -1
+    own: tuple[str, str] | None = None
+    steered: tuple[tuple[tuple[str, str], float], ...] = ()
+    on_travel: Curve | None = None
+    on_rate: Curve | None = None
+    one_sided: bool = False
 
 
-def spatial_law():
-    """The callback, compiled when first asked for."""
-    if "law" not in _COMPILED:
-        fields = ("qfrc_passive", "time", "qpos", "qvel", "xpos", "xmat", "xanchor", "xaxis")
-        places = [offset("mjModel", "numeric_data"), *(offset("mjData", field) for field in fields)]
-        _COMPILED["law"] = _compile(*places)
-    return _COMPILED["law"]
+def elements(vehicle: SpatialVehicle, speed: float | None) -> list[Element]:
+    """Everything that acts in a vehicle besides weights and inertia."""
+    held, v, acting = preloads(vehicle), float(speed or 0.0), list[Element]()
+    for s in vehicle.springs:
+        points = ((s.two, s.point_two, s.axis), (s.one, s.point_one, _scaled(s.axis, -1.0)))
+        law = (s.stiffness, s.damping, held.parts[s.name], (s.friction, s.friction_rate))
+        acting.append(Element(points, *law, on_travel=s.travel_force, on_rate=s.rate_force))
+    for bar in vehicle.bars:
+        down, up = (_scaled(UP, sign / bar.track) for sign in (-1.0, 1.0))
+        points = ((bar.left, bar.point_left, down), (bar.right, bar.point_right, up))
+        acting.append(Element(points, bar.stiffness, bar.damping, held.parts[bar.name], own=(bar.body, "rx")))
+    for i, tyre in enumerate(vehicle.tyres):
+        gains = (tyre.stiffness, tyre.damping, -held.tyres[tyre.name])
+        acting.append(Element(((tyre.body, tyre.point, UP),), *gains, tyre=i, one_sided=tyre.pushes_only))
+    for f in vehicle.side_forces:
+        steered = (((f.chassis, "rx"), -f.stiffness * f.roll_steer), ((f.chassis, "rz"), -f.stiffness))
+        acting.append(Element(((f.body, f.point, (0.0, 1.0, 0.0)),), damping=f.stiffness / v, steered=steered))
+    for drag in vehicle.drags:
+        centre = vehicle.body(drag.body).position
+        acting.append(Element(((drag.body, centre, (1.0, 0.0, 0.0)),), damping=drag.coefficient * v))
+    return acting
+
+
+def _scaled(axis: Vector, factor: float) -> Vector:
+    return (factor * axis[0], factor * axis[1], factor * axis[2])
+
+
+def packed(
+    vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: Numbers
+) -> tuple[tuple[int, int, int], list[float]]:
+    """How many bodies, elements and points there are, and all numbers that the callback reads of them."""
+    carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
+    moving = [body.name for body in vehicle.bodies if body.name in carrying]
+    bodies, points = list[list[float]](), list[list[float]]()
+    for name in moving:
+        before = len(points)
+        points += _points_of(acting, vehicle, name)
+        bodies.append([*_body(vehicle, name, moving, model, numbers), before, len(points)])
+    laws = [_element(element, vehicle, numbers) for element in acting]
+    return (len(bodies), len(laws), len(points)), [float(value) for value in chain(*bodies, *points, *laws)]
+
+
+def _body(
+    vehicle: SpatialVehicle, name: str, moving: list[str], model: mujoco.MjModel, numbers: Numbers
+) -> list[float]:
+    """A body that may turn, or carries one that may."""
+    body, number = vehicle.body(name), numbers.bodies[name]
+    first, count = max(int(model.body_jntadr[number]), 0), len(body.freedoms)
+    sliding = sum(not freedom.startswith("r") for freedom in body.freedoms)
+    parent = moving.index(body.parent) if body.parent else -1
+    return [parent, number, first, first + sliding, first + count]
+
+
+def _points_of(acting: list[Element], vehicle: SpatialVehicle, name: str) -> list[list[float]]:
+    """Where the elements act on a body that may turn."""
+    centre = vehicle.body(name).position
+    return [
+        [i, *np.subtract(point, centre), *axis]
+        for i, element in enumerate(acting)
+        for body, point, axis in element.points
+        if body == name and vehicle.turns(name)
+    ]
+
+
+def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> list[float]:
+    """An element: its law, the shares of coordinates in its travel, and what of its law is no line."""
+    shares, rest = dict[int, float](), 0.0
+    if element.own in numbers.joints:
+        shares[numbers.joints[element.own]] = 1.0
+    for name, point, axis in element.points:
+        if vehicle.turns(name):
+            rest += float(np.dot(point, axis))
+            continue
+        for place in ((body, freedom) for body in vehicle.chain(name) for freedom in vehicle.body(body).freedoms):
+            joint = numbers.joints[place]
+            shares[joint] = shares.get(joint, 0.0) + float(np.dot(axis, AXES[place[1]]))
+    flat = [value for pair in shares.items() if pair[1] for value in pair]
+    more = _rest_of_law(element, numbers)
+    law = [element.stiffness, element.damping, element.held, element.tyre, rest, element.one_sided]
+    begins = SHARES + len(flat)
+    return [begins + len(more), *law, begins if more else 0, *flat, *more]
+
+
+def _rest_of_law(element: Element, numbers: Numbers) -> list[float]:
+    """What of a law is no line; nothing where there is nothing."""
+    steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
+    curves = [element.on_travel, element.on_rate]
+    if not (element.friction[0] or steered or any(curves)):
+        return []
+    tables = [list(zip(curve.arguments, curve.forces, strict=True)) if curve else [] for curve in curves]
+    return [*element.friction, *(steered or [-1, 0.0, -1, 0.0]), *map(len, tables), *chain(*chain(*tables))]

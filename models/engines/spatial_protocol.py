@@ -1,27 +1,26 @@
 """What an engine is to a vehicle in space: it is linearised there and runs in time on a given road.
 
-An engine's module ``spatial_NAME`` has ``build(vehicle, settings, speed, road)``. Rides march in both with the
-same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; METHODS has the others. All read
-the road from one table at half steps. Nothing is integrated here.
+An engine's module ``spatial_NAME`` has a class ``SpatialName`` of (vehicle, settings, speed, road). Rides march in both
+with the same tableau, the classical Runge-Kutta one, so that they may be compared to rounding; METHODS has the others.
+All read the road from one table at half steps. Nothing is integrated here.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Protocol
 
 import numpy as np
 
-from models.core.errors import Refused, RunFailed
+from models.core.errors import InputError, Refused, RunFailed
 from models.core.steps import divides, fitting
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Settings, guard
 from models.engines.stability import GROWTH, growth, limit
-from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
-from models.vehicles.spatial_linear import linearise, outputs, wheels
+from models.vehicles.spatial_linear import Kinematics, linearise, outputs, wheels
 
 INTEGRATORS = {"exudyn": "RK44", "mujoco": "RK4"}
 """What each engine calls the classical Runge-Kutta method."""
@@ -90,7 +89,9 @@ def build(
         _check(engine, linear, settings, road)
     elif road is not None:
         raise Refused(engine, "a road is read by half steps: it needs settings with a step")
-    return import_module(f"models.engines.spatial_{engine}").build(vehicle, settings, speed, road)
+    kind = getattr(import_module(f"models.engines.spatial_{engine}"), f"Spatial{engine.capitalize()}")
+    model: SpatialModel = kind(vehicle, settings, speed, road)
+    return model
 
 
 def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:
@@ -99,12 +100,7 @@ def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndar
         raise Refused(
             engine, f"vehicles in space march with {' or '.join(METHODS[engine])}, not with {settings.integrator}"
         )
-    if not divides(settings.step, settings.duration):
-        raise Refused(
-            engine,
-            f"the step {settings.step:g} s does not divide the duration {settings.duration:g} s; "
-            f"use for example {fitting(settings.step, settings.duration)} s",
-        )
+    check_divides(engine, settings)
     shape = (2 * settings.steps + 1, 2 * len(linear.wheels))
     if road is not None and (road.shape != shape or not np.isfinite(road).all()):
         raise Refused(
@@ -112,21 +108,32 @@ def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndar
             f"the road must be {shape[0]} rows (half steps) of {shape[1]} finite numbers (heights, "
             f"then rates under {len(linear.wheels)} tyres)",
         )
-    _check_step(engine, linear, settings)
+    check_modes(engine, linear, settings)
 
 
-def _check_step(engine: str, linear: LinearVehicle, settings: Settings) -> None:
+def check_divides(engine: str, settings: Settings) -> None:
+    """Refuse a step that does not divide the duration."""
+    step, duration = settings.step, settings.duration
+    if not divides(step, duration):
+        raise Refused(
+            engine,
+            f"the step {step:g} s does not divide the duration {duration:g} s; use for "
+            f"example {fitting(step, duration)} s",
+        )
+
+
+def check_modes(engine: str, linear: LinearVehicle, settings: Settings) -> None:
     """Refuse a step at which a mode of the linear vehicle grows that does not grow by itself."""
     n = len(linear.mass)
     damping, stiffness = np.split(np.linalg.solve(linear.mass, np.hstack([linear.damping, linear.stiffness])), 2, 1)
-    own = (np.eye(n), damping, stiffness, np.zeros((n, n)), np.zeros((n, n)))  # no engine knows its callback's damping
+    parts = (np.eye(n), damping, stiffness, *np.zeros((2, n, n)))  # no engine knows its callback's damping
     name, h, duration = settings.integrator, settings.step, settings.duration
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
-    if growth(name, h, duration, own) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
+    if growth(name, h, duration, parts) > math.log(GROWTH) + max(0.0, float(poles.real.max())) * duration:
         raise Refused(
             engine,
             f"at a step of {h:g} s {name} lets a mode of the vehicle grow; use at most "
-            f"{limit(name, h, duration, own):.3g} s",
+            f"{limit(name, h, duration, parts):.3g} s",
         )
 
 
@@ -191,6 +198,30 @@ def linear_vehicle(
         outputs(vehicle, motion),
         source,
     )
+
+
+SPEEDS = (5.0, 15.0, 45.0)
+"""Speeds (m/s) that are linearised; any three would do."""
+
+
+def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearVehicle]:
+    """The vehicle at a speed (m/s, above 0), as the engine linearises it; one or three linearisations in all.
+
+    Side forces damp by 1 / v and drag by v, and nothing else depends on the speed: D = D0 + D1 / v + D2 v exactly.
+    """
+    if not vehicle.side_forces and not vehicle.drags:
+        only = build(engine, vehicle).linearise()
+        return lambda speed: only
+    linears = [build(engine, vehicle, speed=speed).linearise() for speed in SPEEDS]
+    powers = np.array([[1.0, 1.0 / speed, speed] for speed in SPEEDS])
+    parts = np.tensordot(np.linalg.inv(powers), np.array([linear.damping for linear in linears]), 1)
+
+    def at(speed: float) -> LinearVehicle:
+        if not speed > 0:
+            raise InputError(vehicle.name, "speed", speed, "side forces and drag need a speed above 0 m/s")
+        return replace(linears[0], damping=parts[0] + parts[1] / speed + parts[2] * speed)
+
+    return at
 
 
 def sound(

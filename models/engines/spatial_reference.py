@@ -56,7 +56,7 @@ class SpatialReference:
 
     def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
         """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
-        self.q, self.v, self.motions = q, v, self._motions(q, v)
+        self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)
         for body in self.vehicle.bodies:
             m = self.motions[body.name]
@@ -67,7 +67,7 @@ class SpatialReference:
         force += self._forces(np.zeros(2 * len(self.vehicle.tyres)) if road is None else road)
         return np.linalg.solve(mass, force)
 
-    def _motions(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
+    def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
         """All bodies, parents first: each freedom shifts along, or turns about, an axis that those before it turned."""
         found: dict[str, Motion] = {}
         for body in self.vehicle.bodies:

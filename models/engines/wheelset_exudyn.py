@@ -14,7 +14,7 @@ import exudyn as exu
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.engines.spatial_exudyn_build import KINDS, items, lists
+from models.engines.exudyn_system import KINDS, items, lists
 from models.engines.wheelset import EngineWheelset, leaning
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
 from models.rail.joint_forces import JOINTS, set_joint_forces, table

@@ -100,3 +100,25 @@ def ask(typing_context, address, inputs, table, outputs):
         return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
 
     return types.int32(types.intp, DOUBLES, DOUBLES, DOUBLES), generate
+
+
+@_intrinsic
+def double_at(typing_context, base, shift):
+    """Pointer to the double that lies ``shift`` bytes after ``base``, a bare pointer as C callbacks get them."""
+
+    def generate(context, builder, signature, arguments):
+        place = builder.add(builder.ptrtoint(arguments[0], ir.IntType(64)), arguments[1])
+        return builder.inttoptr(place, context.get_value_type(DOUBLES))
+
+    return DOUBLES(types.voidptr, types.intp), generate
+
+
+@_intrinsic
+def array_at(typing_context, base, shift):
+    """The pointer to doubles that is stored ``shift`` bytes after ``base``, a bare pointer as C callbacks get them."""
+
+    def generate(context, builder, signature, arguments):
+        place = builder.add(builder.ptrtoint(arguments[0], ir.IntType(64)), arguments[1])
+        return builder.load(builder.inttoptr(place, context.get_value_type(DOUBLES).as_pointer()))
+
+    return DOUBLES(types.voidptr, types.intp), generate

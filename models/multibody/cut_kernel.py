@@ -14,7 +14,6 @@ from models.multibody.cut_mechanics import (
     PER_BODY,
     PER_JOINT,
     PER_MOTION,
-    TURNED,
     TURNS,
     add_wrench,
     column,
@@ -24,6 +23,8 @@ from models.multibody.cut_mechanics import (
     solve,
     turned,
 )
+from models.multibody.tree import dot, plus, put, three
+from models.multibody.tree import out as into
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
 
 (
@@ -60,19 +61,17 @@ WRENCH, GUIDING = 6, 6
 
 
 @lean
-def _element(e, joints, m, chassis, v, row, axis, end, by):
-    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis. Room: three vectors."""
-    turned(m[chassis + 1], e, AXIS, axis, 0)
+def _element(e, joints, m, chassis, v, row):
+    """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis."""
+    axis, travel, rate = turned(m[chassis + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
-    travel, rate = -e[DESIGN], 0.0
     for side in range(2):
-        sign, j, first = 2.0 * side - 1.0, int(e[TWO * side]), TWO * side + 1
-        locate(m[j + 1], e, first, end, 0)
+        sign, j = 2.0 * side - 1.0, int(e[TWO * side])
+        end = locate(m[j + 1], e, TWO * side + 1)
         for k in range(3):
             travel += sign * axis[k] * end[k]
         while j > chassis:
-            column(joints[j, TURNS] != 0.0, m[j + 1], end, 0, by, 0)
-            along = axis[0] * by[0] + axis[1] * by[1] + axis[2] * by[2]
+            along = dot(axis, column(joints[j, TURNS], m[j + 1], end))
             row[j] += sign * along
             rate += sign * along * v[j]
             j = int(joints[j, PARENT])
@@ -80,46 +79,30 @@ def _element(e, joints, m, chassis, v, row, axis, end, by):
 
 
 @lean
-def _tyre(hub, joints, m, q, v, height, rate, speed, place, wrench):
-    """Write force and moment (space) at the hub by a tyre on a road of this height and rate under it.
+def _tyre(hub, joints, m, q, v, height, rate, speed, place):
+    """Force and moment (space) at the hub by a tyre on a road of this height and rate under it.
 
     The side force of a tyre that only pushes goes with its load: in the air it has none.
     """
-    by, down, point = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(6), (6,))
-    down[0], down[1], down[2] = 0.0, 0.0, -hub[HEIGHT]
-    turned(m[ROLL + 1], down, 0, point, 0)
-    for k in range(3):
-        point[3 + k] = place[k] + point[k]
-    j, risen, sideways = int(hub[LAST]), 0.0, 0.0
+    down, j, risen, sideways = turned(m[ROLL + 1], (0.0, 0.0, -hub[HEIGHT])), int(hub[LAST]), 0.0, 0.0
+    point = plus(place, down)
     while j >= 0:
-        turns = joints[j, TURNS] != 0.0
-        column(turns, m[j + 1], place, 0, by, 0)
-        risen += by[2] * v[j]
-        column(turns, m[j + 1], point, 3, by, 0)
-        sideways += by[1] * v[j]
+        risen += column(joints[j, TURNS], m[j + 1], place)[2] * v[j]
+        sideways += column(joints[j, TURNS], m[j + 1], point)[1] * v[j]
         j = int(joints[j, PARENT])
     elastic, grip = hub[LOAD] + hub[TYRE] * (height - place[2] + hub[HEIGHT]), 1.0
-    wrench[2] = elastic + hub[TYRE_DAMPING] * (rate - risen)
+    load = elastic + hub[TYRE_DAMPING] * (rate - risen)
     if hub[ONE_SIDED] != 0.0:
-        wrench[2] = max(min(wrench[2], 2.0 * elastic), 0.0)
-        grip = wrench[2] / hub[LOAD]
-    wrench[0] = -wrench[2] * rate / speed
-    wrench[1] = grip * hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
-    wrench[3], wrench[4], wrench[5] = -point[2] * wrench[1], 0.0, point[0] * wrench[1]
+        load = max(min(load, 2.0 * elastic), 0.0)
+        grip = load / hub[LOAD]
+    side = grip * hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
+    return (-load * rate / speed, side, load), (-down[2] * side, 0.0, down[0] * side)
 
 
 @lean
 def frame(head, hub):
     """Row of ``m`` in whose axes a hub's wrench is given."""
     return 0 if head[FRAME] == 2.0 else int(head[CHASSIS] if head[FRAME] == 1.0 else hub[LAST]) + 1
-
-
-@lean
-def into(own, vector, i, out, o):
-    """Write a vector of space in the axes of a row of ``m``."""
-    for k in range(3):
-        r = TURNED + k
-        out[o + k] = own[r] * vector[i] + own[r + 3] * vector[i + 1] + own[r + 6] * vector[i + 2]
 
 
 @lean
@@ -169,32 +152,24 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
     row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
     chassis, count = int(head[CHASSIS]), len(hubs)
-    place, wrench, axis, by = (
-        array(doubles(3), (3,)),
-        array(doubles(6), (6,)),
-        array(doubles(3), (3,)),
-        array(doubles(3), (3,)),
-    )
     travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)
     for i in range(len(elements)):
-        inside[i] = _element(elements[i], joints, m, chassis, v, travel, axis, place, by)
+        inside[i] = _element(elements[i], joints, m, chassis, v, travel)
         for j in range(chassis + 1, len(joints)):
             out[j] -= inside[i] * travel[j]
     for i in range(count):
-        hub, known = hubs[i], wrenches[i]
-        last, own = int(hub[LAST]), m[frame(head, hub)]
-        locate(m[last + 1], hub, ARM, place, 0)
+        hub, known, own = hubs[i], wrenches[i], m[frame(head, hubs[i])]
+        place = locate(m[int(hub[LAST]) + 1], hub, ARM)
         if head[ROAD] != 0.0:
-            _tyre(hub, joints, m, q, v, row[i], row[count + i], head[SPEED], place, wrench)
-            into(own, wrench, 0, known, 0)
-            into(own, wrench, 3, known, 3)
+            force, moment = _tyre(hub, joints, m, q, v, row[i], row[count + i], head[SPEED], place)
+            put(known, 0, into(own, force, 0))
+            put(known, 3, into(own, moment, 0))
         else:
             for k in range(WRENCH):
                 known[k] = row[WRENCH * i + k]
-            turned(own, known, 0, wrench, 0)
-            turned(own, known, 3, wrench, 3)
-        add_wrench(joints, m, last, place, wrench, out)
+            force, moment = turned(own, three(known, 0)), turned(own, three(known, 3))
+        add_wrench(joints, m, int(hub[LAST]), place, force, moment, out)
     moments[0] = moments[1] = 0.0
     wanted = row[len(row) - GUIDING :]
     if head[GUIDE] == PULLED:

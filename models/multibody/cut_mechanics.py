@@ -1,42 +1,33 @@
 """Bodies on joints in space, compiled: where they are, their mass matrix and what they lack for free motion.
 
-Row j + 1 of ``m`` describes what is behind joint j, row 0 the ground: place of its origin, rotation (rows), axis of
+Row j + 1 of ``m`` describes what is behind joint j, row 0 the ground: rotation (rows), place of its origin, axis of
 the joint, angular velocity, and of acceleration and angular acceleration what is there without any q''. Jourdain's
-principle, with axes and anchors of joints as the columns of its rows.
+principle, with axes and anchors of joints as the columns of its rows. Vectors are tuples of space's axes.
 """
 
 import math
 
 from models.machine.compiled import lean
 from models.machine.stack import array, doubles
+from models.multibody.tree import add, cross, dot, plus, put, three, times
 
 PARENT, TURNS, AXIS, OFFSET, PER_JOINT = 0, 1, 2, 3, 6
 """Numbers of a joint: the one below it (-1: the ground), whether it turns, its axis, where it is on what is below."""
 LAST, MASS, ARM, INERTIA, PER_BODY = 0, 1, 2, 5, 14
 """Numbers of a body: the joint that carries it, kg, its centre (m) from there, its inertia about that (kg m^2)."""
-PLACE, TURNED, ALONG, OMEGA, REST, TURN_REST, PER_MOTION = 0, 3, 12, 15, 18, 21, 24
+TURNED, PLACE, ALONG, OMEGA, REST, TURN_REST, PER_MOTION = 0, 9, 12, 15, 18, 21, 24
+"""Of a row of ``m``; its rotation comes first, as the rows of ``turned`` do."""
 
 
 @lean
-def add_cross(out, o, a, i, b, j, factor):
-    """Add factor a x b to ``out``; vectors begin at o, i and j within the rows that are given."""
-    out[o] += factor * (a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1])
-    out[o + 1] += factor * (a[i + 2] * b[j] - a[i] * b[j + 2])
-    out[o + 2] += factor * (a[i] * b[j + 1] - a[i + 1] * b[j])
-
-
-@lean
-def turned(own, vector, i, out, o):
-    """Write a vector of the frame of a row of ``m`` in the axes of space."""
-    for k in range(3):
-        r = TURNED + 3 * k
-        out[o + k] = own[r] * vector[i] + own[r + 1] * vector[i + 1] + own[r + 2] * vector[i + 2]
+def turned(matrix, vector):
+    """Product of the first nine numbers, rows of a matrix, and a vector: of a row of ``m`` from its axes to space's."""
+    return dot(three(matrix, 0), vector), dot(three(matrix, 3), vector), dot(three(matrix, 6), vector)
 
 
 @lean
 def move(joints, q, v, m):
     """Fill ``m`` (n + 1, PER_MOTION) from coordinates and rates (n,)."""
-    r = array(doubles(6), (6,))
     m[0, :] = 0.0
     m[0, TURNED] = m[0, TURNED + 4] = m[0, TURNED + 8] = 1.0
     for j in range(len(joints)):
@@ -44,97 +35,80 @@ def move(joints, q, v, m):
         below, k = m[int(joint[PARENT]) + 1], int(joint[AXIS])
         for i in range(PER_MOTION):
             own[i] = below[i]
-        turned(below, joint, OFFSET, r, 0)
+        arm, along, omega = (
+            turned(below, three(joint, OFFSET)),
+            (below[k], below[3 + k], below[6 + k]),
+            three(own, OMEGA),
+        )
         slides = joint[TURNS] == 0.0
-        for i in range(3):
-            own[ALONG + i] = below[TURNED + 3 * i + k]
-            if slides:
-                r[i] += own[ALONG + i] * q[j]
-            own[PLACE + i] += r[i]
-            r[3 + i] = 0.0
-        add_cross(r, 3, below, OMEGA, r, 0, 1.0)
-        add_cross(own, REST, below, OMEGA, r, 3, 1.0)
-        add_cross(own, REST, below, TURN_REST, r, 0, 1.0)
         if slides:
-            add_cross(own, REST, below, OMEGA, own, ALONG, 2.0 * v[j])
+            arm = plus(arm, times(along, q[j]))
+        put(own, ALONG, along)
+        add(own, PLACE, arm)
+        add(own, REST, cross(omega, cross(omega, arm)))
+        add(own, REST, cross(three(below, TURN_REST), arm))
+        if slides:
+            add(own, REST, times(cross(omega, along), 2.0 * v[j]))
         else:
-            add_cross(own, TURN_REST, below, OMEGA, own, ALONG, v[j])
-            _turn(own, below, k, q[j], v[j])
+            add(own, TURN_REST, times(cross(omega, along), v[j]))
+            _turn(own, below, k, q[j], times(along, v[j]))
 
 
 @lean
 def _turn(own, below, k, angle, rate):
-    """Turn a row of ``m`` about axis k of the row below by an angle (rad) and its rate (rad/s)."""
-    c, s, a, b = math.cos(angle), math.sin(angle), TURNED + (k + 1) % 3, TURNED + (k + 2) % 3
-    for i in range(3):
-        own[OMEGA + i] += own[ALONG + i] * rate
-        one, two = below[a + 3 * i], below[b + 3 * i]
-        own[a + 3 * i] = c * one + s * two
-        own[b + 3 * i] = c * two - s * one
+    """Turn a row of ``m`` about axis k of the row below by an angle (rad), at a rate (rad/s, a vector)."""
+    c, s, a, b = math.cos(angle), math.sin(angle), (k + 1) % 3, (k + 2) % 3
+    add(own, OMEGA, rate)
+    for i in range(0, 9, 3):
+        own[a + i] = c * below[a + i] + s * below[b + i]
+        own[b + i] = c * below[b + i] - s * below[a + i]
 
 
 @lean
-def locate(own, arms, i, place, o):
-    """Write where a point is that lies at an arm from the origin of a row of ``m``, in its axes."""
-    turned(own, arms, i, place, o)
-    for k in range(3):
-        place[o + k] += own[PLACE + k]
+def locate(own, arms, i):
+    """Where a point is that lies at an arm from the origin of a row of ``m``, in its axes."""
+    return plus(turned(own, three(arms, i)), three(own, PLACE))
 
 
 @lean
-def column(turns, own, place, i, out, o):
-    """Write how a point at ``place`` moves by the rate of the joint of a row of ``m``, which carries it."""
-    for k in range(3):
-        out[o + k] = 0.0 if turns else own[ALONG + k]
-    if turns:
-        add_cross(out, o, own, ALONG, place, i, 1.0)
-        add_cross(out, o, own, ALONG, own, PLACE, -1.0)
+def column(turns, own, place):
+    """How a point at ``place`` moves by the rate of the joint of a row of ``m``, which carries it."""
+    along = three(own, ALONG)
+    if turns == 0.0:
+        return along
+    return plus(cross(along, place), times(cross(along, three(own, PLACE)), -1.0))
 
 
 @lean
-def add_wrench(joints, m, last, place, wrench, out):
-    """Add a force (N) at ``place`` and a moment (N m), ``wrench`` (6,) in space, on what a joint carries."""
-    j, by = last, array(doubles(3), (3,))
+def add_wrench(joints, m, last, place, force, moment, out):
+    """Add a force (N) at ``place`` and a moment (N m) on what a joint carries to the joint forces ``out`` (n,)."""
+    j = last
     while j >= 0:
-        turns = joints[j, TURNS]
-        column(turns != 0.0, m[j + 1], place, 0, by, 0)
+        own, turns = m[j + 1], joints[j, TURNS]
+        by, about = column(turns, own, place), times(three(own, ALONG), turns)
         for k in range(3):
-            out[j] += by[k] * wrench[k] + turns * m[j + 1, ALONG + k] * wrench[3 + k]
+            out[j] += by[k] * force[k] + about[k] * moment[k]
         j = int(joints[j, PARENT])
 
 
 @lean
-def _times(tensor, vector, i, out):
-    for k in range(3):
-        out[k] = tensor[3 * k] * vector[i] + tensor[3 * k + 1] * vector[i + 1] + tensor[3 * k + 2] * vector[i + 2]
+def accelerated(own, arm, gravity):
+    """Acceleration without q'' of a point at an arm from the origin of a row of ``m``, less free fall."""
+    omega, rest = three(own, OMEGA), (own[REST], own[REST + 1], own[REST + 2] + gravity)
+    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(own, TURN_REST), arm))
 
 
 @lean
-def _turned_tensor(own, body, out):
-    """Write R T R^T (9,) of the inertia of a body and the rotation of a row of ``m``."""
+def resting(own, body, gravity, tensor):
+    """A body's arm in space, its acceleration and moment of momentum's rate without q''; writes its inertia there."""
     for i in range(3):
         for j in range(3):
-            out[3 * i + j] = 0.0
+            tensor[3 * i + j] = 0.0  # R T R^T
             for k in range(9):
-                out[3 * i + j] += own[TURNED + 3 * i + k // 3] * body[INERTIA + k] * own[TURNED + 3 * j + k % 3]
-
-
-@lean
-def resting(own, body, gravity, tensor, arm, a, t):
-    """Write a body's inertia and arm in space, and its acceleration and moment of momentum's rate without q''."""
-    h = array(doubles(3), (3,))
-    h[0] = h[1] = h[2] = 0.0
-    _turned_tensor(own, body, tensor)
-    turned(own, body, ARM, arm, 0)
-    add_cross(h, 0, own, OMEGA, arm, 0, 1.0)
-    for k in range(3):
-        a[k] = own[REST + k]
-    a[2] += gravity
-    add_cross(a, 0, own, OMEGA, h, 0, 1.0)
-    add_cross(a, 0, own, TURN_REST, arm, 0, 1.0)
-    _times(tensor, own, OMEGA, h)
-    _times(tensor, own, TURN_REST, t)
-    add_cross(t, 0, own, OMEGA, h, 0, 1.0)
+                tensor[3 * i + j] += own[3 * i + k // 3] * body[INERTIA + k] * own[3 * j + k % 3]
+    arm, omega = turned(own, three(body, ARM)), three(own, OMEGA)
+    momentum = plus(turned(tensor, three(own, TURN_REST)), cross(omega, turned(tensor, omega)))
+    return arm, accelerated(own, arm, gravity), momentum
 
 
 @lean
@@ -143,23 +117,20 @@ def inertia(joints, bodies, m, gravity, mass, force):
     n = len(joints)
     mass[:] = 0.0
     chain, rows, tensor = array(doubles(n), (n,)), array(doubles(9 * n), (n, 9)), array(doubles(9), (9,))
-    place, a, t = array(doubles(3), (3,)), array(doubles(3), (3,)), array(doubles(3), (3,))
     for b in range(len(bodies)):
         body = bodies[b]
-        last, kg, count = int(body[LAST]), body[MASS], 0
-        resting(m[last + 1], body, gravity, tensor, place, a, t)
-        for k in range(3):
-            place[k] += m[last + 1, PLACE + k]
-        j = last
+        j, kg, count = int(body[LAST]), body[MASS], 0
+        arm, a, t = resting(m[j + 1], body, gravity, tensor)
+        place = plus(arm, three(m[j + 1], PLACE))
         while j >= 0:
-            row = rows[count]
+            row, own, turns = rows[count], m[j + 1], joints[j, TURNS]
             chain[count] = j
-            column(joints[j, TURNS] != 0.0, m[j + 1], place, 0, row, 0)
+            by, about = column(turns, own, place), times(three(own, ALONG), turns)
             for k in range(3):
-                row[3 + k] = m[j + 1, ALONG + k] * joints[j, TURNS]
-                force[j] -= kg * row[k] * a[k] + row[3 + k] * t[k]
-            for k in range(3):
-                row[6 + k] = tensor[3 * k] * row[3] + tensor[3 * k + 1] * row[4] + tensor[3 * k + 2] * row[5]
+                force[j] -= kg * by[k] * a[k] + about[k] * t[k]
+            put(row, 0, by)
+            put(row, 3, about)
+            put(row, 6, turned(tensor, about))
             count, j = count + 1, int(joints[j, PARENT])
         for one in range(count):
             for two in range(count):

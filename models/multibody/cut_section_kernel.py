@@ -8,7 +8,8 @@ they move, less what else acts there.
 
 import numpy as np
 
-from models.machine.compiled import njit
+from models.machine.compiled import lean, njit
+from models.machine.stack import array, doubles
 from models.multibody.cut_kernel import (
     ARM,
     AXIS,
@@ -22,7 +23,6 @@ from models.multibody.cut_kernel import (
     WRENCH,
     forces,
     frame,
-    into,
     parts,
 )
 from models.multibody.cut_mechanics import (
@@ -32,10 +32,8 @@ from models.multibody.cut_mechanics import (
     PARENT,
     PER_MOTION,
     PLACE,
-    REST,
-    TURN_REST,
     TURNS,
-    add_cross,
+    accelerated,
     column,
     inertia,
     locate,
@@ -43,6 +41,8 @@ from models.multibody.cut_mechanics import (
     solve,
     turned,
 )
+from models.multibody.tree import cross, plus, put, three, times
+from models.multibody.tree import out as into
 from models.vehicles.cut_vehicle import ROLL
 
 ELEMENT, CHASSIS_ROW, MOMENTS, POINT = 2, 9, 2, 3
@@ -51,92 +51,80 @@ JOINT, POINT_ARM, WEIGHT, PER_POINT = 0, 1, 4, 5
 """Of a point: the joint that carries it, where it is from there (m), how much of gravity is felt."""
 
 
-@njit(cache=True, error_model="numpy")
-def _accelerate(joints, m, last, qdd, place, a, turning):
-    """Add to the acceleration of a point at ``place``, carried by joint ``last``, and to the turning what q'' makes."""
-    j, by = last, np.empty(3)
+@lean
+def _accelerate(joints, m, last, qdd, place, a):
+    """Acceleration of a point at ``place``, carried by joint ``last``, that without q'' is ``a``, and its turning's."""
+    j, turning = last, (0.0, 0.0, 0.0)
     while j >= 0:
-        turns = joints[j, TURNS]
-        column(turns != 0.0, m[j + 1], place, 0, by, 0)
-        for k in range(3):
-            a[k] += by[k] * qdd[j]
-            turning[k] += turns * m[j + 1, ALONG + k] * qdd[j]
+        own, turns = m[j + 1], joints[j, TURNS]
+        a = plus(a, times(column(turns, own, place), qdd[j]))
+        turning = plus(turning, times(times(three(own, ALONG), turns), qdd[j]))
         j = int(joints[j, PARENT])
+    return a, turning
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _move_bodies(joints, bodies, m, gravity, qdd, acting):
     """Write place, force and moment about it (9 each) that move every body as it does, its weight held."""
-    tensor, arm, turning = np.empty(9), np.empty(3), np.empty(3)
+    tensor = array(doubles(9), (9,))
     for b in range(len(bodies)):
-        body, row = bodies[b], acting[b]
-        own = m[int(body[LAST]) + 1]
-        resting(own, body, gravity, tensor, arm, row[3:6], row[6:])
-        for k in range(3):
-            row[k], turning[k] = own[PLACE + k] + arm[k], 0.0
-        _accelerate(joints, m, int(body[LAST]), qdd, row, row[3:6], turning)
-        for k in range(3):
-            row[3 + k] *= body[MASS]
-            row[6 + k] += tensor[3 * k] * turning[0] + tensor[3 * k + 1] * turning[1] + tensor[3 * k + 2] * turning[2]
+        body, row, last = bodies[b], acting[b], int(bodies[b, LAST])
+        arm, a, t = resting(m[last + 1], body, gravity, tensor)
+        place = plus(three(m[last + 1], PLACE), arm)
+        a, turning = _accelerate(joints, m, last, qdd, place, a)
+        put(row, 0, place)
+        put(row, 3, times(a, body[MASS]))
+        put(row, 6, plus(t, turned(tensor, turning)))
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _load_hubs(head, hubs, m, wrenches, acting):
     """Write place, force and moment of every hub, negative: they act from outside."""
     for i in range(len(hubs)):
         hub, row, own = hubs[i], acting[i], m[frame(head, hubs[i])]
-        locate(m[int(hub[LAST]) + 1], hub, ARM, row, 0)
-        turned(own, wrenches[i], 0, row, 3)
-        turned(own, wrenches[i], 3, row, 6)
-        for k in range(6):
-            row[3 + k] = -row[3 + k]
+        put(row, 0, locate(m[int(hub[LAST]) + 1], hub, ARM))
+        put(row, 3, times(turned(own, three(wrenches[i], 0)), -1.0))
+        put(row, 6, times(turned(own, three(wrenches[i], 3)), -1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@lean
 def _load_elements(elements, m, chassis, inside, acting, travels):
     """Write places and forces at both ends of every element, negative, and its travel."""
-    axis = np.empty(3)
     for i in range(len(elements)):
         e = elements[i]
-        turned(m[chassis + 1], e, AXIS, axis, 0)
+        axis = turned(m[chassis + 1], three(e, AXIS))
         travels[i] = -e[DESIGN]
         for side in range(2):
-            row, sign, first = acting[2 * i + side], 2.0 * side - 1.0, TWO * side + 1
-            locate(m[int(e[ONE + TWO * side]) + 1], e, first, row, 0)
+            row, sign = acting[2 * i + side], 2.0 * side - 1.0
+            place = locate(m[int(e[ONE + TWO * side]) + 1], e, TWO * side + 1)
             for k in range(3):
-                travels[i] += sign * axis[k] * row[k]
-                row[3 + k], row[6 + k] = sign * inside[i] * axis[k], 0.0
+                travels[i] += sign * axis[k] * place[k]
+            put(row, 0, place)
+            put(row, 3, times(axis, sign * inside[i]))
+            put(row, 6, (0.0, 0.0, 0.0))
 
 
-@njit(cache=True, error_model="numpy")
-def _sum_up(acting, carried, point, wrench):
-    """Write force and moment about a point of all that acts on what is carried."""
-    arm = np.empty(3)
-    wrench[:] = 0.0
+@lean
+def _sum_up(acting, carried, point):
+    """Force and moment about a point of all that acts on what is carried."""
+    force = moment = 0.0, 0.0, 0.0
     for i in range(len(acting)):
         if carried[i] != 0.0:
             row = acting[i]
-            for k in range(3):
-                arm[k] = row[k] - point[k]
-                wrench[k] += row[3 + k]
-                wrench[3 + k] += row[6 + k]
-            add_cross(wrench, 3, arm, 0, row, 3, 1.0)
+            arm = plus(three(row, 0), times(point, -1.0))
+            force, moment = plus(force, three(row, 3)), plus(moment, three(row, 6))
+            moment = plus(moment, cross(arm, three(row, 3)))
+    return force, moment
 
 
-@njit(cache=True, error_model="numpy")
-def _feel_point(joints, m, point, gravity, qdd, out):
-    """Write the acceleration of a point in the axes of what carries it."""
-    last, place, h, a, turning = int(point[JOINT]), np.empty(6), np.zeros(3), np.empty(3), np.zeros(3)
+@lean
+def _feel_point(joints, m, point, gravity, qdd):
+    """Acceleration of a point in the axes of what carries it."""
+    last = int(point[JOINT])
     own = m[last + 1]
-    turned(own, point, POINT_ARM, place, 3)
-    for k in range(3):
-        place[k], a[k] = own[PLACE + k] + place[3 + k], own[REST + k]
-    a[2] += gravity * point[WEIGHT]
-    add_cross(h, 0, own, OMEGA, place, 3, 1.0)
-    add_cross(a, 0, own, OMEGA, h, 0, 1.0)
-    add_cross(a, 0, own, TURN_REST, place, 3, 1.0)
-    _accelerate(joints, m, last, qdd, place, a, turning)
-    into(own, a, 0, out, 0)
+    arm = turned(own, three(point, POINT_ARM))
+    a = accelerated(own, arm, gravity * point[WEIGHT])
+    return into(own, _accelerate(joints, m, last, qdd, plus(three(own, PLACE), arm), a)[0], 0)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -149,47 +137,40 @@ def felt(numbers, every, states, guides, carried, points, own_axes, out):
     """
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, b, e, h, chassis = len(joints), len(bodies), len(elements), len(hubs), int(head[CHASSIS])
-    m, mass, sides, inside, travels = (
-        np.empty((n + 1, PER_MOTION)),
-        np.empty((n, n)),
-        np.empty((1, n)),
-        np.empty(e),
-        np.empty(e),
-    )
-    wrenches, moments, acting, wrench = np.empty((h, WRENCH)), np.empty(2), np.empty((b + h + 2 * e, 9)), np.empty(6)
-    per_time = head[PER_TIME]
+    m, mass, sides = np.empty((n + 1, PER_MOTION)), np.empty((n, n)), np.empty((1, n))
+    inside, travels, wrenches, moments = np.empty(e), np.empty(e), np.empty((h, WRENCH)), np.empty(2)
+    acting, per_time, gravity = np.empty((b + h + 2 * e, 9)), head[PER_TIME], head[GRAVITY]
     for i in range(len(states)):
         q, v, row = states[i, :n], states[i, n:], out[i]
         sides[:] = 0.0
         forces(numbers, i * every / per_time, q, v, m, sides[0], inside, wrenches, moments)
-        inertia(joints, bodies, m, head[GRAVITY], mass, sides[0])
+        inertia(joints, bodies, m, gravity, mass, sides[0])
         solve(mass, sides)
-        _move_bodies(joints, bodies, m, head[GRAVITY], sides[0], acting[:b])
+        _move_bodies(joints, bodies, m, gravity, sides[0], acting[:b])
         _load_hubs(head, hubs, m, wrenches, acting[b : b + h])
         _load_elements(elements, m, chassis, inside, acting[b + h :], travels)
         row[:e], row[e : 2 * e] = inside, travels
         at = 2 * e
         for k in range(6):
             row[at + k] = q[k]
-        into(m[ROLL + 1], m[ROLL + 1], OMEGA, row, at + 6)
+        put(row, at + 6, into(m[ROLL + 1], m[ROLL + 1], OMEGA))
         row[at + 9 : at + 11] = moments
         at += CHASSIS_ROW + MOMENTS
         for g in range(len(guides)):
             last = int(guides[g])
-            _sum_up(acting, carried[g], m[last + 1, PLACE:], wrench)
-            at = _written(m[last + 1 if own_axes else chassis + 1], wrench, row, at)
+            force, moment = _sum_up(acting, carried[g], three(m[last + 1], PLACE))
+            at = _written(m[last + 1 if own_axes else chassis + 1], force, moment, row, at)
         for g in range(h):
-            for k in range(6):
-                wrench[k] = -acting[b + g, 3 + k]
-            at = _written(m[int(hubs[g, LAST]) + 1 if own_axes else chassis + 1], wrench, row, at)
+            force, moment = times(three(acting[b + g], 3), -1.0), times(three(acting[b + g], 6), -1.0)
+            at = _written(m[int(hubs[g, LAST]) + 1 if own_axes else chassis + 1], force, moment, row, at)
         for g in range(len(points)):
-            _feel_point(joints, m, points[g], head[GRAVITY], sides[0], row[at:])
+            put(row, at, _feel_point(joints, m, points[g], gravity, sides[0]))
             at += POINT
 
 
-@njit(cache=True, error_model="numpy")
-def _written(own, wrench, row, at):
+@lean
+def _written(own, force, moment, row, at):
     """Write force and moment of space in the axes of a row of ``m``; where the next ones go."""
-    into(own, wrench, 0, row, at)
-    into(own, wrench, 3, row, at + 3)
+    put(row, at, into(own, force, 0))
+    put(row, at + 3, into(own, moment, 0))
     return at + WRENCH

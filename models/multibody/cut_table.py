@@ -1,12 +1,14 @@
 """The table that the compiled forces of a cut vehicle read: its bodies, springs and hubs, and the inputs over time."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.multibody import cut_kernel as kernel
 from models.vehicles.cut_vehicle import ROLL, CutVehicle
-from models.vehicles.spatial import FREEDOMS
+from models.vehicles.free_vehicle import anchor
+from models.vehicles.free_vehicle import joints as free_joints
+from models.vehicles.spatial import Vector
 
 
 @dataclass(frozen=True)
@@ -38,47 +40,32 @@ class Joints:
     """Where the bodies of a cut vehicle are joined, as numbers; ``last`` joint and its place (m) of every body."""
 
     rows: np.ndarray
-    last: dict[str, int] = field(default_factory=dict)
-    origin: dict[str, np.ndarray] = field(default_factory=dict)
+    last: dict[str, int]
+    origin: dict[str, Vector]
 
 
 def joints(vehicle: CutVehicle) -> Joints:
-    """Joints in the order of the coordinates; one that follows another of its own body lies where that one does."""
-    found, rows = Joints(np.empty(0)), []
-    for body in vehicle.tree.bodies:
-        last = found.last[body.parent] if body.parent else -1
-        origin = found.origin[body.parent] if body.parent else np.zeros(3)
-        for freedom in (freedom for freedom in FREEDOMS if freedom in body.freedoms):
-            k = FREEDOMS.index(freedom)
-            rows.append([last, k >= 3, k % 3, *np.subtract(body.position, origin)])
-            last, origin = len(rows) - 1, np.array(body.position)
-        found.last[body.name], found.origin[body.name] = last, origin
-    return Joints(np.array(rows, float), found.last, found.origin)
+    """Joints in the order of the coordinates; those of one body share the place of the first."""
+    kind, below, *arm = free_joints(vehicle.tree).T
+    anchors = {body.name: anchor(vehicle.tree, body.name) for body in vehicle.tree.bodies}
+    rows = np.column_stack([below, kind >= 3, kind % 3, *arm])
+    origin = {name: place for name, (_, place) in anchors.items()}
+    return Joints(rows, {name: joint for name, (joint, _) in anchors.items()}, origin)
 
 
 def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
     """All numbers for a run at a step (s)."""
     joined = joints(vehicle)
-    heavy = [body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)]
-    bodies = [
-        [
-            joined.last[body.name],
-            body.mass,
-            *np.subtract(body.position, joined.origin[body.name]),
-            *np.ravel(body.inertia),
-        ]
-        for body in heavy
-    ]
+    bodies = []
+    for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
+        arm = np.subtract(body.position, joined.origin[body.name])
+        bodies.append([joined.last[body.name], body.mass, *arm, *np.ravel(body.inertia)])
     elements = [_element(vehicle, joined, i) for i in range(len(vehicle.elements))]
     hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
     inputs = drive.hubs if drive.guide is None else np.hstack([drive.hubs, drive.guide])
     head = np.zeros(kernel.HEADER)
-    head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = (
-        len(joined.rows),
-        len(bodies),
-        len(elements),
-        len(hubs),
-    )
+    counts = [len(rows) for rows in (joined.rows, bodies, elements, hubs)]
+    head[[kernel.JOINTS, kernel.BODIES, kernel.ELEMENTS, kernel.HUBS]] = counts
     head[[kernel.ROAD, kernel.FRAME, kernel.SPEED]] = drive.road, kernel.FRAMES.index(drive.frame), drive.speed
     head[[kernel.PER_TIME, kernel.ROWS, kernel.COLUMNS]] = 2.0 / step, *inputs.shape
     head[[kernel.GRAVITY, kernel.CHASSIS, kernel.HOLDING]] = vehicle.tree.gravity, ROLL, drive.holding
@@ -93,7 +80,7 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
 
 def _element(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
     e = vehicle.elements[i]
-    one, two = e.point_one - joined.origin[e.one], e.point_two - joined.origin[e.two]
+    one, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
     design = float(e.axis @ (e.point_two - e.point_one))
     return [joined.last[e.one], *one, joined.last[e.two], *two, *e.axis, design, e.held, e.stiffness, e.damping]
 

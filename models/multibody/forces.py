@@ -1,4 +1,8 @@
-"""What the table of a free vehicle holds, and compiled forces on its wheels: tyres, and the torques on their spin.
+"""Compiled forces on every coordinate of a free vehicle: springs, bars, tyres, drag and the torques on its wheels.
+
+Weights and inertia are the engine's. A vehicle's numbers are one table of doubles, as ``numbers`` packs them: head,
+coordinates, points, spring-dampers and bars, tyres, controls, waves of the road, net of the patch, curves. What is
+worked out on the way lies on the stack: no array is made.
 
 The road is a height zeta(x, y) that stands still in space; with h how far a tyre's point has risen, a tyre's elastic
 force F0 + k_z (zeta - h) and its damping press along the road's normal, at the wheel's centre, as -dV/dq of the energy
@@ -13,18 +17,25 @@ import math
 
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.machine.compiled import lean
-from models.machine.stack import row
-from models.multibody.inputs import height
+from models.machine.stack import array, at, beyond, doubles, row, start
+from models.multibody.parts import press
 from models.multibody.tree import (
+    GROUND,
     PER_LINK,
     PER_SPOT,
+    PLACE,
     RATE,
+    SPEED,
     TURNING,
     TWISTED,
     WHERE,
     add,
     cross,
     dot,
+    inwards,
+    locate,
+    out,
+    outwards,
     plus,
     push,
     put,
@@ -32,7 +43,7 @@ from models.multibody.tree import (
     times,
     twist,
 )
-from models.tyre.bristles import FIRST
+from models.tyre.bristles import FIRST, tyre_forces
 
 (
     COUNT,
@@ -103,6 +114,35 @@ COSINE, SINE, X, Y, TO_FRONT, TO_LEFT, YAWING = range(7)
 
 
 @lean
+def control(numbers, first, which, count, t):
+    """Value and rate of a control at a time (s): at rest at every knot, by the smoothest step of degree 5 between."""
+    knots = numbers[first + 2 * which * count :]
+    if t <= knots[0]:
+        return knots[count], 0.0
+    for i in range(1, count):
+        if t < knots[i]:
+            span, rise = knots[i] - knots[i - 1], knots[count + i] - knots[count + i - 1]
+            u = (t - knots[i - 1]) / span
+            grown = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+            return knots[count + i - 1] + rise * grown, rise * 30.0 * (u * (1.0 - u)) ** 2 / span
+    return knots[2 * count - 1], 0.0
+
+
+@lean
+def height(waves, count, x, y):
+    """Height (m) of the road at a place (m) and its slopes along x and y: a sum of plane waves."""
+    z = along = across = 0.0
+    for i in range(0, 4 * count, 4):
+        phase = waves[i] * x + waves[i + 1] * y
+        cosine, sine = math.cos(phase), math.sin(phase)
+        z += waves[i + 2] * cosine + waves[i + 3] * sine
+        slope = waves[i + 3] * cosine - waves[i + 2] * sine
+        along += waves[i] * slope
+        across += waves[i + 1] * slope
+    return z, along, across
+
+
+@lean
 def _axle(steer, inclined):
     """Axis of a wheel that is steered and leans, to its left."""
     cosine, sine, level, lean_of = 1.0, 0.0, 1.0, 0.0
@@ -149,12 +189,8 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
     slide[0], slide[1], slide[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
     slide[3] = -spin * dot(cross(axle, down), along)
     pressing = load * long
-    contact[A], contact[B], contact[LOAD], contact[MU] = (
-        math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]),
-        tyre[HALF_WIDTH],
-        pressing,
-        tyre[GRIP],
-    )
+    contact[A], contact[B] = math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH]
+    contact[LOAD], contact[MU] = pressing, tyre[GRIP]
     contact[FIRST] = contact[FIRST + 1] = contact[FIRST + 2] = 1.0 / tyre[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer
     report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slide[0], slide[1], slide[2], slide[3]
@@ -171,18 +207,12 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
 @lean
 def creep(tyre, found, way, chassis, f, tree, report):
     """Forces ``found`` of one tyre's contact, and its load, onto its wheel; the moment about the axle onto its spin."""
-    own, rotor, ground, centre, axle = (
-        row(tree[0], PER_LINK, int(tyre[KNUCKLE])),
-        int(tyre[ROTOR]),
-        tree[2],
-        three(way, CENTRE),
-        three(way, AXLE),
-    )
+    own, rotor, axle = row(tree[0], PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
     force = plus(times(three(way, ROLLING), found[0]), times(three(way, ACROSS), found[1]))
     turning = times(three(way, NORMAL), found[2])
     moment = plus(cross(three(way, DOWN), force), turning)
-    push(own, ground, plus(force, three(way, LOADING)), centre)
-    twist(own, ground, moment)
+    push(own, tree[2], plus(force, three(way, LOADING)), three(way, CENTRE))
+    twist(own, tree[2], moment)
     torque = dot(axle, moment)
     if rotor >= 0:
         f[rotor] += torque
@@ -214,3 +244,146 @@ def _hold(torque, axle, own, carrying):
     """A torque about the axle from what carries the wheel to the chassis."""
     add(own, TWISTED, times(axle, -torque))
     add(carrying, TWISTED, times(axle, torque))
+
+
+@lean
+def room(head):
+    """How many doubles of room a vehicle's tree needs."""
+    return PER_LINK * int(head[JOINTS]) + PER_SPOT * int(head[POINTS]) + GROUND
+
+
+@lean
+def enter(numbers, q, v, f, room, ledger):
+    """Add the forces of all parts to ``f`` or to the tree. Returns the carrier's frame and the tree, in the ``room``.
+
+    numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; room : pointer to as many doubles as needed.
+    """
+    n, points, table = int(numbers[JOINTS]), int(numbers[POINTS]), start(numbers)
+    spots = beyond(room, PER_LINK * n)
+    ground = array(beyond(spots, PER_SPOT * points), (GROUND,))
+    ground[0] = ground[1] = ground[2] = 0.0
+    outwards(beyond(table, HEADER), n, q, v, room)
+    locate(beyond(table, int(numbers[OF_POINTS])), points, room, spots)
+    for i in range(LEDGER):
+        ledger[i] = 0.0
+    ledger[POTENTIAL], ledger[DISSIPATED] = press(table, int(numbers[OF_PARTS]), int(numbers[PARTS]), spots, q, v, f)
+    cosine, sine = math.cos(q[2]), math.sin(q[2])
+    frame = cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
+    return frame, (room, spots, ground)
+
+
+@lean
+def leave(numbers, frame, tree, f, ledger):
+    """Drag, and all that was gathered in the tree, added to ``f`` and ledger."""
+    table = start(numbers)
+    if numbers[DRAG] != 0.0:
+        _drag(numbers, frame, tree, ledger)
+    inwards(
+        beyond(table, HEADER),
+        int(numbers[JOINTS]),
+        beyond(table, int(numbers[OF_POINTS])),
+        int(numbers[POINTS]),
+        tree,
+        f,
+    )
+    ahead, aside, turn = tree[2]
+    f[0] += frame[0] * ahead - frame[1] * aside
+    f[1] += frame[1] * ahead + frame[0] * aside
+    f[2] += turn
+
+
+@lean
+def _drag(numbers, frame, tree, ledger):
+    """Drag at the chassis' centre, against its motion along the vehicle."""
+    own = row(tree[0], PER_LINK, int(numbers[CHASSIS]))
+    place = plus(three(own, PLACE), out(own, numbers, DRAG_X))
+    ahead = (plus(three(own, SPEED), cross(three(own, TURNING), place)))[0] + frame[4] - frame[6] * place[1]
+    force = -numbers[DRAG] * abs(ahead) * ahead
+    ledger[DISSIPATED] += force * ahead
+    push(own, tree[2], (force, 0.0, 0.0), place)
+
+
+@lean
+def _push_from_outside(numbers, t, frame, tree, ledger):
+    """Pushes, which keep to where the vehicle heads."""
+    controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
+    count = int(numbers[controls - 1])
+    for i in range(count):
+        of = row(beyond(table, controls - 1 - PER_PUSH * count), PER_PUSH, i)
+        own = row(tree[0], PER_LINK, int(of[PUSHED_BY]))
+        force = times(three(of, PUSH_AXIS), control(numbers, controls, FIRST_PUSH + i, knots, t)[0])
+        place = plus(three(own, PLACE), out(own, of, PUSHED_AT))
+        passing = (frame[TO_FRONT] - frame[YAWING] * place[1], frame[TO_LEFT] + frame[YAWING] * place[0], 0.0)
+        speed = plus(plus(three(own, SPEED), cross(three(own, TURNING), place)), passing)
+        ledger[DISSIPATED] += dot(force, speed)
+        push(own, tree[2], force, place)
+
+
+@lean
+def all_forces(numbers, t, q, v, f, report, ledger):
+    """Add the forces (N, N m) on all coordinates to ``f``; all are arrays, report (tyres, REPORTED), ledger (LEDGER,).
+
+    t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
+    """
+    w, chassis, knots, table = int(numbers[TYRES]), int(numbers[CHASSIS]), int(numbers[KNOTS]), start(numbers)
+    frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
+    steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
+    braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
+    driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
+    contacts, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
+    slides, found = array(doubles(4 * w), (w, 4)), array(doubles(4 * w), (w, 4))
+    tyres, waves = beyond(table, int(numbers[OF_TYRES])), numbers[int(numbers[OF_WAVES]) :]
+    for i in range(w):
+        tyre = row(tyres, PER_TYRE, i)
+        touch(
+            tyre,
+            waves,
+            int(numbers[WAVES]),
+            tyre[STEERED] * steer,
+            tyre[STEERED] * steering,
+            v,
+            chassis,
+            frame,
+            tree,
+            contacts[i],
+            slides[i],
+            row(ways, WAY, i),
+            ledger,
+            report[i],
+        )
+    cells = array(beyond(table, int(numbers[OF_CELLS])), (5, int(numbers[CELLS])))
+    strips = array(beyond(table, int(numbers[OF_STRIPS])), (4, int(numbers[STRIPS])))
+    tyre_forces(contacts, slides, strips, cells, numbers[MIDDLE], found)
+    for i in range(w):
+        tyre, way = row(tyres, PER_TYRE, i), row(ways, WAY, i)
+        creep(tyre, found[i], way, chassis, f, tree, report[i])
+        turn_wheel(tyre, braking, driving, v, three(way, AXLE), chassis, f, tree, ledger, report[i])
+        ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
+    _push_from_outside(numbers, t, frame, tree, ledger)
+    leave(numbers, frame, tree, f, ledger)
+
+
+@lean
+def forces(numbers, t, q, v, f):
+    """Add the forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
+    head = array(numbers, (HEADER,))
+    n, w = int(head[JOINTS]), int(head[TYRES])
+    report, ledger = array(doubles(REPORTED * w), (w, REPORTED)), array(doubles(LEDGER), (LEDGER,))
+    all_forces(array(numbers, (int(head[COUNT]),)), t, array(q, (n,)), array(v, (n,)), array(f, (n,)), report, ledger)
+
+
+@lean
+def set_forces(block, t, n):
+    """``forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
+    f = at(block)
+    array(f, (n,))[:] = 0.0
+    forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
+
+
+@lean
+def reports(numbers, times, q, v, found, ledgers):
+    """Fill reports (m, tyres, REPORTED) and ledgers (m, LEDGER) of states (m, n) at ``times`` (m,)."""
+    f = array(doubles(q.shape[1]), (q.shape[1],))
+    f[:] = 0.0
+    for i in range(len(times)):
+        all_forces(numbers, times[i], q[i], v[i], f, found[i], ledgers[i])

@@ -10,9 +10,8 @@ from models.multibody import forces as at
 from models.multibody import tree
 from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART
 from models.tyre.bristles import net, shape_factor
-from models.vehicles.curve import Curve
 from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
-from models.vehicles.spatial import SpatialVehicle, Vector
+from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import Preloads, preloads
 
 Control = tuple[tuple[float, float], ...]
@@ -91,12 +90,17 @@ class Handling:
         free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), own.spin_inertia, own.fixed)
         object.__setattr__(self, "vehicle", free)
         object.__setattr__(self, "held", preloads(free))
-        object.__setattr__(self, "numbers", _table(self))
+        object.__setattr__(self, "numbers", table(self))
 
     @property
     def gravity(self) -> np.ndarray:
         """(3,) m/s^2 in the axes of the road."""
         return GRAVITY * np.array([-np.sin(self.slope), 0.0, -np.cos(self.slope)])
+
+    def tyre_numbers(self, i: int) -> np.ndarray:
+        """Numbers (PER_TYRE,) of a tyre in the table: what is written there holds from then on."""
+        first = int(self.numbers[at.OF_TYRES]) + at.PER_TYRE * i
+        return self.numbers[first : first + at.PER_TYRE]
 
     def changed(self, **changes: object) -> "Handling":
         """The same with other fields."""
@@ -113,7 +117,7 @@ class Handling:
         return np.zeros(len(places)), v
 
 
-def _table(own: Handling) -> np.ndarray:
+def table(own: Handling) -> np.ndarray:
     """All numbers, in the order that ``forces`` names."""
     free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
     parts = [*_springs(own, points), *_bars(own, points)]

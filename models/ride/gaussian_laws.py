@@ -11,8 +11,7 @@ the normal density and distribution; for dry friction, which has no corners, an 
 import numpy as np
 from scipy.special import ndtr
 
-from models.vehicles.curve import Curve
-from models.vehicles.spatial import SpringDamper
+from models.vehicles.spatial import Curve, SpringDamper
 
 NODES = np.linspace(-1.0, 1.0, 801)
 """Of the trapezoidal rule, which converges geometrically for smooth integrands that vanish at both ends."""

@@ -15,11 +15,9 @@ from models.ride.copies_kernel import POWERS, Laws, march
 from models.ride.road_path import check_rates, road_path
 from models.ride.statistical_linearisation import bent, statistically_linear
 from models.road.excitation import Excitation
-from models.vehicles.curve import Curve
-from models.vehicles.kinematics import Kinematics
 from models.vehicles.linear_vehicle import LinearVehicle, poles
-from models.vehicles.spatial import PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
-from models.vehicles.spatial_linear import Gains, linearise, preloads
+from models.vehicles.spatial import Curve, PartOutput, SpatialOutput, SpatialVehicle, SpringDamper, Tyre, TyreOutput
+from models.vehicles.spatial_linear import Gains, Kinematics, linearise, preloads
 
 REACH, STEEPEST = 0.25, 0.5
 """Step times the fastest rate, at most: of the replaced vehicle, and of the one with its springs as steep as they get.

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
-from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper
+from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import preloads
 
 GRAVITY = 9.81
@@ -77,48 +77,26 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     _check(vehicle, chassis)
     whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
     held = preloads(whole)
-    springs = [_spring(spring, held.parts[spring.name]) for spring in whole.springs]
-    bars = [
-        Element(
-            bar.name,
-            bar.left,
-            bar.right,
-            np.array(bar.point_left),
-            np.array(bar.point_right),
-            np.array([0.0, 0.0, 1.0 / bar.track]),
-            bar.stiffness,
-            bar.damping,
-            held.parts[bar.name],
-        )
-        for bar in whole.bars
-    ]
+
+    def element(part: SpringDamper | AntiRollBar, one: str, two: str, *places: Vector) -> Element:
+        first, second, axis = map(np.array, places)
+        force = held.parts[part.name]
+        return Element(part.name, one, two, first, second, axis, part.stiffness, part.damping, force)
+
+    springs = (element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis) for s in whole.springs)
+    bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in whole.bars)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
     return CutVehicle(chassis, _tree(whole, chassis), whole, (*springs, *bars), loads)
 
 
-def _spring(s: SpringDamper, held: float) -> Element:
-    assert s.two is not None
-    return Element(
-        s.name,
-        s.one,
-        s.two,
-        np.array(s.point_one),
-        np.array(s.point_two),
-        np.array(s.axis),
-        s.stiffness,
-        s.damping,
-        held,
-    )
-
-
 def _tree(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:
     """Heading and pitch on carriers without mass, roll on the chassis, all others behind it."""
-    own = vehicle.body(chassis)
+    body = vehicle.body(chassis)
     carriers = (
-        Body(f"{chassis} heading", 0.0, own.position, ("x", "y", "z", "rz")),
-        Body(f"{chassis} pitch", 0.0, own.position, ("ry",), parent=f"{chassis} heading"),
+        Body(f"{chassis} heading", 0.0, body.position, ("x", "y", "z", "rz")),
+        Body(f"{chassis} pitch", 0.0, body.position, ("ry",), parent=f"{chassis} heading"),
     )
-    turned = replace(own, freedoms=("rx",), parent=f"{chassis} pitch")
+    turned = replace(body, freedoms=("rx",), parent=f"{chassis} pitch")
     others = tuple(body for body in vehicle.bodies if body.name != chassis)
     return SpatialVehicle(vehicle.name, (*carriers, turned, *others), (), (), vehicle.axles, gravity=vehicle.gravity)
 
@@ -127,12 +105,12 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
     names = tuple(body.name for body in vehicle.bodies)
     if chassis not in names:
         raise InputError(vehicle.name, "chassis", chassis, "no such body", names)
-    own = vehicle.body(chassis)
-    if len(own.freedoms) != 6 or own.parent is not None:
+    body = vehicle.body(chassis)
+    if len(body.freedoms) != 6 or body.parent is not None:
         raise InputError(
             vehicle.name,
             f"bodies[{chassis}].freedoms",
-            own.freedoms,
+            body.freedoms,
             "what is left of a vehicle without tyres is free: its chassis needs x, y, z, rx, ry and rz",
         )
     for spring in vehicle.springs:
@@ -151,3 +129,64 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
             raise InputError(vehicle.name, place, bar.body, "must be the chassis", (chassis,))
     if not vehicle.tyres:
         raise InputError(vehicle.name, "tyres", None, "there is nothing to cut: no tyre")
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """The cut vehicle as one rigid body: what its drift follows when its springs have settled.
+
+    mass (kg), centre (3,) in the design position (m), inertia (3, 3) about it (kg m^2), arms (h, 3) of the hubs.
+
+    Forces and moments of white noise at the hubs turn the vehicle as a double integral, var = q t^3 / 3, with q =
+    period I^-1 C I^-1 of the covariance C of the moment samples about the common centre of mass. What turns by phi
+    carries body-fixed forces with it, but not gravity: the vehicle slides off by g times the tilt, a double integral of
+    a double integral, var = g^2 q t^7 / 252. Forces that are given in the space do not turn, and there is no such
+    error; but what carries the vehicle from below its centre of mass then topples it, as an upright pendulum, with the
+    rates sqrt(m g h / I) of roll and pitch, h the height of the centre above the hubs.
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    arms: np.ndarray
+
+    def moments(self, wrenches: np.ndarray) -> np.ndarray:
+        """Moments (m, 3) about the centre, N m, of wrenches (m, 6 h) in the chassis' axes."""
+        parts = wrenches.reshape(len(wrenches), -1, 6)
+        return (np.cross(self.arms, parts[:, :, :3]) + parts[:, :, 3:]).sum(axis=1)
+
+    def turning(self, deviation: np.ndarray) -> np.ndarray:
+        """Covariance (3, 3) of the angular accelerations, rad^2/s^4, that samples of noise (6 h,), N and N m, make."""
+        rows = self.moments(np.eye(len(deviation)))
+        inverse = np.linalg.inv(self.inertia)
+        return inverse @ (rows.T * deviation**2) @ rows @ inverse
+
+    def toppling(self) -> np.ndarray:
+        """Growth rates (2,) of roll and pitch, 1/s, under forces that keep their directions in the space."""
+        loads = -self.arms[:, 2].mean() * self.mass * GRAVITY
+        return np.sqrt(np.maximum(loads, 0.0) / np.diag(self.inertia)[:2])
+
+    def angle_variance(self, deviation: np.ndarray, period: float, times: np.ndarray) -> np.ndarray:
+        """Variances (m, 3) of roll, pitch, heading (rad^2) at times (m,) from rest."""
+        return np.outer(times**3 / 3, period * np.diag(self.turning(deviation)))
+
+    def position_variance(self, deviation: np.ndarray, period: float, times: np.ndarray, frame: str) -> np.ndarray:
+        """Variances (m, 3) of x, y, z (m^2) at times (m,) from rest, forces in a frame."""
+        force = period * (deviation.reshape(-1, 6)[:, :3] ** 2).sum(axis=0) / self.mass**2
+        variances = np.outer(times**3 / 3, force)
+        if frame != "inertial":
+            turning = period * np.diag(self.turning(deviation))
+            variances[:, :2] += GRAVITY**2 * np.outer(times**7 / 252, turning[[1, 0]])
+        return variances
+
+
+def rigid(vehicle: CutVehicle) -> Rigid:
+    """All bodies in the design position as one."""
+    bodies = vehicle.whole.bodies
+    mass = sum(body.mass for body in bodies)
+    centre = np.array([body.mass * np.array(body.position) for body in bodies]).sum(axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for body in bodies:
+        arm = np.subtract(body.position, centre)
+        inertia += np.array(body.inertia) + steiner(body.mass, arm)
+    return Rigid(mass, centre, inertia, np.array([tyre.point for tyre in vehicle.whole.tyres]) - centre)

@@ -13,9 +13,8 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.vehicles.kinematics import Kinematics
 from models.vehicles.spatial import Body, SpatialVehicle, SpringDamper, Tyre
-from models.vehicles.spatial_linear import mass, preloads, slopes_at_rest
+from models.vehicles.spatial_linear import Kinematics, mass, preloads, slopes_at_rest, static_stiffness
 
 GRAVITY = 9.81
 MASS = 30.0, 60e3
@@ -307,7 +306,7 @@ def _frequencies(whole: Whole) -> Iterator[Finding]:
 def _sunk(whole: Whole) -> float:
     """How far (m) the carried body sinks under the weights, springs and tyres together."""
     vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
-    stiffness = _stiffness(vehicle, motion)
+    stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     moved = np.linalg.lstsq(stiffness, np.asarray(weights), rcond=1e-12)[0]
     return float(motion.shift(whole.carried.name, whole.carried.position)[2] @ moved)
@@ -319,20 +318,8 @@ def _hop(whole: Whole, wheel: str) -> float | None:
     row = motion.coordinate(wheel, "z")
     if not row.any() or wheel == whole.carried.name:
         return None
-    return float(np.sqrt((row @ _stiffness(vehicle, motion) @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
-
-
-def _stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
-    """Of springs and tyres, at rest and without gravity; bars carry no weight."""
-    total = np.zeros((motion.size, motion.size))
-    for spring in vehicle.springs:
-        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-        row = np.array(spring.axis) @ apart
-        total += slopes_at_rest(spring)[0] * np.outer(row, row)
-    for tyre in vehicle.tyres:
-        row = motion.shift(tyre.body, tyre.point)[2]
-        total += tyre.stiffness * np.outer(row, row)
-    return total
+    stiffness = static_stiffness(replace(vehicle, bars=()), motion)
+    return float(np.sqrt((row @ stiffness @ row) / (row @ mass(vehicle) @ row)) / (2 * np.pi))
 
 
 def _dampers(whole: Whole) -> Iterator[Finding]:

@@ -5,11 +5,13 @@ lies in the **design position**, all coordinates zero, in which every body is pa
 exact, not linearised; "along a" always means along a direction fixed in space.
 """
 
+from bisect import bisect_right
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
-from models.vehicles.curve import Curve
-from models.vehicles.limits import NONE, Limits
+import numpy as np
 
 Vector = tuple[float, float, float]
 Freedom = Literal["x", "y", "z", "rx", "ry", "rz"]
@@ -37,6 +39,44 @@ class Body:
     freedoms: tuple[Freedom, ...]
     inertia: tuple[Vector, Vector, Vector] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     parent: str | None = None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Force (N) over travel (m) or over its rate (m/s): straight between points, the outer pieces go on beyond.
+
+    ``arguments`` rise strictly, at least two; the curve passes through (0, 0), so that it changes no equilibrium.
+    """
+
+    arguments: tuple[float, ...]
+    forces: tuple[float, ...]
+
+    def __call__(self, argument: float) -> float:
+        """Force (N) at a travel or rate."""
+        i = self._piece(argument)
+        return self.forces[i] + self._slopes[i] * (argument - self.arguments[i])
+
+    def slope_at_rest(self) -> float:
+        """Slope at 0; in a corner the mean of its two sides, which is what a central difference sees."""
+        slopes, at = self._slopes, self._piece(0.0)
+        if self.arguments[at] == 0.0 and at > 0:
+            return 0.5 * (slopes[at - 1] + slopes[at])
+        return slopes[at]
+
+    def hinges(self) -> tuple[float, float, tuple[float, ...], tuple[float, ...]]:
+        """Offset (N), first slope, corners and bends of force = offset + slope x + sum of bend max(x - corner, 0)."""
+        slopes, x = self._slopes, self.arguments
+        bends = tuple(after - before for before, after in pairwise(slopes))
+        return self.forces[0] - slopes[0] * x[0], slopes[0], x[1:-1], bends
+
+    @cached_property
+    def _slopes(self) -> list[float]:
+        x, f = self.arguments, self.forces
+        return [(f[i + 1] - f[i]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
+
+    def _piece(self, argument: float) -> int:
+        """Index of the piece that holds the argument, the outer ones for all beyond."""
+        return bisect_right(self.arguments, argument, 1, len(self.arguments) - 1) - 1
 
 
 @dataclass(frozen=True)
@@ -191,6 +231,25 @@ class TyreOutput:
     tyre: str
 
 
+@dataclass(frozen=True)
+class Limits:
+    """What a reduced vehicle is the limit of, for small motion only.
+
+    Names of ``massless`` bodies and ``rigid`` springs, and ``locked`` freedoms as (body, freedom). Rigid springs and
+    locked freedoms leave q = N r with fewer coordinates r; bodies without mass leave a mass matrix that may be singular
+    (see ``models.ride.excited``): nothing is taken to a limit with large numbers.
+    """
+
+    massless: frozenset[str] = frozenset()
+    rigid: frozenset[str] = frozenset()
+    locked: frozenset[tuple[str, Freedom]] = frozenset()
+
+    def __bool__(self) -> bool:
+        return bool(self.massless or self.rigid or self.locked)
+
+
+NONE = Limits()
+
 SpatialOutput = PointOutput | TurnOutput | PartOutput | TyreOutput
 
 
@@ -238,4 +297,9 @@ class SpatialVehicle:
 
     def turns(self, name: str | None) -> bool:
         """Whether a body may turn, by a freedom of its own or of what it rides on."""
-        return any(freedom.startswith("r") for one in self.chain(name) for freedom in self.body(one).freedoms)
+        return any(freedom.startswith("r") for body in self.chain(name) for freedom in self.body(body).freedoms)
+
+
+def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3) of a point mass at an arm (3,), kg m^2."""
+    return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))

@@ -1,27 +1,94 @@
 """M, D, K, road columns and outputs of a described vehicle, written down for small motion about its design position."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import null_space
 
 from models.core.errors import InputError
-from models.vehicles.kinematics import Kinematics
-from models.vehicles.limits import limited
 from models.vehicles.linear_vehicle import LinearVehicle, Output, Wheel
 from models.vehicles.spatial import (
+    FREEDOMS,
     AntiRollBar,
+    Body,
+    Limits,
     PartOutput,
     PointOutput,
     SpatialOutput,
     SpatialVehicle,
     SpringDamper,
     TurnOutput,
-    TyreOutput,
+    Vector,
 )
 
+NOTHING = 1e-10
+"""Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
+
+
+UNIT = np.eye(3)
+TURN = np.array([np.cross(unit, UNIT).T for unit in UNIT])
+"""(3, 3, 3): e_i x v = TURN[i] @ v."""
+
+
+class Kinematics:
+    """Where the points of a vehicle go when its coordinates are small: exact to second order.
+
+    A body moves by its own coordinates after those of the bodies it rides on, so that an outer turn also turns every
+    inner motion: d2p / dq_a dq_b = e_a x dp/dq_b for an outer (or the same) turn a about e_a, 0 for an outer shift.
+    """
+
+    def __init__(self, vehicle: SpatialVehicle) -> None:
+        self._bodies = {body.name: body for body in vehicle.bodies}
+        self._index = {coordinate: i for i, coordinate in enumerate(vehicle.coordinates())}
+        self.size = len(self._index)
+
+    def coordinate(self, body: str, freedom: str) -> np.ndarray:
+        """Row (n,) that picks one coordinate out of q, zeros where the body does not have it."""
+        row = np.zeros(self.size)
+        if (body, freedom) in self._index:
+            row[self._index[body, freedom]] = 1.0  # type: ignore[index]
+        return row
+
+    def shift(self, body: str | None, point: Vector) -> np.ndarray:
+        """(3, n): displacement of a point (m) by the coordinates; zeros on the ground, None."""
+        columns = np.zeros((3, self.size))
+        for rider, freedom, i in self._motions(body):
+            along = FREEDOMS.index(freedom)
+            columns[:, i] = UNIT[along] if along < 3 else TURN[along - 3] @ np.subtract(point, rider.position)
+        return columns
+
+    def turn(self, body: str) -> np.ndarray:
+        """(3, n): small rotation of a body (rad) by the coordinates."""
+        columns = np.zeros((3, self.size))
+        for _, freedom, i in self._motions(body):
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
+                columns[:, i] = UNIT[along - 3]
+        return columns
+
+    def bend(self, body: str | None, point: Vector) -> np.ndarray:
+        """(3, n, n): second derivatives of a point (m) by the coordinates."""
+        first = self.shift(body, point)
+        second = np.zeros((3, self.size, self.size))
+        motions = self._motions(body)
+        for k, (_, freedom, outer) in enumerate(motions):
+            along = FREEDOMS.index(freedom)
+            if along >= 3:
+                for _, _, inner in motions[k:]:
+                    second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
+        return second
+
+    def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
+        """Coordinates that move a body, from the ground outwards: (the body that has it, freedom, index)."""
+        if body is None:
+            return []
+        rider = self._bodies[body]
+        coordinates = [(rider, f, self._index[rider.name, f]) for f in FREEDOMS if f in rider.freedoms]
+        return self._motions(rider.parent) + coordinates
 
 
 def linearise(
@@ -35,7 +102,7 @@ def linearise(
     rest, as statistical linearisation finds them; InputError for a name that no spring has.
     """
     motion = Kinematics(vehicle)
-    gains = {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+    gains = _gains(vehicle)
     for name in set(equivalent or {}) - set(gains):
         raise InputError(vehicle.name, "equivalent", name, "no such spring", tuple(gains))
     gains |= equivalent or {}
@@ -69,8 +136,7 @@ def outputs(
     vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains] | None = None
 ) -> tuple[Output, ...]:
     """Rows of all outputs, from the ``motion`` of points (an engine's own, too) and the springs' slopes at rest."""
-    own = gains or {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
-    parts, tyres = _parts(vehicle, motion, own), _tyres(vehicle, motion)
+    parts, tyres = _parts(vehicle, motion, gains or _gains(vehicle)), _tyres(vehicle, motion)
     return tuple(_output(spec, vehicle, motion, parts, tyres) for spec in vehicle.outputs)
 
 
@@ -108,10 +174,9 @@ def preloads(vehicle: SpatialVehicle) -> Preloads:
     and would have to pull.
     """
     motion = Kinematics(vehicle)
-    parts = _parts(vehicle, motion, {spring.name: slopes_at_rest(spring) for spring in vehicle.springs})
-    tyres = _tyres(vehicle, motion)
-    stiffness = sum(k * np.outer(row, row) for row, k, _ in (*parts.values(), *tyres.values()))
-    weight = sum(body.mass * vehicle.gravity * _height(motion, body.name, body.position) for body in vehicle.bodies)
+    parts, tyres = _parts(vehicle, motion, _gains(vehicle)), _tyres(vehicle, motion)
+    stiffness = static_stiffness(vehicle, motion)
+    weight = sum(body.mass * vehicle.gravity * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)
     sunk = -np.linalg.lstsq(stiffness, weight, rcond=1e-12)[0]
     left = np.abs(stiffness @ sunk + weight)
     if left.max() > 1e-8 * np.abs(weight).max():
@@ -133,28 +198,32 @@ Part = tuple[np.ndarray, float, float]
 """Row (n,) of a deformation by the coordinates, stiffness, damping."""
 
 
+def _gains(vehicle: SpatialVehicle) -> dict[str, Gains]:
+    return {spring.name: slopes_at_rest(spring) for spring in vehicle.springs}
+
+
 def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gains]) -> dict[str, Part]:
     """Spring-dampers and bars by name."""
-    springs = {spring.name: (_travel(motion, spring), *gains[spring.name]) for spring in vehicle.springs}
-    return springs | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
-
-
-def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
-    return {t.name: (_height(motion, t.body, t.point), t.stiffness, t.damping) for t in vehicle.tyres}
-
-
-def _height(motion: Kinematics, body: str, point: tuple[float, float, float]) -> np.ndarray:
-    return motion.shift(body, point)[2]
-
-
-def _travel(motion: Kinematics, spring: SpringDamper) -> np.ndarray:
-    apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-    return np.array(spring.axis) @ apart
+    rows = dict[str, Part]()
+    for spring in vehicle.springs:
+        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+        rows[spring.name] = np.array(spring.axis) @ apart, *gains[spring.name]
+    return rows | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
 
 
 def _twist(motion: Kinematics, bar: AntiRollBar) -> np.ndarray:
-    risen = _height(motion, bar.left, bar.point_left) - _height(motion, bar.right, bar.point_right)
+    risen = motion.shift(bar.left, bar.point_left)[2] - motion.shift(bar.right, bar.point_right)[2]
     return motion.coordinate(bar.body, "rx") - risen / bar.track
+
+
+def _tyres(vehicle: SpatialVehicle, motion: Kinematics) -> dict[str, Part]:
+    return {t.name: (motion.shift(t.body, t.point)[2], t.stiffness, t.damping) for t in vehicle.tyres}
+
+
+def static_stiffness(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
+    """Stiffness (n, n) of springs, bars and tyres at rest, without gravity: N/m, N, N m."""
+    parts = (*_parts(vehicle, motion, _gains(vehicle)).values(), *_tyres(vehicle, motion).values())
+    return np.asarray(sum(k * np.outer(row, row) for row, k, _ in parts))
 
 
 def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
@@ -210,15 +279,6 @@ UNITS = {
 }
 """Unit of each kind of output; of an anti-roll bar rad, rad/s and N m."""
 
-_ORDER = {
-    "acceleration": 2,
-    "velocity": 1,
-    "displacement": 0,
-    "angular acceleration": 2,
-    "angular velocity": 1,
-    "angle": 0,
-}
-
 
 def _output(
     spec: SpatialOutput,
@@ -230,28 +290,65 @@ def _output(
     """Rows of one output."""
     rows = np.zeros((3, motion.size))  # of q, q', q''
     road = np.zeros((2, len(vehicle.tyres)))  # of z, z'
-    unit = UNITS[spec.kind]
+    unit, order = UNITS[spec.kind], 2 if "acceleration" in spec.kind else int("velocity" in spec.kind)
     if isinstance(spec, PointOutput):
-        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
+        rows[order] = np.array(spec.axis) @ motion.shift(spec.body, spec.point)
     elif isinstance(spec, TurnOutput):
-        rows[_ORDER[spec.kind]] = np.array(spec.axis) @ motion.turn(spec.body)
+        rows[order] = np.array(spec.axis) @ motion.turn(spec.body)
     elif isinstance(spec, PartOutput):
-        _part_rows(spec, parts[spec.part], rows)
+        row, *force_gains = parts[spec.part]
+        gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": force_gains}[spec.kind]
+        rows[:2] = np.outer(gains, row)
         if any(bar.name == spec.part for bar in vehicle.bars):
             unit = {"m": "rad", "m/s": "rad/s", "N": "N m"}[unit]
     else:
-        _tyre_rows(spec, tyres[spec.tyre], rows, road[:, list(tyres).index(spec.tyre)])
+        row, *force_gains = tyres[spec.tyre]
+        gains = {"tyre force": force_gains, "tyre deflection": (1.0, 0.0)}[spec.kind]
+        rows[:2], road[:, list(tyres).index(spec.tyre)] = -np.outer(gains, row), gains
     return Output(spec.name, unit, spec.kind, rows[2], rows[1], rows[0], road[0], road[1])
 
 
-def _part_rows(spec: PartOutput, part: Part, rows: np.ndarray) -> None:
-    row, k, c = part
-    gains = {"travel": (1.0, 0.0), "travel rate": (0.0, 1.0), "force": (k, c)}[spec.kind]
-    rows[:2] = np.outer(gains, row)
+def limited(linear: LinearVehicle, vehicle: SpatialVehicle, limits: Limits) -> tuple[LinearVehicle, np.ndarray]:
+    """M, D, K and outputs in what coordinates are left, and N (n, r) with q = N r; M may be singular.
+
+    linear : the vehicle without limits. InputError where nothing is left that could move.
+    """
+    M, N = massless(linear.mass, vehicle, limits.massless), _free(vehicle, limits)
+    if not N.size:
+        raise InputError("", "effects", None, "nothing is left that could move")
+    outputs = tuple(
+        replace(o, acceleration=o.acceleration @ N, rate=o.rate @ N, displacement=o.displacement @ N)
+        for o in linear.outputs
+    )
+    return replace(
+        linear,
+        mass=N.T @ M @ N,
+        damping=N.T @ linear.damping @ N,
+        stiffness=N.T @ linear.stiffness @ N,
+        road_stiffness=N.T @ linear.road_stiffness,
+        road_damping=N.T @ linear.road_damping,
+        coordinates=tuple(("", str(i)) for i in range(N.shape[1])),
+        outputs=outputs,
+    ), N
 
 
-def _tyre_rows(spec: TyreOutput, part: Part, rows: np.ndarray, road: np.ndarray) -> None:
-    row, k, c = part
-    gains = {"tyre force": (k, c), "tyre deflection": (1.0, 0.0)}[spec.kind]
-    rows[:2] = -np.outer(gains, row)
-    road[:] = gains
+def massless(matrix: np.ndarray, vehicle: SpatialVehicle, names: frozenset[str]) -> np.ndarray:
+    """The mass matrix (n, n) less that of these bodies; rounding leaves no trace of them."""
+    if not names:
+        return matrix
+    light = tuple(
+        replace(body, mass=0.0, inertia=((0.0,) * 3,) * 3) if body.name in names else body for body in vehicle.bodies
+    )
+    return mass(replace(vehicle, bodies=light))
+
+
+def _free(vehicle: SpatialVehicle, limits: Limits) -> np.ndarray:
+    """N (n, r): single coordinates where nothing but locks holds them, else a basis of what the rigid springs leave."""
+    coordinates, motion = vehicle.coordinates(), Kinematics(vehicle)
+    kept = np.eye(len(coordinates))[:, [c not in limits.locked for c in coordinates]]
+    rows = [
+        np.array(s.axis) @ (motion.shift(s.two, s.point_two) - motion.shift(s.one, s.point_one)) @ kept
+        for s in vehicle.springs
+        if s.name in limits.rigid
+    ]
+    return kept @ null_space(np.array(rows), rcond=NOTHING) if rows else kept

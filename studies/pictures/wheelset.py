@@ -51,7 +51,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
 
 def _exudyn(own: Any, joints: np.ndarray) -> Poses:
     """Poses by a marker in the middle of the axle: the last link of the first object."""
-    from models.engines.spatial_exudyn_build import items
+    from models.engines.exudyn_system import items
 
     mbs = own._system[0]
     middle = mbs.AddMarker(

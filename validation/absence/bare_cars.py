@@ -8,7 +8,7 @@ import numpy as np
 from models.engines.protocol import guard
 from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
-from models.systems.handling.in_engines import build
+from models.systems.handling.run import build
 from validation.absence import hand_built_handling, handling
 from validation.absence.of_systems import bare
 
@@ -19,24 +19,24 @@ Job = Callable[[], tuple[np.ndarray, ...]]
 
 def start() -> tuple[Handling, np.ndarray, np.ndarray]:
     """The car of the bare scene, and a start of which nothing is left at rest: it drifts, turns, bounces and rolls."""
-    own = bare("handling").handling(handling.ROLLING)
-    q, v = own.straight(SPEED)
+    car = bare("handling").handling(handling.ROLLING)
+    q, v = car.straight(SPEED)
     q[3:6], v[1], v[2] = (0.01, 0.01, 0.002), 0.1, 0.02
-    return own, q, v
+    return car, q, v
 
 
 def cars(steps: int) -> tuple[Job, Job]:
     """Runs of a bare car and of the written one, which pass the same guard, to positions and rates (steps + 1, 23)."""
-    own, q, v = start()
+    car, q, v = start()
     model, by_hand, times = (
-        build("mujoco", own),
-        hand_built_handling.run(own, q, v, STEP, steps),
+        build("mujoco", car),
+        hand_built_handling.run(car, q, v, STEP, steps),
         STEP * np.arange(steps + 1),
     )
 
     def ours() -> tuple[np.ndarray, ...]:
-        found = model.run(q, v, steps * STEP, STEP)
-        return found.positions, found.rates
+        path = model.run(q, v, steps * STEP, STEP)
+        return path.positions, path.rates
 
     def theirs() -> tuple[np.ndarray, ...]:
         states = by_hand()

@@ -17,7 +17,7 @@ from mujoco import rollout
 from models.contact.fastsim_many import PER_SLIP, ROOM, forces_within
 from models.engines.contact_bridge_mujoco import native_law
 from models.engines.mujoco_callback import installed
-from models.engines.spatial_mujoco import _principal
+from models.engines.mujoco_tree import principal
 from models.machine.compiled import lean
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
@@ -240,7 +240,7 @@ def model_of(own: Handling, step: float) -> mujoco.MjModel:
         )
         for name, kinds in RIDERS.items()
     )
-    principal, axes = _principal(chassis)
+    inertias, axes = principal(chassis)
     built = mujoco.MjModel.from_xml_string(
         MJCF.format(
             step=repr(step),
@@ -254,7 +254,7 @@ def model_of(own: Handling, step: float) -> mujoco.MjModel:
             x=-chassis.position[0],
         )
     )
-    built.body_inertia[1] = principal
+    built.body_inertia[1] = inertias
     for name, kinds in RIDERS.items():
         spin = [0.0, own.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
         built.body_inertia[built.body(name).id] = spin

@@ -152,16 +152,16 @@ def _road_law() -> Any:
     """The compiled callback: forces of the road on the wheels, from the model's numeric data."""
     from numba import cfunc, types
 
-    from models.engines.mujoco_callback import _array_at, _double_at
     from models.engines.mujoco_layout import offset
+    from models.machine.stack import array_at, double_at
 
     numeric, passive = offset("mjModel", "numeric_data"), offset("mjData", "qfrc_passive")
     time = offset("mjData", "time")
 
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
-        numbers, forces = _array_at(model, numeric), _array_at(data, passive)
-        row = 2 + 4 * int(np.rint(_double_at(data, time)[0] * numbers[0]))
+        numbers, forces = array_at(model, numeric), array_at(data, passive)
+        row = 2 + 4 * int(np.rint(double_at(data, time)[0] * numbers[0]))
         for i in range(4):
             forces[3 + i] += numbers[1] * numbers[row + i]
 

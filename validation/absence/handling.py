@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene
 
 ENGINES = ("mujoco", "exudyn")
@@ -15,14 +16,13 @@ BARE: dict[str, Any] = {
 
 def seen(scene: HandlingScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a manoeuvre as both engines are handed it, and its path."""
-    from models.systems.handling.in_engines import driven
-
-    own, said = scene.handling(ROLLING), scene.manoeuvres[ROLLING]
-    controls = (own.controls.steer, own.controls.brake, own.controls.drive)
+    path = run(scene, engine)
+    handling = path.detail.handling
+    controls = (handling.controls.steer, handling.controls.brake, handling.controls.drive)
     counts = {
-        "waves": len(own.waves),
+        "waves": len(handling.waves),
         "controls": sum(any(value for _, value in knots) for knots in controls),
-        "pushes": len(own.pushes),
-        "leaning wheels": len(own.vehicle.tyres) * (own.tyres.inclination != 0.0),
+        "pushes": len(handling.pushes),
+        "leaning wheels": len(handling.vehicle.tyres) * (handling.tyres.inclination != 0.0),
     }
-    return counts, driven(engine, own, said.speed, said.duration, scene.run.step).run.positions.tobytes()
+    return counts, path["positions"].tobytes()

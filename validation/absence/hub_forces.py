@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 
 from models.core.time_series import write_time_series
+from models.engines.cut_vehicle import build
+from models.multibody import cut_kernel as kernel
+from models.systems.hub_forces.measurement import recorded
+from models.systems.hub_forces.run import Measurement, measure
 from models.systems.hub_forces.scene import ANGLES, COMPONENTS, HubScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -34,61 +38,49 @@ BY_HAND: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def write(folder: Path) -> None:
     """Forces that carry the vehicle, one of them rising, and angles of a vehicle that stands."""
     rising = np.linspace(0.0, 1.0, round(STEPS * STEP / PERIOD) + 1) ** 2
-    units = {name: next(iter(known)) for name, known in COMPONENTS.items()}
     forces = {
-        f"{hub}_{name}": (units[name], (4e3 + 500.0 * rising) * (name == "fz")) for hub in HUBS for name in COMPONENTS
+        f"{hub}_{name}": (next(iter(units)), (4e3 + 500.0 * rising) * (name == "fz"))
+        for hub in HUBS
+        for name, units in COMPONENTS.items()
     }
     write_time_series(folder / "forces.csv", forces, PERIOD)
-    angles = {name: (next(iter(known)), 0.0 * rising) for name, known in ANGLES.items()}
+    angles = {name: (next(iter(units)), 0.0 * rising) for name, units in ANGLES.items()}
     write_time_series(folder / "angles.csv", angles, PERIOD)
 
 
 def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the scene's run, as an engine is handed it, and its path."""
-    from models.engines.cut_vehicle import build
-    from models.multibody import cut_kernel as kernel
-    from models.systems.hub_forces.of_scene import measured
-    from models.systems.hub_forces.stabilised import Stabilised
-
-    vehicle, own = scene.cut_vehicle(), scene.run
-    truth, forces, angles = measured(scene, vehicle, engine)
-    stabilised = Stabilised(scene, vehicle, forces, angles)
-    drive = stabilised.drive(scene.stabilise.method, own.step, STEPS)
-    model = build(engine, vehicle, drive, own.step, own.duration)
-    table = model.numbers
-    within = drive.hubs[: round(2 * forces.period / own.step) + 1]  # a period of them, at half steps
-    curved = np.abs(np.diff(within, n=2, axis=0)).max() > 1e-9 * np.abs(within).max()
-    noisy = _noisy(scene, truth, forces, angles)
-    lifting = sum(tyre.pushes_only for tyre in vehicle.whole.tyres)
+    measurement, step = measure(scene, engine), scene.run.step
+    drive = measurement.drive(scene.stabilise.method, step, STEPS)
+    model = build(engine, measurement.vehicle, drive, step, scene.run.duration)
+    head = model.numbers
+    period = drive.hubs[: round(2 * measurement.forces.period / step) + 1]  # of the samples, at half steps
+    curved = np.abs(np.diff(period, n=2, axis=0)).max() > 1e-9 * np.abs(period).max()
+    noisy_forces, noisy_angles = _noisy(measurement)
     counts = {
-        "runs on tyres": int(truth is not None),
-        "tyres that lift": lifting,
-        "noisy forces": noisy[0],
-        "noisy angles": noisy[1],
-        "pulled angles": 2 * int(table[kernel.GUIDE] == kernel.PULLED),
-        "enforced angles": 2 * int(table[kernel.GUIDE] == kernel.HELD),
-        "turning hubs": int(table[kernel.HUBS] * (table[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
+        "runs on tyres": int(measurement.truth is not None),
+        "tyres that lift": sum(tyre.pushes_only for tyre in measurement.vehicle.whole.tyres),
+        "noisy forces": noisy_forces,
+        "noisy angles": noisy_angles,
+        "pulled angles": 2 * int(head[kernel.GUIDE] == kernel.PULLED),
+        "enforced angles": 2 * int(head[kernel.GUIDE] == kernel.HELD),
+        "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
         "curves between samples": int(curved),
     }
-    return counts, model.run(stabilised.start(drive)).states.tobytes()
+    return counts, model.run(measurement.start(drive)).states.tobytes()
 
 
 def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
     """A run of the scene over so many of its steps, built beforehand."""
-    from models.engines.cut_vehicle import build
-    from models.systems.hub_forces.of_scene import measured
-
-    vehicle, own = scene.cut_vehicle(), scene.run
-    drive = measured(scene, vehicle, engine)[1].drive(own.step, steps, scene.forces.interpolation)
-    return build(engine, vehicle, drive, own.step, steps * own.step).run
+    measurement, step = measure(scene, engine), scene.run.step
+    return build(engine, measurement.vehicle, measurement.drive("none", step, steps), step, steps * step).run
 
 
-def _noisy(scene: HubScene, truth: Any, forces: Any, angles: Any) -> tuple[int, int]:
+def _noisy(measurement: Measurement) -> list[int]:
     """Columns of forces and of angles that are not those of the true run; none of files, which have no true one."""
-    from models.systems.hub_forces.measurement import recorded
-
-    if truth is None:
-        return 0, 0
-    of_forces, of_angles = recorded(truth, scene.forces.frame, round(forces.period / scene.run.step))
-    noisy = (forces.samples != of_forces.samples).any(axis=0), (angles.samples != of_angles.samples).any(axis=0)
-    return int(noisy[0].sum()), int(noisy[1].sum())
+    forces, angles, scene = measurement.forces, measurement.angles, measurement.scene
+    if measurement.truth is None:
+        return [0, 0]
+    clean = recorded(measurement.truth, scene.forces.frame, round(forces.period / scene.run.step))
+    pairs = ((forces.samples, clean[0].samples), (angles.samples, clean[1].samples))
+    return [int((told != true).any(axis=0).sum()) for told, true in pairs]

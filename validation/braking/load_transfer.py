@@ -9,9 +9,8 @@ to first order, whatever springs do: contacts go with their wheels, spins slow d
 
 import numpy as np
 
-from models.multibody.forces import PRESS
 from models.multibody.numbers import GRAVITY, Controls, Handling, Tyres
-from models.systems.handling.in_engines import Drive
+from models.systems.handling.run import Drive
 from models.vehicles.free_vehicle import SWAY
 from models.vehicles.spatial import SpatialVehicle
 
@@ -29,7 +28,7 @@ def turning(vehicle: SpatialVehicle, steer: float) -> Handling:
 def transfer(drive: Drive) -> np.ndarray:
     """(2,) N m: last loads less those at rest, by their design places ahead and to the left."""
     design = np.array([tyre.point[:2] for tyre in drive.handling.vehicle.tyres])
-    moments: np.ndarray = (drive.tyres[-1, :, PRESS] - drive.tyres[0, :, PRESS]) @ design
+    moments: np.ndarray = (drive["load"][-1] - drive["load"][0]) @ design
     return moments
 
 

@@ -17,13 +17,14 @@ from models.machine.timing import interleave, median
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.in_engines import Drive, driven, driven_by, energy, friction_distance, unaccounted
+from models.systems.handling.run import Drive, driven, driven_by, energy, friction_distance, unaccounted
 from models.systems.handling.single_track import steady_turn
 from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding
+from validation.common.rows import Row, System, aim, at_most, behaves, finding
+from validation.spatial.cars import cornering_error, mirrored
 
 TITLE = "A car on four rolling tyres"
 SYSTEM: System = "rolling-vehicle"
@@ -60,19 +61,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
-    """None: the rows say all."""
-    return []
-
-
-def draw(data: dict[str, Any]) -> dict[str, Any]:
-    """None."""
-    return {}
-
-
-def _gap(one: Drive, other: Drive) -> float:
-    pairs = ((one.run.positions, other.run.positions), (one.run.rates, other.run.rates))
-    return float(max(np.abs(a - b).max() for a, b in pairs))
+def _gap(a: Drive, b: Drive) -> float:
+    """Largest difference of positions and rates."""
+    return float(max(np.abs(a.run.positions - b.run.positions).max(), np.abs(a.run.rates - b.run.rates).max()))
 
 
 def _engines_row(drives: dict[str, Drive]) -> Row:
@@ -88,26 +79,13 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
     )
 
 
-def cornering(handling: Handling, i: int, slip: float = 1e-7) -> float:
-    """Cornering stiffness (N/rad) of one tyre at its static load, out of its table and the brush."""
-    n = handling.numbers[int(handling.numbers[at.OF_TYRES]) + at.PER_TYRE * i :]
-    half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
-    found = brush(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], np.array([[0, slip, 0, 1.0]]))
-    return float(-found[0, 1] / slip)
-
-
-def _cornering_error(handling: Handling) -> float:
-    given = {force.name: force.stiffness for force in R19.side_forces}
-    return max(abs(cornering(handling, i) / given[name] - 1.0) for i, name in enumerate(ALL))
-
-
 def locked_error() -> float:
     """Largest error, by mu N, of the force on wheels that do not turn, from one that opposes sliding with mu N."""
     angles, speeds = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), [0.1, 1.0, 40.0])
     slides = np.zeros((angles.size, 4))
     slides[:, 0], slides[:, 1] = (speeds * np.cos(angles)).ravel(), (speeds * np.sin(angles)).ravel()
-    found = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
-    return float(np.abs(found / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
+    forces = brush(3000.0, 0.8, 0.08, 0.09, 5e7, slides)[:, :2]
+    return float(np.abs(forces / (0.8 * 3000.0) + slides[:, :2] / np.hypot(*slides[:, :2].T)[:, None]).max())
 
 
 def _tyre_rows() -> list[Row]:
@@ -116,7 +94,7 @@ def _tyre_rows() -> list[Row]:
             "handling.cornering",
             SYSTEM,
             "cornering stiffness at small slip, by the ride vehicle's, less 1",
-            _cornering_error(Handling(R19)),
+            cornering_error(Handling(R19)),
             "",
             1e-3,
             "the bristles are those of the ride vehicle's tyres",
@@ -140,7 +118,7 @@ def _power_row(drive: Drive) -> Row:
         "handling.power",
         SYSTEM,
         "power of each tyre's contact at every step of the lane change",
-        "never positive" if drive.tyres[:, :, at.POWER].max() <= 0.0 else "positive",
+        "never positive" if drive["power"].max() <= 0.0 else "positive",
         "never positive",
         "friction takes energy out",
     )
@@ -152,18 +130,7 @@ def mirror_gap(handling: Handling, duration: float) -> float:
         driven("mujoco", handling.changed(controls=Controls(steer=((0.0, 0.0), (0.2, side * 0.06)))), SPEED, duration)
         for side in (1.0, -1.0)
     )
-    places = handling.vehicle.coordinates()
-    swap = [places.index((_other(name), freedom)) for name, freedom in places]
-    sign = np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places])
-    return float(np.abs(left.run.positions - sign * right.run.positions[:, swap]).max())
-
-
-def _other(name: str) -> str:
-    for one, two in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
-        for a, b in ((one, two), (two, one)):
-            if name.startswith(a):
-                return b + name[len(a) :]
-    return name
+    return float(np.abs(left.run.positions - mirrored(handling, right.run.positions)).max())
 
 
 def _mirror_row(duration: float) -> Row:
@@ -180,18 +147,18 @@ def _mirror_row(duration: float) -> Row:
     )
 
 
-def turn_error(change: Callable[[np.ndarray], None] | None = None, speed: float = 20.0) -> float:
+def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 20.0) -> float:
     """Yaw gain of a steady turn of small slip, by the closed form, less 1; ``change`` plants a fault in the table."""
     steer = 2e-5
     handling = Handling(NO_DRAG, controls=Controls(steer=((0.0, 0.0), (0.5, steer))))
     gain = steady_turn(handling, speed).yaw_gain
     if change is not None:
-        change(handling.numbers)
+        change(handling)
     return float(driven("mujoco", handling, speed, 5.0).velocity()[-1, 2] / steer / gain - 1.0)
 
 
 def _turn_rows() -> list[Row]:
-    found = steady_turn(Handling(NO_DRAG), 20.0)
+    turn = steady_turn(Handling(NO_DRAG), 20.0)
     return [
         at_most(
             "handling.turn",
@@ -207,7 +174,7 @@ def _turn_rows() -> list[Row]:
             "handling.understeer",
             SYSTEM,
             "its understeer gradient",
-            found.understeer,
+            turn.understeer,
             "s^2/m",
             "positive: understeering",
             "closed form at the static loads",
@@ -220,14 +187,14 @@ def _stop_rows() -> list[Row]:
     handling = Handling(NO_DRAG, Tyres(friction=mu, fixed=ALL))
     drive = driven("mujoco", handling, speed, 2.0)
     ahead = drive.velocity()[:, 0]
-    left = drive.tyres[:, :, at.FX] + mu * drive.tyres[:, :, at.PRESS]
+    left = drive["fx"] + drive.grip()
     stopped = friction_distance(speed, mu) - friction_distance(ahead[-1], mu)
     return [
         at_most(
             "handling.slide",
             SYSTEM,
             "braking force of four locked wheels beside mu N, by mu N",
-            float(np.abs(left / (mu * drive.tyres[:, :, at.PRESS])).max()),
+            float(np.abs(left / drive.grip()).max()),
             "",
             1e-9,
             "at every step of a stop",
@@ -282,7 +249,7 @@ def _slope_row() -> Row:
     handling = Handling(R19, Tyres(fixed=ALL), slope=SLOPE)
     drive = driven("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
-    drift = float(np.abs(drive.tyres[last, :, at.SLIP_X].mean(axis=0)).max())
+    drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
     return at_most(
         "handling.slope",
         SYSTEM,
@@ -327,31 +294,24 @@ def _energy_rows() -> list[Row]:
     ]
 
 
-def _tyre(numbers: np.ndarray, i: int) -> np.ndarray:
-    return numbers[int(numbers[at.OF_TYRES]) + at.PER_TYRE * i :]
-
-
-def _swap_axles(numbers: np.ndarray) -> None:
+def _swap_axles(handling: Handling) -> None:
     """Bristles of the rear in front, and the other way round."""
     for front, rear in ((0, 2), (1, 3)):
-        one, two = _tyre(numbers, front), _tyre(numbers, rear)
-        one[at.BRISTLES], two[at.BRISTLES] = float(two[at.BRISTLES]), float(one[at.BRISTLES])
+        ahead, behind = handling.tyre_numbers(front), handling.tyre_numbers(rear)
+        ahead[at.BRISTLES], behind[at.BRISTLES] = float(behind[at.BRISTLES]), float(ahead[at.BRISTLES])
 
 
-def _turn_wrong(numbers: np.ndarray) -> None:
+def _turn_wrong(handling: Handling) -> None:
     """One front wheel is steered the other way."""
-    _tyre(numbers, 1)[at.STEERED] *= -1.0
+    handling.tyre_numbers(1)[at.STEERED] *= -1.0
 
 
 def _fault_rows() -> list[Row]:
-    soft = Handling(R19)
-    _tyre(soft.numbers, 0)[at.BRISTLES] *= 1.01
-    leaning = Handling(R19, Tyres(inclination=-0.02))
-    _tyre(leaning.numbers, 1)[at.INCLINED] *= -1.0
-    rough = lane_change()
-    _tyre(rough.numbers, 2)[at.GRIP] *= 1.0 + 1e-6
-    found = {
-        "bristles of one tyre 1 % too stiff, by the cornering stiffness": _cornering_error(soft) > 1e-3,
+    soft, rough = Handling(R19), lane_change()
+    soft.tyre_numbers(0)[at.BRISTLES] *= 1.01
+    rough.tyre_numbers(2)[at.GRIP] *= 1.0 + 1e-6
+    seen = {
+        "bristles of one tyre 1 % too stiff, by the cornering stiffness": cornering_error(soft) > 1e-3,
         "bristles of front and rear swapped, by the steady turn": abs(turn_error(_swap_axles)) > 1e-3,
         "one wheel steered the other way, by the steady turn": abs(turn_error(_turn_wrong)) > 1e-3,
         "friction of one tyre 1e-6 off in one engine, by the engines": _gap(
@@ -368,17 +328,15 @@ def _fault_rows() -> list[Row]:
             "caught",
             "a check that cannot fail shows nothing",
         )
-        for i, (name, caught) in enumerate(found.items())
+        for i, (name, caught) in enumerate(seen.items())
     ]
 
 
 def _price_row() -> Row:
-    steps, handling = 50, lane_change(waves=np.empty((0, 4)))
-    bare = lane_change(waves=np.empty((0, 4)))
+    steps, (car, bare) = 50, (lane_change(waves=np.empty((0, 4))) for _ in range(2))
     bare.numbers[at.TYRES] = 0.0
-    jobs = [_march(one, steps) for one in (handling, bare)]
-    timed = [*jobs, lambda: _repeat_tyres(4 * steps)]
-    full, none, kernel = interleave(timed, ROUNDS, 0.001, clock=time.process_time)
+    jobs = _march(car, steps), _march(bare, steps), lambda: _repeat_tyres(4 * steps)
+    full, none, kernel = interleave(jobs, ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
     return aim(
         "handling.price",
@@ -395,11 +353,11 @@ def _price_row() -> Row:
 def _threads_row() -> Row:
     """Lane changes at three speeds, together in MuJoCo's loop."""
     handling = lane_change()
-    own = FreeMujoco(driven_by(handling))
-    own.model.opt.timestep = 1e-3
+    built = FreeMujoco(driven_by(handling))
+    built.model.opt.timestep = 1e-3
     starts = np.array([np.concatenate(handling.straight(speed)) for speed in (20.0, 25.0, 30.0)])
-    with installed(own.law):
-        serial, both = (Marcher(own.model, threads).run(starts, 50) for threads in (1, 2))
+    with installed(built.law):
+        serial, both = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
     said = "identical" if serial.tobytes() == both.tobytes() else f"{np.abs(serial - both).max():.1e} apart"
     return behaves(
         "handling.threads",
@@ -414,12 +372,12 @@ def _threads_row() -> Row:
 
 def _march(handling: Handling, steps: int) -> Callable[[], Any]:
     """Steps of MuJoCo's own loop, and nothing else."""
-    own = FreeMujoco(driven_by(handling))
-    own.model.opt.timestep = 1e-4
-    start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(own.model)
+    built = FreeMujoco(driven_by(handling))
+    built.model.opt.timestep = 1e-4
+    start, marcher = np.concatenate(handling.straight(SPEED))[None], Marcher(built.model)
 
     def job() -> None:
-        with installed(own.law):
+        with installed(built.law):
             marcher.run(start, steps)
 
     return job
@@ -428,13 +386,13 @@ def _march(handling: Handling, steps: int) -> Callable[[], Any]:
 def _repeat_tyres(times: int) -> None:
     """Four tyres that roll with a little slip."""
     of = net(21)
-    contacts, found = np.zeros((4, 10)), np.empty((4, 4))
+    contacts, forces = np.zeros((4, 10)), np.empty((4, 4))
     contacts[:, [A, B, LOAD, MU]] = 0.08, 0.09, 3000.0, 0.9
     contacts[:, FIRST:] = 2e-8
-    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, found, times)
+    _many(contacts, np.array([[0.1, 0.2, 0.1, SPEED]] * 4), of.strips, of.cells, of.middle, forces, times)
 
 
 @njit(cache=True, error_model="numpy")
-def _many(contacts, slides, strips, cells, middle, found, times):
+def _many(contacts, slides, strips, cells, middle, forces, times):
     for _ in range(times):
-        tyre_forces(contacts, slides, strips, cells, middle, found)
+        tyre_forces(contacts, slides, strips, cells, middle, forces)

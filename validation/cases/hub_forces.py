@@ -1,33 +1,29 @@
 """R19-free cut at its wheels and driven by hub forces: engines, gravity error, toppling, growth, filter, faults."""
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from scipy.stats import chi2
 
 from models.core.errors import InputError
 from models.core.signals import Interpolation
-from models.engines.cut_vehicle import ENGINES, EngineHubs, HubModel, HubRun, build
-from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.engines.cut_vehicle import ENGINES, HubModel, HubRun, build
 from models.engines.spatial_reference import SpatialReference
-from models.multibody.cut_kernel import WRENCH, forces
-from models.multibody.cut_rigid import rigid
+from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.enforced import held
+from models.systems.hub_forces.comparison import FILTER, Comparison, compare
 from models.systems.hub_forces.measurement import HubForces, model, recorded, truth, two_tracks
+from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import estimate
-from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut
-from models.vehicles.spatial import SpatialVehicle, SpringDamper
-from models.vehicles.vehicle_file import load_vehicle
-from studies.hub_forces import FILTER, Found, answer, compute, damages, drift_off, engines_apart, errors
+from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
+from models.vehicles.spatial import SpringDamper
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.spatial.cars import anywhere, by_jacobians, r19, shaken, static, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
 SYSTEM: System = "drift"
@@ -52,69 +48,28 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return rows, {}
     rows += [*_accelerations("twin", cut(twin(), "body")), *_reproduced(car), *_growth(car)]
     scenes = {frame: _scene(frame) for frame in ("hub", "inertial")}
-    found = {frame: compute(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
-    for frame, own in found.items():
-        rows += [*_stabilised(frame, own), _exact(frame, own)]
-    return rows + _faults(scenes["hub"]), {frame: answer(own) for frame, own in found.items()}
-
-
-@cache
-def r19() -> CutVehicle:
-    """The shipped car, cut."""
-    return cut(load_vehicle("r19_free"), "body")
-
-
-def twin() -> SpatialVehicle:
-    """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
-    whole = load_vehicle("r19_free")
-    springs = tuple(
-        replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
-        for i, s in enumerate(whole.springs)
-    )
-    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
-    chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
-    return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
-
-
-def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:
-    """Hub forces that carry the vehicle at rest."""
-    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
-    forces[:, 2::WRENCH] = vehicle.loads
-    return Drive(forces, frame)
-
-
-def _anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates at random, the chassis turned by any heading and by up to a radian."""
-    rng = np.random.default_rng(seed)
-    q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
-    q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
-    return q, v
-
-
-def _shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
-    """A row of six random components per hub, with a stabiliser or without."""
-    rng = np.random.default_rng(SEED)
-    drive = static(vehicle, 3, frame)
-    shaken = drive.hubs + rng.normal(0, 500.0, drive.hubs.shape[1])
-    return replace(drive, hubs=shaken, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+    comparisons = {frame: compare(scene, ("exudyn", "mujoco")) for frame, scene in scenes.items()}
+    for frame, comparison in comparisons.items():
+        rows += [*_stabilised(frame, comparison), _exact(frame, comparison)]
+    return rows + _faults(scenes["hub"]), {frame: each.answer() for frame, each in comparisons.items()}
 
 
 def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     """Engines and written-out equations at random states, and those equations against others without any force."""
     worst = 0.0
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
-        q, v = _anywhere(vehicle, i)
-        found = [
-            build(engine, vehicle, _shaken(vehicle, frame, guide), STEP, STEP).accelerations(0.0, q, v)
+        q, v = anywhere(vehicle, i)
+        written, *engines = (
+            build(engine, vehicle, shaken(vehicle, frame, guide), STEP, STEP).accelerations(0.0, q, v)
             for engine in ENGINES
-        ]
-        worst = max(worst, max(float(np.abs(a - found[0]).max() / np.abs(found[0]).max()) for a in found[1:]))
-    q, v = _anywhere(vehicle, 7)
+        )
+        worst = max(worst, *(float(np.abs(a - written).max() / np.abs(written).max()) for a in engines))
+    q, v = anywhere(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
-    own = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
+    written = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
     slack = SpringDamper("none", vehicle.chassis, vehicle.whole.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
-    other = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
-    other -= GRAVITY * np.eye(len(q))[Z]
+    expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
+    expected -= GRAVITY * np.eye(len(q))[Z]
     return [
         at_most(
             f"hub_forces.accelerations_{name}",
@@ -130,7 +85,7 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
             f"hub_forces.free_fall_{name}",
             SYSTEM,
             "accelerations of the freely falling, turning tree beside a second set of equations",
-            float(np.abs(own - other).max()),
+            float(np.abs(written - expected).max()),
             "m/s^2, rad/s^2",
             1e-9,
             "written separately; gravity moves all alike",
@@ -141,25 +96,15 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
 
 def _wrenches(vehicle: CutVehicle) -> Row:
     """Joint forces of the hubs' wrenches by the kernel and by MuJoCo's own Jacobians."""
-    (q, _), worst = _anywhere(vehicle, 3), 0.0
+    (q, _), worst = anywhere(vehicle, 3), 0.0
     for frame in ("hub", "inertial"):
-        drive = _shaken(vehicle, frame, guide=False)
+        drive = shaken(vehicle, frame, guide=False)
         built, bare = (
-            EngineHubs("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
+            HubModel("mujoco", vehicle, replace(drive, hubs=part * drive.hubs), STEP, STEP) for part in (1.0, 0.0)
         )
-        own = _forces(built, q) - _forces(bare, q)
-        assert isinstance(built.model, FreeMujoco)
-        model = built.model.model
-        data, other = mujoco.MjData(model), np.zeros(vehicle.size)
-        data.qpos[:] = q
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        for tyre, wrench in zip(vehicle.whole.tyres, drive.hubs[0].reshape(-1, 2, 3), strict=True):
-            number = [body.name for body in vehicle.tree.bodies].index(tyre.body)
-            body = int(model.body(str(number)).id)
-            force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
-            mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, other)
-        worst = max(worst, float(np.abs(own - other).max() / np.abs(other).max()))
+        expected = by_jacobians(built, q, drive.hubs[0], frame)
+        off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()
+        worst = max(worst, float(off / np.abs(expected).max()))
     return at_most(
         "hub_forces.wrenches",
         SYSTEM,
@@ -172,13 +117,6 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     )
 
 
-def _forces(built: HubModel, q: np.ndarray) -> np.ndarray:
-    """Joint forces (n,) of the kernel at rest."""
-    work = built.work()
-    forces(built.numbers, 0.0, q, np.zeros(len(q)), *work)
-    return work[1]
-
-
 def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
     steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
     start[ROLL] = tilt
@@ -188,13 +126,8 @@ def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> Hu
 def _gravity(vehicle: CutVehicle) -> list[Row]:
     """Body-fixed static forces on a tilted vehicle: it slides off, and nothing inside it feels that."""
     run = _tilted(vehicle, "hub", TILT, 1.0)
-    fall = (
-        -0.5
-        * GRAVITY
-        * np.column_stack([np.full(len(run.times), np.sin(TILT)), np.full(len(run.times), 1 - np.cos(TILT))])
-        * run.times[:, None] ** 2
-    )
-    held_by = np.array([element.held for element in vehicle.elements])
+    fall = -0.5 * GRAVITY * np.array([np.sin(TILT), 1 - np.cos(TILT)]) * run.times[:, None] ** 2
+    preloads = np.array([element.held for element in vehicle.elements])
     return [
         at_most(
             "hub_forces.gravity_error",
@@ -211,7 +144,7 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
             "hub_forces.equivalence",
             SYSTEM,
             "change of any section force by that tilt, of the weight",
-            float(np.abs(run.elements - held_by).max() / vehicle.loads.sum()),
+            float(np.abs(run.elements - preloads).max() / vehicle.loads.sum()),
             "1",
             1e-10,
             "uniform gravity cannot be told from an acceleration: body-fixed forces leave the inside alone",
@@ -309,9 +242,9 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
             for path in range(COPIES)
         ]
     )
-    own, at = rigid(vehicle), np.array([LASTING])
-    law = own.angle_variance(deviation, step, at)[0]
-    sliding = own.position_variance(deviation, step, at, "hub")[0, 1]
+    body, at = rigid(vehicle), np.array([LASTING])
+    law = body.angle_variance(deviation, step, at)[0]
+    sliding = body.position_variance(deviation, step, at, "hub")[0, 1]
     low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
@@ -332,28 +265,19 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
 
 def _scene(frame: str) -> HubScene:
     """That of the study, 8 s long."""
-    return scene_of(
-        {
-            "title": TITLE,
-            "system": "hub-forces",
-            "study": "hub_forces",
-            "vehicle": {"file": "r19_free"},
-            "run": {"duration": 8.0},
-            "road": {},
-            "forces": {"frame": frame},
-        }
-    )
+    tables = {"vehicle": {"file": "r19_free"}, "run": {"duration": 8.0}, "road": {}, "forces": {"frame": frame}}
+    return scene_of({"title": TITLE, "system": "hub-forces", "study": "hub_forces"} | tables)
 
 
-def _stabilised(frame: str, found: Found) -> list[Row]:
+def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     """Engines before drift-off, both angles with the filter, and the damage that each run leaves."""
-    off = np.abs(errors(found, found.runs[FILTER])).max(axis=0)
+    off = np.abs(comparison.errors(comparison.runs[FILTER])).max(axis=0)
     rows = [
         at_most(
             f"hub_forces.engines_{frame}",
             SYSTEM,
             f"engines apart before drift-off, noisy road run of 8 s, frame {frame!r}",
-            engines_apart(found),
+            comparison.engines_apart(),
             "m, rad, 1/s",
             1e-9,
             "same tableau, same step",
@@ -376,14 +300,14 @@ def _stabilised(frame: str, found: Found) -> list[Row]:
             f"hub_forces.drift_off_{frame}",
             SYSTEM,
             f"free run leaves the true roll or pitch by 0.05 rad; 8 s: never, frame {frame!r}",
-            min(drift_off(found, found.runs["free, mujoco"]), 8.0),
+            min(comparison.drift_off(comparison.runs["free, mujoco"]), 8.0),
             "s",
             "",
             "stated",
         ),
     ]
-    for name in (name for name in found.runs if "exudyn" not in name):
-        ratios = damages(found, found.runs[name]).values()
+    for name in (name for name in comparison.runs if "exudyn" not in name):
+        ratios = comparison.damages(comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
             what = f"{end} damage of {len(ratios)} springs, mounts and bars by the true one; {name}, frame {frame!r}"
             rows.append(
@@ -400,13 +324,14 @@ def _stabilised(frame: str, found: Found) -> list[Row]:
     return rows
 
 
-def _exact(frame: str, found: Found) -> Row:
+def _exact(frame: str, comparison: Comparison) -> Row:
     """Roll and pitch prescribed as they truly were: what remains is the noise of the forces."""
-    assert found.truth is not None
-    steps = len(found.truth.times) - 1
-    drive = held(found.forces.drive(STEP, steps), found.truth.states[:, [ROLL, PITCH]], STEP, STEP)
-    run = build("mujoco", found.vehicle, drive, STEP, steps * STEP).run()
-    ratios = np.array(list(damages(found, run).values()))
+    measurement = comparison.measurement
+    assert measurement.truth is not None
+    steps = measurement.scene.steps
+    drive = with_angles(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
+    run = build("mujoco", measurement.vehicle, drive, STEP, steps * STEP).run()
+    ratios = np.array([*comparison.damages(run.elements).values()])
     return at_most(
         f"hub_forces.prescribed_{frame}",
         SYSTEM,
@@ -427,8 +352,8 @@ def _faults(scene: HubScene) -> list[Row]:
     vehicle, duration = r19(), 5.0
     drive = _rough(vehicle, duration)
     clean, angles = recorded(truth("mujoco", vehicle, drive, "hub", STEP, duration), "hub", 2)
-    other, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
-    parts, of_space = (own.samples.reshape(len(own.samples), -1, WRENCH) for own in (clean, other))
+    in_space, _ = recorded(truth("mujoco", vehicle, drive, "inertial", STEP, duration), "inertial", 2)
+    parts, of_space = (measured.samples.reshape(len(measured.samples), -1, WRENCH) for measured in (clean, in_space))
     turned = parts * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     planted = {
         "left and right exchanged": parts[:, [1, 0, 3, 2]],
@@ -437,36 +362,26 @@ def _faults(scene: HubScene) -> list[Row]:
         "another frame": of_space,
         "nothing": parts,
     }
-    rows = []
+    rows, why = [], "the innovations of the filter tell"
     for i, (name, samples) in enumerate(planted.items()):
-        faulty = replace(clean, samples=samples.reshape(len(samples), -1))
-        said = "accepted"
+        faulty, said = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
             estimate(vehicle, faulty, angles, scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0)
         except InputError:
             said = "refused"
-        expected = "accepted" if name == "nothing" else "refused"
-        rows.append(
-            behaves(
-                f"hub_forces.fault_{i}",
-                SYSTEM,
-                f"measurement with {name} planted",
-                said,
-                expected,
-                "the innovations of the filter tell",
-            )
-        )
+        expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"
+        rows.append(behaves(f"hub_forces.fault_{i}", SYSTEM, quantity, said, expected, why))
     return rows
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Damage of every section force, run by run."""
-    found = []
+    shown = []
     for frame, of_runs in data.items():
         runs = {name: run["damage"] for name, run in of_runs.items() if "exudyn" not in name and "damage" in run}
         elements = next(iter(runs.values()))
-        rows = tuple((element, *(f"{own[element]:.3g}" for own in runs.values())) for element in elements)
-        found.append(
+        rows = tuple((element, *(f"{damages[element]:.3g}" for damages in runs.values())) for element in elements)
+        shown.append(
             Table(
                 f"Damage by the true one, hub forces in the frame '{frame}'",
                 "Section forces in the chassis' axes, slope 5; roll and pitch are prescribed as measured.",
@@ -474,4 +389,4 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 rows,
             )
         )
-    return found
+    return shown

@@ -18,10 +18,10 @@ from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, re
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, cut
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
-from validation.cases.hub_forces import r19, twin
 from validation.common.rows import Row, System, Table, behaves, finding, not_run, within
 from validation.measured import measured_car
 from validation.measured import recording as car
+from validation.spatial.cars import r19, twin
 
 TITLE = "Checks of a recording"
 SYSTEM: System = "drift"

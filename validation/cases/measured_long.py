@@ -16,9 +16,9 @@ from models.systems.measured.hand_on import hand_on
 from models.systems.measured.section_run import Hold, run
 from models.systems.measured.sections import Sections, guided
 from models.vehicles.cut_vehicle import cut
-from validation.cases.hub_forces import _anywhere, _shaken, twin
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
+from validation.spatial.cars import anywhere, shaken, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
 
 TITLE = "Long recordings, section forces, what is handed on"
@@ -50,10 +50,10 @@ def _guides(quick: bool) -> list[Row]:
     """A car without any symmetry, turned and shaken: the guides' forces and moments by the engines themselves."""
     car, worst = cut(twin(), "body"), 0.0
     sections = Sections(car, "hub")
-    drive = _shaken(car, "hub", guide=False)
+    drive = shaken(car, "hub", guide=False)
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
     for seed in range(1 if quick else 5):
-        q, v = _anywhere(car, seed)
+        q, v = anywhere(car, seed)
         found, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
         worst = max(worst, float(np.abs(found - other).max() / np.abs(other).max()))
     rows = [
@@ -71,7 +71,7 @@ def _guides(quick: bool) -> list[Row]:
     ]
     if quick:
         return rows
-    q, v = _anywhere(car, 0)
+    q, v = anywhere(car, 0)
     for i, (body, freedom) in enumerate(car.tree.coordinates()):
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
     found, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)

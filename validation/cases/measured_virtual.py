@@ -21,7 +21,6 @@ from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.measured.recording import Recording
 from models.measured.signal import Signal
-from models.multibody.cut_rigid import rigid
 from models.systems.hub_forces.measurement import HubForces, model
 from models.systems.measured import plan
 from models.systems.measured.clock import record
@@ -31,7 +30,7 @@ from models.systems.measured.sections import Sections
 from models.systems.measured.trust import Level, drift
 from models.systems.measured.verdict import errors, judge, judge_beside_truth
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, map_lines, virtual_measurement
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, not_run, within
 from validation.measured import recording as moving_car

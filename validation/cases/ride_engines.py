@@ -11,9 +11,8 @@ from models.core.noise import normal
 from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
-from models.vehicles.curve import Curve
 from models.vehicles.linear_vehicle import LinearVehicle, Rows, poles, shift
-from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.rows import Row, System, Table, at_most, behaves, finding

@@ -2,72 +2,38 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
-import mujoco
 import numpy as np
 
-from models.engines.cut_vehicle import EngineHubs
-from models.engines.free_vehicle_mujoco import FreeMujoco
-from models.multibody.cut_kernel import WRENCH, forces
+from models.engines.cut_vehicle import HubModel
+from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
-from models.vehicles.cut_vehicle import CutVehicle, cut
-from models.vehicles.vehicle_file import load_vehicle
+from models.vehicles.cut_vehicle import CutVehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
+from validation.spatial.cars import by_jacobians, r19, static
 
 
-def loaded(factor: float = 1.0) -> tuple[EngineHubs, np.ndarray]:
-    """R19-free with a wrench on every hub, or without, in MuJoCo, and coordinates far from rest."""
-    vehicle = _cut()
-    built = EngineHubs("mujoco", vehicle, Drive(factor * _wrenches(vehicle)), 1e-3, 1e-3)
-    q = np.random.default_rng(5).uniform(-0.03, 0.03, vehicle.size)
-    q[3:6] = 1.0, 0.1, -0.2
-    return built, q
-
-
-@cache
-def _cut() -> CutVehicle:
-    return cut(load_vehicle("r19_free"), "body")
-
-
-def _wrenches(vehicle: CutVehicle) -> np.ndarray:
-    rows = np.random.default_rng(4).normal(0.0, 500.0, WRENCH * len(vehicle.hubs))
-    rows[2::WRENCH] += vehicle.loads
-    return np.tile(rows, (3, 1))
-
-
-def _at_rest(built: EngineHubs, q: np.ndarray) -> np.ndarray:
-    work = built.work()
-    forces(built.numbers, 0.0, q, np.zeros(len(q)), *work)
-    return work[1]
+def _driven(hubs: np.ndarray) -> HubModel:
+    """R19-free in MuJoCo with these wrenches (3, 6 h) on its hubs."""
+    return HubModel("mujoco", r19(), Drive(hubs), 1e-3, 1e-3)
 
 
 def _jacobians() -> float:
-    """Joint forces of the wrenches beside MuJoCo's own, by the hubs' places and axes there."""
-    (built, q), (bare, _), vehicle = loaded(), loaded(0.0), _cut()
-    assert isinstance(built.model, FreeMujoco)
-    own = built.model.model
-    data, other = mujoco.MjData(own), np.zeros(vehicle.size)
-    data.qpos[:] = q
-    mujoco.mj_kinematics(own, data)
-    mujoco.mj_comPos(own, data)
-    names = [body.name for body in vehicle.tree.bodies]
-    for hub, wrench in zip(vehicle.whole.tyres, _wrenches(vehicle)[0].reshape(-1, 2, 3), strict=True):
-        body = int(own.body(str(names.index(hub.body))).id)
-        force, moment = wrench @ data.xmat[body].reshape(3, 3).T
-        mujoco.mj_applyFT(own, data, force, moment, data.xpos[body], body, other)
-    return off(_at_rest(built, q) - _at_rest(bare, q), other)
+    """Joint forces of wrenches on every hub beside MuJoCo's own, at coordinates far from rest."""
+    vehicle, rows = r19(), static(r19(), 3).hubs
+    rows += np.random.default_rng(4).normal(0.0, 500.0, rows.shape[1])
+    q = np.random.default_rng(5).uniform(-0.03, 0.03, vehicle.size)
+    q[3:6] = 1.0, 0.1, -0.2
+    built, bare = _driven(rows), _driven(0.0 * rows)
+    return off(built.forces_at_rest(q) - bare.forces_at_rest(q), by_jacobians(built, q, rows[0]))
 
 
 def _still() -> float:
     """Accelerations at rest on the static loads (m/s^2, rad/s^2)."""
-    vehicle = _cut()
-    rows = np.zeros((3, WRENCH * len(vehicle.hubs)))
-    rows[:, 2::WRENCH] = vehicle.loads
-    built = EngineHubs("mujoco", vehicle, Drive(rows), 1e-3, 1e-3)
-    return float(np.abs(built.accelerations(0.0, np.zeros(vehicle.size), np.zeros(vehicle.size))).max())
+    rest = np.zeros(r19().size)
+    return float(np.abs(_driven(static(r19(), 3).hubs).accelerations(0.0, rest, rest)).max())
 
 
 CHECKS = {

@@ -1,25 +1,24 @@
 """Faults of a car on rolling tyres, planted in the table that its compiled forces read; what sees them."""
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from models.multibody import forces as at
-from models.multibody.kernel import reports
 from models.multibody.numbers import Controls, Handling, Tyres
-from models.systems.handling.in_engines import _bodies, build
+from models.systems.handling.run import bodies_energy, build
 from models.vehicles.vehicle_file import load_vehicle
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
+from validation.spatial.cars import cornering_error, mirrored
 
 
 def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
     """R19-free in a turn at 25 m/s, and a state in it."""
-    own = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
-    q, v = own.straight(25.0)
-    places, part = own.vehicle.coordinates(), np.sign(steer)
+    car = Handling(load_vehicle("r19_free"), controls=Controls(steer=((0.0, steer),)))
+    q, v = car.straight(25.0)
+    places, part = car.vehicle.coordinates(), np.sign(steer)
     for name, freedom, move, rate in (
         ("carrier", "y", 0.1, 0.4),
         ("carrier", "rz", 0.02, 0.3),
@@ -28,12 +27,12 @@ def turning(steer: float = 0.05) -> tuple[Handling, np.ndarray, np.ndarray]:
         k = places.index((name, freedom))
         q[k], v[k] = part * move, part * rate
     q[places.index(("sway", "z"))], v[places.index(("sway", "z"))] = -5e-3, 0.1
-    return own, q, v
+    return car, q, v
 
 
 def _accelerations(engine: str, steer: float = 0.05) -> np.ndarray:
-    own, q, v = turning(steer)
-    return build(engine, own).acceleration(0.0, q, v)
+    car, q, v = turning(steer)
+    return build(engine, car).acceleration(0.0, q, v)
 
 
 @cache
@@ -41,94 +40,80 @@ def _by_exudyn() -> np.ndarray:
     return _accelerations("exudyn")
 
 
-def _engine() -> float:
-    return off(_accelerations("mujoco"), _by_exudyn())
-
-
 def _mirror() -> float:
-    from validation.cases.handling import _other
-
-    places = turning()[0].vehicle.coordinates()
-    swap = [places.index((_other(name), freedom)) for name, freedom in places]
-    sign = np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places])
-    return off(sign * _accelerations("mujoco", -0.05)[swap], _accelerations("mujoco"))
+    return off(mirrored(turning()[0], _accelerations("mujoco", -0.05)), _accelerations("mujoco"))
 
 
-def _read(own: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    report, ledger = np.empty((1, len(own.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
-    reports(own.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
+def _read(car: Handling, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    report, ledger = np.empty((1, len(car.vehicle.tyres), at.REPORTED)), np.empty((1, at.LEDGER))
+    at.reports(car.numbers, np.zeros(1), q[None].copy(), v[None].copy(), report, ledger)
     return report[0], ledger[0]
 
 
 def _balance() -> float:
     """Change of the energy along the motion, less the powers."""
-    own, q, v = turning()
-    a, (report, ledger) = build("mujoco", own).acceleration(0.0, q, v), _read(own, q, v)
+    car, q, v = turning()
+    a, (report, ledger) = build("mujoco", car).acceleration(0.0, q, v), _read(car, q, v)
     ends = [
-        _bodies(own, here, rate) + _read(own, here, rate)[1][at.POTENTIAL]
+        bodies_energy(car, here, rate) + _read(car, here, rate)[1][at.POTENTIAL]
         for here, rate in ((q + part * v, v + part * a) for part in (1e-5, -1e-5))
     ]
     power = ledger[at.DISSIPATED] + ledger[at.TORQUE_POWER] + ledger[at.STEER_POWER] + report[:, at.POWER].sum()
     return float(abs((ends[0] - ends[1]) / 2e-5 - power) / np.abs(report[:, at.POWER]).max())
 
 
-def _cornering() -> float:
-    from validation.cases.handling import _cornering_error
-
-    return _cornering_error(turning()[0])
-
-
 def _sliding() -> float:
     """Locked wheels: their force beside mu N against the sliding."""
-    own = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
-    report, _ = _read(own, *own.straight(15.0))
-    return float(np.abs(report[:, at.FX] / (own.tyres.friction * report[:, at.PRESS]) + 1.0).max())
+    car = Handling(load_vehicle("r19_free"), Tyres(cells=11, fixed=("fl", "fr", "rl", "rr")))
+    report, _ = _read(car, *car.straight(15.0))
+    return float(np.abs(report[:, at.FX] / (car.tyres.friction * report[:, at.PRESS]) + 1.0).max())
 
 
 CHECKS = {
-    "engine": Check("accelerations in a turn by Exudyn", "of the largest", 1e-10, _engine),
+    "engine": Check(
+        "accelerations in a turn by Exudyn",
+        "of the largest",
+        1e-10,
+        lambda: off(_accelerations("mujoco"), _by_exudyn()),
+    ),
     "mirror": Check("accelerations of the mirror image", "of the largest", 1e-10, _mirror),
     "balance": Check("change of energy by the powers", "of the tyres'", 1e-6, _balance),
-    "cornering": Check("cornering stiffness of the ride vehicle", "relative", 1e-3, _cornering),
+    "cornering": Check(
+        "cornering stiffness of the ride vehicle", "relative", 1e-3, lambda: cornering_error(turning()[0])
+    ),
     "sliding": Check("locked wheels by mu N", "relative", 1e-9, _sliding),
 }
 
 
-def tyre(change: Callable[[np.ndarray], None], which: tuple[int, ...] = (0,)) -> Patch:
-    """Numbers of tyres changed in the table."""
+ALL = (0, 1, 2, 3)
+
+
+def tyre(column: int, factor: float, which: tuple[int, ...] = (0,), more: float = 0.0) -> Patch:
+    """One number of tyres by a factor and something more in the table."""
 
     def table(real: Any) -> Any:
-        def made(own: Handling) -> np.ndarray:
-            numbers: np.ndarray = real(own)
+        def made(car: Handling) -> np.ndarray:
+            numbers: np.ndarray = real(car)
             for i in which:
-                change(numbers[int(numbers[at.OF_TYRES]) + at.PER_TYRE * i :])
+                place = int(numbers[at.OF_TYRES]) + at.PER_TYRE * i + column
+                numbers[place] = factor * numbers[place] + more
             return numbers
 
         return made
 
-    return attribute("models.multibody.numbers:_table", table)
+    return attribute("models.multibody.numbers:table", table)
 
 
-def times(column: int, factor: float) -> Callable[[np.ndarray], None]:
-    """One number of a tyre by a factor."""
-
-    def change(numbers: np.ndarray) -> None:
-        numbers[column] *= factor
-
-    return change
-
-
-def _inclined(numbers: np.ndarray) -> None:
-    numbers[at.INCLINED] += 9e-3
-
-
-FAULTS = (
-    Fault("bristles of one tyre 1 % stiffer", "tyre", tyre(times(at.BRISTLES, 1.01))),
-    Fault("bristles of all tyres 1 % stiffer", "tyre", tyre(times(at.BRISTLES, 1.01), (0, 1, 2, 3))),
-    Fault("friction of all tyres 1 % off", "tyre", tyre(times(at.GRIP, 1.01), (0, 1, 2, 3))),
-    Fault("one wheel steered the other way", "tyre", tyre(times(at.STEERED, -1.0))),
-    Fault("load of one tyre at rest 1 % off", "tyre", tyre(times(at.STATIC, 1.01))),
-    Fault("inclination of one wheel, which has none, by half a degree", "tyre", tyre(_inclined)),
+FAULTS = tuple(
+    Fault(name, "tyre", patch)
+    for name, patch in (
+        ("bristles of one tyre 1 % stiffer", tyre(at.BRISTLES, 1.01)),
+        ("bristles of all tyres 1 % stiffer", tyre(at.BRISTLES, 1.01, ALL)),
+        ("friction of all tyres 1 % off", tyre(at.GRIP, 1.01, ALL)),
+        ("one wheel steered the other way", tyre(at.STEERED, -1.0)),
+        ("load of one tyre at rest 1 % off", tyre(at.STATIC, 1.01)),
+        ("inclination of one wheel, which has none, by half a degree", tyre(at.INCLINED, 1.0, more=9e-3)),
+    )
 )
 
 CAMPAIGN = Campaign("planted.tyres", "a car on tyres", "rolling-vehicle", CHECKS, FAULTS)

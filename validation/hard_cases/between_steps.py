@@ -20,7 +20,7 @@ from models.fatigue.counting import level_crossings
 from models.rail.wheelset import CHOSEN
 from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import integrate
-from models.systems.handling.in_engines import driven
+from models.systems.handling.run import run
 from models.systems.handling.scene import HandlingScene, build
 from models.systems.hub_forces.measurement import two_tracks
 from models.vehicles.cut_vehicle import cut
@@ -46,24 +46,19 @@ def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callabl
     return error
 
 
-def car(**manoeuvre: Any) -> HandlingScene:
-    """A car of 19 freedoms in a manoeuvre of a fifth of a second, in steps of a millisecond."""
-    own = {"speed": 20.0, "duration": 0.2} | manoeuvre
-    return build({"title": "hard", "system": "handling", "manoeuvres": {"hard": own}})
+def car(step: float = 1e-3, **manoeuvre: Any) -> HandlingScene:
+    """A car of 19 freedoms in a manoeuvre of a fifth of a second, in steps of a millisecond where no other is named."""
+    driven = {"hard": {"speed": 20.0, "duration": 0.2} | manoeuvre}
+    return build({"title": "hard", "system": "handling", "run": {"step": step}, "manoeuvres": driven})
 
 
 def handled(**manoeuvre: Any) -> Callable[[str, Path], float]:
     """A case of a car: difference of its places (m, rad) from those by a quarter of the step."""
 
     def error(implementation: str, folder: Path) -> float:
-        scene = car(**manoeuvre)
         if implementation == "reference":
             raise InputError("", "engine", implementation, "handling is marched by engines")
-        own, of = scene.manoeuvres["hard"], scene.handling("hard")
-        ends = [
-            driven(implementation, of, own.speed, own.duration, step).run.positions[-1]
-            for step in (scene.run.step, scene.run.step / 4.0)
-        ]
+        ends = [run(car(step, **manoeuvre), implementation)["positions"][-1] for step in (1e-3, 2.5e-4)]
         return float(np.abs(ends[1] - ends[0]).max())
 
     return error

@@ -27,7 +27,7 @@ from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
-from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial_linear import Kinematics
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common.bounces import Bounces, energy
 from validation.hard_cases import setups

@@ -19,7 +19,6 @@ from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.spatial_protocol import SpatialRun
-from models.multibody import forces as at
 from models.multibody.numbers import Handling, Tyres
 from models.rail import wheel_forces as wf
 from models.rail.energy import ledger
@@ -27,7 +26,7 @@ from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.wheel_forces import REGULAR
 from models.rail.wheelset import CHOSEN
-from models.systems.handling.in_engines import Drive, build, driven, energy, read
+from models.systems.handling.run import Drive, build, driven, energy, read
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases.case import Case
 from validation.hard_cases.rolling import built, off
@@ -137,9 +136,8 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
 
 def wrong(run: Drive) -> bool:
     """Whether a contact has power, or more than mu N."""
-    force = np.hypot(run.tyres[:, :, at.FX], run.tyres[:, :, at.FY])
-    bound = run.handling.tyres.friction * run.tyres[:, :, at.PRESS]
-    return bool(run.tyres[:, :, at.POWER].max() > 0.0 or (force > bound * (1.0 + 1e-9)).any())
+    force = np.hypot(run["fx"], run["fy"])
+    return bool(run["power"].max() > 0.0 or (force > run.grip() * (1.0 + 1e-9)).any())
 
 
 def left_open(run: Drive) -> float:
@@ -147,15 +145,13 @@ def left_open(run: Drive) -> float:
     times, ends = run.run.times, [0, -1]
     few = SpatialRun(times[ends], run.run.positions[ends], run.run.rates[ends])
     first, last = energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
-    powers = [at.DISSIPATED, at.TORQUE_POWER, at.STEER_POWER]
-    power = run.ledger[:, powers].sum(axis=1) + run.tyres[:, :, at.POWER].sum(axis=1)
-    return float(abs(last - first - simpson(power, x=times)) / first)
+    return float(abs(last - first - simpson(run.power(), x=times)) / first)
 
 
 def leaping(implementation: str, folder: Path) -> float:
     """Energy that is left open by a car that leaves a ramp with all wheels and lands."""
     run = drive(implementation, Handling(R19, Tyres(cells=7), waves=RAMP), 25.0, 0.5, 5e-4)
-    loads = run.tyres[:, :, at.PRESS]
+    loads = run["load"]
     up = (loads == 0.0).all(axis=1)
     if wrong(run) or not up.any() or (loads[-1] == 0.0).any():
         return np.inf
@@ -165,14 +161,13 @@ def leaping(implementation: str, folder: Path) -> float:
 def parked(implementation: str, folder: Path) -> float:
     """Mean speed (m/s) of locked wheels on a slope, after the first swing."""
     run = drive(implementation, Handling(R19, LOCKED, slope=0.1), 0.0, 0.05, 1e-4)
-    return np.inf if wrong(run) else float(np.abs(run.tyres[-250:, :, at.SLIP_X].mean(axis=0)).max())
+    return np.inf if wrong(run) else float(np.abs(run["slip_x"][-250:].mean(axis=0)).max())
 
 
 def locked(implementation: str, folder: Path) -> float:
     """Force of locked wheels beside mu N against their sliding, by mu N."""
     run = drive(implementation, Handling(R19, LOCKED), 15.0, 0.03, 1e-3)
-    bound = run.handling.tyres.friction * run.tyres[:, :, at.PRESS]
-    return float(np.abs(run.tyres[:, :, at.FX] / bound + 1.0).max())
+    return float(np.abs(run["fx"] / run.grip() + 1.0).max())
 
 
 def back(implementation: str, folder: Path) -> float:

@@ -18,7 +18,7 @@ from models.measured.signal import Signal
 from models.systems.measured.section_run import Hold, SectionRun, run
 from models.systems.measured.sections import Point, Sections
 from models.systems.measured.virtual import VirtualTable, virtual_measurement
-from validation.cases.hub_forces import r19
+from validation.spatial.cars import r19
 
 PERIOD, SEAM, BLOCK = 1e-3, 1000, 60_000
 """s; samples over which a repetition fades into the next; samples made at once."""

@@ -14,8 +14,10 @@ from numba import carray, cfunc, types
 
 from models.engines import mujoco as adapter
 from models.engines.assembly import Assembly
-from models.engines.mujoco_callback import _array_at, _double_at, _offsets, installed
+from models.engines.mujoco_callback import installed
+from models.engines.mujoco_layout import offsets
 from models.engines.protocol import Settings
+from models.machine.stack import array_at, double_at
 
 PARAMETERS = 17
 """Rows per second and number of rows, before the vehicle's fifteen parameters."""
@@ -24,13 +26,13 @@ PARAMETERS = 17
 def _compile(numeric, passive, time, position, velocity):
     @cfunc(types.void(types.voidptr, types.voidptr), cache=True)
     def law(model, data):
-        header = carray(_array_at(model, numeric), (PARAMETERS,))
-        row = int(np.rint(carray(_double_at(data, time), (1,))[0] * header[0]))
+        header = carray(array_at(model, numeric), (PARAMETERS,))
+        row = int(np.rint(carray(double_at(data, time), (1,))[0] * header[0]))
         if not 0 <= row < int(header[1]):
             return
-        road = carray(_array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
-        q, v = carray(_array_at(data, position), (4,)), carray(_array_at(data, velocity), (4,))
-        force = carray(_array_at(data, passive), (4,))
+        road = carray(array_at(model, numeric), (PARAMETERS + 4 * int(header[1]),))
+        q, v = carray(array_at(data, position), (4,)), carray(array_at(data, velocity), (4,))
+        force = carray(array_at(data, passive), (4,))
         at = PARAMETERS + 4 * row
         a, b = header[2], header[3]
         sine, cosine = np.sin(q[3]), np.cos(q[3])
@@ -49,7 +51,7 @@ def _compile(numeric, passive, time, position, velocity):
 @cache
 def law() -> Any:
     """The callback, compiled when first asked for."""
-    return _compile(*_offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
+    return _compile(*offsets("numeric_data", "qfrc_passive", "time", "qpos", "qvel"))
 
 
 class CompiledForces:

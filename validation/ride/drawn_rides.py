@@ -14,8 +14,7 @@ from models.ride.covariance import FINITE, stationary
 from models.systems.ride.omissions import wheels_of
 from models.systems.ride.reduced_scene import ReducedScene
 from models.systems.ride.scene import build
-from models.vehicles.curve import Curve
-from models.vehicles.spatial import Body, PointOutput, SpatialVehicle, SpringDamper
+from models.vehicles.spatial import Body, Curve, PointOutput, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 from validation.ride.rides import twin
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from models.engines.mujoco_quiet import quiet
-from models.engines.spatial_mujoco import Numbers, _spec, _weigh
+from models.engines.mujoco_tree import Numbers, spec_of, weigh
 from models.systems.measured.sections import guided
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.spatial import FREEDOMS
@@ -33,10 +33,10 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
     """The same (guides, 6) in the axes of what carries each body, at rest; exact where at most one angle is free."""
     import exudyn as exu
-    import exudyn.itemInterface as items
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 
-    exu.config.printToConsole = False
+    from models.engines.exudyn_system import KINDS, items
+
     loaded, container = _Loaded(vehicle, q, 0 * q, wrenches), exu.SystemContainer()
     mbs: Any = container.AddSystem()
     objects, centres, sensors = dict[str, Any](), dict[str, Any](), list[Any]()
@@ -48,9 +48,9 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
             items.ObjectRigidBody(mass=body.mass, inertia=[a[0], b[1], c[2], b[2], a[2], a[1]], nodeNumber=node)
         )
         centres[body.name] = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=objects[body.name]))
-        force, moment = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
-        mbs.AddLoad(items.LoadForceVector(markerNumber=centres[body.name], loadVector=force.tolist()))
-        mbs.AddLoad(items.LoadTorqueVector(markerNumber=centres[body.name], loadVector=moment.tolist()))
+        loads = np.split(loaded.data.xfrc_applied[i] - GRAVITY * body.mass * np.eye(6)[2], 2)
+        for kind, load in zip((items.LoadForceVector, items.LoadTorqueVector), loads, strict=True):
+            mbs.AddLoad(kind(markerNumber=centres[body.name], loadVector=load.tolist()))
     for body in (vehicle.whole.body(name) for name in guided(vehicle)):
         assert body.parent is not None
         arm = np.subtract(body.position, vehicle.whole.body(body.parent).position)
@@ -65,7 +65,7 @@ def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> n
             mbs.AddSensor(
                 items.SensorObject(objectNumber=joint, storeInternal=True, writeToFile=False, outputVariableType=kind)
             )
-            for kind in (exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal)
+            for kind in (KINDS.ForceLocal, KINDS.TorqueLocal)
         ]
     mbs.Assemble()
     options = exu.SimulationSettings()
@@ -80,7 +80,7 @@ class _Loaded:
     """A MuJoCo model of a cut vehicle with loads on its bodies, at a state."""
 
     def __init__(self, vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: np.ndarray) -> None:
-        self.vehicle, spec = vehicle, _spec(vehicle.tree, 1e-3)
+        self.vehicle, spec = vehicle, spec_of(vehicle.tree, 1e-3)
         names = {body.name: str(i) for i, body in enumerate(vehicle.tree.bodies)}
         for number in (names[name] for name in guided(vehicle)):
             spec.body(number).add_site(name=number)
@@ -88,7 +88,7 @@ class _Loaded:
                 spec.add_sensor(name=f"{kind} {number}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=number)
         with quiet():
             self.model = spec.compile()
-            _weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
+            weigh(self.model, Numbers(vehicle.tree, self.model), vehicle.tree.bodies)
             self.data = mujoco.MjData(self.model)
             self.ids = {name: int(self.model.body(number).id) for name, number in names.items()}
             self.data.qpos[:], self.data.qvel[:] = q, v

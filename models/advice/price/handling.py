@@ -1,7 +1,7 @@
 """A user's scene of handling as the search of the price of accuracy sees it: one of its manoeuvres."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,8 @@ from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part, part_o
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.engines.spatial_protocol import SpatialRun
-from models.multibody import forces as at
 from models.multibody.numbers import Handling
-from models.systems.handling.in_engines import Drive, build, driven, read
+from models.systems.handling.run import Drive, build, driven, read
 from models.systems.handling.scene import HandlingScene
 
 FIRST = 1.0
@@ -24,9 +23,15 @@ QUANTITIES: dict[str, tuple[Any, str]] = {
     "lateral_acceleration": (lambda drive: drive.lateral_acceleration(), "m/s^2"),
     "lateral_speed": (lambda drive: drive.velocity()[:, 1], "m/s"),
     "speed": (lambda drive: drive.velocity()[:, 0], "m/s"),
-    "load": (lambda drive: drive.tyres[:, :, at.PRESS], "N"),
+    "load": (lambda drive: drive["load"], "N"),
 }
 """What can be asked about, and its unit."""
+
+
+@cache
+def _with_cells(handling: Handling, cells: int) -> Handling:
+    """The vehicle with other cells."""
+    return replace(handling, tyres=replace(handling.tyres, cells=cells))
 
 
 @dataclass(frozen=True)
@@ -37,23 +42,13 @@ class OwnHandling(Meshed):
     speed: float
     handling: Handling
 
-    @cached_property
-    def _cut(self) -> dict[int, Handling]:
-        return {}
-
-    def _with(self, cells: int) -> Handling:
-        """The vehicle with other cells."""
-        if cells not in self._cut:
-            self._cut[cells] = replace(self.handling, tyres=replace(self.handling.tyres, cells=cells))
-        return self._cut[cells]
-
     def run(self, engine: str, cells: int, step: float, duration: float) -> Drive:
         """The manoeuvre in an engine."""
-        return driven(engine, self._with(cells), self.speed, duration, step)
+        return driven(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
         """The same by DOP853 about the engine's accelerations."""
-        handling = self._with(cells)
+        handling = _with_cells(self.handling, cells)
         model, start = build(self.own, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)
         done = solve_ivp(
@@ -67,11 +62,8 @@ class OwnHandling(Meshed):
         )
         if not done.success:
             raise RunFailed(self.own, done.message)
-        return read(
-            handling,
-            SpatialRun(times, np.ascontiguousarray(done.y[:n].T), np.ascontiguousarray(done.y[n:].T), {}),
-            self.own,
-        )
+        path, rates = map(np.ascontiguousarray, np.split(done.y.T, 2, axis=1))
+        return read(handling, SpatialRun(times, path, rates), self.own)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over time."""
@@ -93,7 +85,11 @@ def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) ->
     """The scene with a quantity, MANOEUVRE.QUANTITY; the first manoeuvre where none is named."""
     name, asked = part_of(quantity, USUAL, scene.manoeuvres, "manoeuvre")
     chosen(asked, QUANTITIES)
-    manoeuvre, step, others = scene.manoeuvres[name], scene.run.step, [one for one in scene.manoeuvres if one != name]
+    manoeuvre, step, others = (
+        scene.manoeuvres[name],
+        scene.run.step,
+        [each for each in scene.manoeuvres if each != name],
+    )
     note = f"manoeuvre {name}" + (f"; of another one by --quantity {others[0]}.{asked}" if others else "")
     return OwnHandling(
         scene.title,

@@ -1,7 +1,7 @@
 """A scene less some effects as a system x' = A x + B w, with the way from its state to that of the whole scene.
 
 What rigid springs, locked freedoms and bodies without mass leave of the vehicle is said in
-``models.vehicles.limits`` and ``models.ride.excited``.
+``models.vehicles.spatial.Limits`` and ``models.ride.excited``.
 """
 
 from collections.abc import Hashable
@@ -17,10 +17,9 @@ from models.ride.excited import DelayedSystem, first_order
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
 from models.systems.ride.reduced_scene import ReducedScene
-from models.vehicles.limits import limited
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
-from models.vehicles.spatial_linear import linearise
+from models.vehicles.spatial_linear import limited, linearise
 
 
 @dataclass(frozen=True)

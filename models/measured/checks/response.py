@@ -12,7 +12,7 @@ from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
-from models.vehicles.kinematics import Kinematics
+from models.vehicles.spatial_linear import Kinematics
 
 STEP = 1e-3
 NUDGE = 1e-5

@@ -16,8 +16,7 @@ from models.measured.ratios import EMPTY, counted_from_load, sentence
 from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_rigid import rigid
-from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
 
 NAME = "weight"
 KNOWN = 1e-3

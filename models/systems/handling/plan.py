@@ -2,7 +2,7 @@
 
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
-from models.systems.handling.scene import HandlingScene
+from models.systems.handling.scene import LIMITS, HandlingScene
 from models.vehicles.plausible import plausible
 
 
@@ -20,7 +20,7 @@ def findings(scene: HandlingScene) -> tuple[Finding, ...]:
 def describe(scene: HandlingScene) -> str:
     """The scene's plan as text."""
     first = scene.handling(next(iter(scene.manoeuvres)))
-    own, free = scene.tyres, first.vehicle
+    tyres, free = scene.tyres, first.vehicle
     loads = ", ".join(f"{name} {load:.0f} N" for name, load in first.held.tyres.items())
     mass = sum(body.mass for body in free.bodies)
     lines = [
@@ -30,7 +30,7 @@ def describe(scene: HandlingScene) -> str:
             "vehicle",
             f"{free.name}: {len(free.coordinates())} freedoms on a carrier that turns through any angle, {mass:.6g} kg",
         ),
-        _line("tyres", f"brushes of {own.cells} cells per strip, mu = {own.friction:g}; static loads {loads}"),
+        _line("tyres", f"brushes of {tyres.cells} cells per strip, mu = {tyres.friction:g}; static loads {loads}"),
         _line(
             "road",
             f"ISO 8608 class {scene.road.iso8608}, {scene.road.waves} plane waves, where a manoeuvre is "
@@ -44,9 +44,9 @@ def describe(scene: HandlingScene) -> str:
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:
-    own = scene.manoeuvres[name]
-    acts = [control for control in ("steer", "brake", "drive") if any(value for _, value in getattr(own, control))]
-    return f"{own.speed:g} m/s, {own.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
+    manoeuvre = scene.manoeuvres[name]
+    acts = [control for control in LIMITS if any(value for _, value in getattr(manoeuvre, control))]
+    return f"{manoeuvre.speed:g} m/s, {manoeuvre.duration:g} s, {' and '.join(acts) or 'nothing'} by the driver"
 
 
 def _line(head: str, text: str) -> str:

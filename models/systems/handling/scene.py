@@ -12,7 +12,7 @@ from models.core.scene_effects import extended, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
-from models.multibody.numbers import Control, Controls, Handling, Tyres
+from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import SHORTEST, plane_waves
 from models.vehicles.vehicle_file import load_vehicle
@@ -20,6 +20,8 @@ from models.vehicles.vehicle_file import load_vehicle
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Knots = Annotated[list[Pair], Field(min_length=1)]
 AT_REST = [[0.0, 0.0]]
+LIMITS = {"steer": (-1.2, 1.2, "rad"), "brake": (0.0, 1e5, "N m"), "drive": (0.0, 1e5, "N m")}
+"""What values of each control may be."""
 
 
 class HandlingVehicle(Strict):
@@ -73,7 +75,9 @@ class Manoeuvre(Strict):
 
     def controls(self) -> Controls:
         """What the driver does."""
-        steer, brake, drive = (_control(knots) for knots in (self.steer, self.brake, self.drive))
+        steer, brake, drive = (
+            tuple((float(time), float(value)) for time, value in getattr(self, name)) for name in LIMITS
+        )
         return Controls(steer, brake, drive, self.front_brake, self.front_drive)
 
 
@@ -91,66 +95,56 @@ class HandlingScene(SceneFile):
 
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
-        own, road = self.manoeuvres[name], self.road
-        waves = plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if own.rough else np.empty((0, 4))
+        manoeuvre, road = self.manoeuvres[name], self.road
+        waves = (
+            plane_waves(level_of_class(road.iso8608), road.waves, road.seed) if manoeuvre.rough else np.empty((0, 4))
+        )
         vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
-        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), own.controls(), waves)
+        built = Handling(vehicle, Tyres(**self.tyres.model_dump()), manoeuvre.controls(), waves)
         return extended(built, self)
-
-
-def _control(knots: list[Pair]) -> Control:
-    return tuple((float(time), float(value)) for time, value in knots)
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> HandlingScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(HandlingScene, table, file, folder)
-    for name, own in scene.manoeuvres.items():
+    for name, manoeuvre in scene.manoeuvres.items():
         place = f"manoeuvres.{name}"
-        _check_times(scene, place, own)
-        for control in ("steer", "brake", "drive"):
-            _check_knots(file, f"{place}.{control}", getattr(own, control), 1.2 if control == "steer" else None)
-            _check_pace(file, f"{place}.{control}", getattr(own, control), scene.run.step)
-        _check_way(scene, place, own)
+        _check_times(scene, place, manoeuvre)
+        for control, limits in LIMITS.items():
+            _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
+        _check_way(scene, place, manoeuvre)
     return with_own(scene)
 
 
-def _check_times(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
-    step = scene.run.step
-    if own.duration / step > MOST_STEPS:
-        allowed = f"needs {own.duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
-        raise InputError(scene.file, f"{place}.duration", own.duration, allowed)
-    if not divides(step, own.duration):
-        allowed = f"must divide {place}.duration = {own.duration:g} s; use for example {fitting(step, own.duration)}"
+def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
+    step, duration = scene.run.step, manoeuvre.duration
+    if duration / step > MOST_STEPS:
+        allowed = f"needs {duration / step:.3g} steps; at most {MOST_STEPS:,} are possible"
+        raise InputError(scene.file, f"{place}.duration", duration, allowed)
+    if not divides(step, duration):
+        allowed = f"must divide {place}.duration = {duration:g} s; use for example {fitting(step, duration)}"
         raise InputError(scene.file, "run.step", step, allowed)
 
 
-def _check_knots(file: str, place: str, knots: list[Pair], most: float | None) -> None:
-    """Times that rise; angles that wheels have; torques that are not negative."""
-    times, values = np.array(knots, float).T
+def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float, high: float, unit: str) -> None:
+    """Refuse times that do not rise, values beyond the limits, and a change that no step of the run sees."""
+    (times, values), file, step = np.array(knots, float).T, scene.file, scene.run.step
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise InputError(file, place, times.tolist(), "times must be finite and rise from knot to knot, in s")
-    low, high = (-most, most) if most is not None else (0.0, 1e5)
     if not ((values >= low) & (values <= high)).all():
-        unit = "rad" if most is not None else "N m"
         raise InputError(file, place, values.tolist(), f"values must be from {low:g} to {high:g} {unit}")
-
-
-def _check_pace(file: str, place: str, knots: list[Pair], step: float) -> None:
-    """Refuse a control that goes to another value in less than a step."""
-    times, values = np.array(knots, float).T
     shortest = float(np.diff(times)[np.diff(values) != 0.0].min(initial=np.inf))
     if shortest < step * (1.0 - 1e-9):
         allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"
         raise InputError(file, place, None, allowed)
 
 
-def _check_way(scene: HandlingScene, place: str, own: Manoeuvre) -> None:
+def _check_way(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
     """Refuse steps within which a rough road has whole waves."""
-    way, fastest = own.speed * scene.run.step, SHORTEST / scene.run.step
-    if own.rough and way > SHORTEST:
+    way, fastest = manoeuvre.speed * scene.run.step, SHORTEST / scene.run.step
+    if manoeuvre.rough and way > SHORTEST:
         allowed = (
             f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at "
             f"most {fastest:.4g} m/s, or a smaller run.step"
         )
-        raise InputError(scene.file, f"{place}.speed", own.speed, allowed)
+        raise InputError(scene.file, f"{place}.speed", manoeuvre.speed, allowed)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.multibody.forces import BRISTLES, HALF_WIDTH, OF_TYRES, PER_TYRE, RADIUS, STATIC, STEERED, VERTICAL
+from models.multibody.forces import BRISTLES, HALF_WIDTH, RADIUS, STATIC, STEERED, VERTICAL
 from models.multibody.numbers import Handling
 
 
@@ -33,9 +33,8 @@ def steady_turn(handling: Handling, speed: float) -> SteadyTurn:
     mass = sum(body.mass for body in free.bodies)
     centre = sum(body.mass * body.position[0] for body in free.bodies) / mass
     matrix, steered = np.array([[0.0, -mass * speed], [0.0, 0.0]]), np.zeros(2)
-    first = int(handling.numbers[OF_TYRES])
     for i, tyre in enumerate(free.tyres):
-        n = handling.numbers[first + PER_TYRE * i : first + PER_TYRE * (i + 1)]
+        n = handling.tyre_numbers(i)
         a = np.sqrt(n[RADIUS] * n[STATIC] / n[VERTICAL])
         c = 8.0 / 3.0 * a**2 * n[HALF_WIDTH] * n[BRISTLES]
         trail, turning, x = 3.0 * np.pi / 32.0 * a, n[HALF_WIDTH] ** 2 / 5.0, tyre.point[0] - centre

@@ -1,18 +1,31 @@
 """What a scene of hub forces will compute: printed by ``twinrig show``, checked before any run."""
 
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.finding import Finding
+from models.core.finding import Finding, gathered
 from models.core.scene_effects import lines as effect_lines
 from models.engines.cut_vehicle import check_step
-from models.multibody.cut_rigid import rigid
-from models.systems.hub_forces.judged import judged
-from models.systems.hub_forces.scene import HubScene
+from models.measured.signal import UNITS, Quantity, Signal
+from models.systems.hub_forces.scene import Frame, HubScene
+from models.vehicles.cut_vehicle import CutVehicle, rigid
 from models.vehicles.plausible import plausible
+
+if TYPE_CHECKING:
+    from models.measured.recording import Recording
 
 COMPARING = "hub_forces"
 """The study that runs a scene with every stabiliser and without, whichever it names."""
+
+Signals = tuple[tuple[Quantity, str], ...]
+ANGLES: Signals = tuple((what, axis) for what in ("angle", "angular rate") for axis in ("roll", "pitch"))
+WRENCH: Signals = tuple((what, axis) for what in ("force", "moment") for axis in "xyz")
+REMEDY = "Correct the columns of the file, or map them in a scene of the system measured"
+"""Files of hub forces have no channel map, of which the checks of recordings speak."""
 
 
 def check(scene: HubScene, engines: tuple[str, ...]) -> None:
@@ -42,14 +55,14 @@ def findings(scene: HubScene) -> tuple[Finding, ...]:
 def describe(scene: HubScene) -> str:
     """The scene's plan as text."""
     vehicle, forces = scene.cut_vehicle(), scene.forces
-    own = rigid(vehicle)
+    body = rigid(vehicle)
     source = f"file {forces.file}" if forces.file else f"virtual measurement at {forces.sampling_rate:g} Hz"
     lines = [
         scene.title,
         _line("scene", f"{scene.file}, study {scene.study}"),
         _line(
             "vehicle",
-            f"{vehicle.tree.name}: {vehicle.size} freedoms, {own.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
+            f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
         _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
@@ -75,10 +88,10 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
     """What the Kalman filter says against files that it would follow; a virtual measurement is not made for it."""
     if scene.forces.file is None or (scene.stabilise.method != "kalman" and scene.study != COMPARING):
         return ()
-    from models.systems.hub_forces.stabilised import Stabilised
+    from models.systems.hub_forces.run import Measurement
 
     vehicle = scene.cut_vehicle()
-    return Stabilised(scene, vehicle, *scene.measured(vehicle)).tilt.doubts
+    return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.doubts
 
 
 def _noise(scene: HubScene) -> str:
@@ -86,9 +99,55 @@ def _noise(scene: HubScene) -> str:
     forces, angles = scene.forces, scene.angles
     of_forces = f"{forces.force_deviation:g} N and {forces.moment_deviation:g} N m on every sample of forces"
     of_angles = f"{angles.angle_deviation:g} rad and {angles.rate_deviation:g} rad/s on every one of angles"
-    said = [text for own, text in ((forces, of_forces), (angles, of_angles)) if own.noise == "white"]
+    said = [text for table, text in ((forces, of_forces), (angles, of_angles)) if table.noise == "white"]
     return ", ".join(said) or "none"
 
 
 def _line(head: str, text: str) -> str:
     return f"  {head:<10} {text}"
+
+
+def judged(scene: HubScene, vehicle: CutVehicle) -> tuple[Finding, ...]:
+    """Doubts about the files of a scene; InputError for what cannot be, unless the scene accepts it."""
+    from models.measured.checks import check
+
+    findings = [
+        replace(each, text=_of_file(each.text))
+        for each in check(_recording(scene, vehicle), vehicle)
+        if each.check not in scene.forces.accept
+    ]
+    if errors := [each for each in findings if each.weight == "error"]:
+        names = json.dumps(list(dict.fromkeys(each.check for each in errors)))
+        raise InputError(
+            scene.file,
+            "forces.file",
+            scene.forces.file,
+            f"{' '.join(each.text for each in gathered(errors))} {REMEDY}; if it is meant so: accept = {names} under "
+            "[forces].",
+        )
+    return tuple(each for each in findings if each.weight == "doubt")
+
+
+def _of_file(text: str) -> str:
+    """What a finding says, without the remedy of a channel map that is not there."""
+    before, colon, _ = text.partition("; give sign")
+    return before + "." if colon else text.replace(" in the channel map", "")
+
+
+def _recording(scene: HubScene, vehicle: CutVehicle) -> "Recording":
+    """Both files as a recording; noise of angles is as the scene states."""
+    from models.measured.columns import MemoryColumns
+    from models.measured.recording import Recording
+
+    def signal(at: str, what: Quantity, axis: str, file: str | None, frame: Frame) -> Signal:
+        name = f"{at} {what} {axis}"
+        return Signal(name, str(file), name, what, at, axis, frame, 1, UNITS[what], 1.0)
+
+    (forces, angles), files = scene.measured(vehicle), (scene.forces.file, scene.angles.file)
+    signals = (
+        *(signal(hub, *each, files[0], scene.forces.frame) for hub in vehicle.hubs for each in WRENCH),
+        *(signal(vehicle.chassis, *each, files[1], "body") for each in ANGLES),
+    )
+    count = min(len(forces.samples), len(angles.samples))
+    samples = np.hstack([forces.samples[:count], angles.samples[:count]])
+    return Recording(signals, MemoryColumns(tuple(s.name for s in signals), samples), forces.period)

@@ -101,6 +101,11 @@ class HubScene(SceneFile):
     seed: int = Field(default=1, ge=0, le=2**62, description="of the noise")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
+    @property
+    def steps(self) -> int:
+        """Steps of every run."""
+        return round(self.run.duration / self.run.step)
+
     def cut_vehicle(self) -> CutVehicle:
         """The vehicle without its tyres; raises InputError."""
         vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
@@ -122,13 +127,13 @@ class HubScene(SceneFile):
                 "in milliseconds, not in seconds, correct the unit that heads them"
             )
             raise InputError(self.file, "forces.file", self.forces.file, allowed)
-        angles, other = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
-        if abs(other - period) > 1e-9 * period:
+        angles, spacing = read_time_series(self.path(self.angles.file, "angles.file"), ANGLES)
+        if abs(spacing - period) > 1e-9 * period:
             raise InputError(
                 self.file,
                 "angles.file",
                 self.angles.file,
-                f"is sampled every {other:g} s and the forces every {period:g} s: they must agree",
+                f"is sampled every {spacing:g} s and the forces every {period:g} s: they must agree",
             )
         last = period * (min(len(forces), len(angles)) - 1)
         if last < self.run.duration * (1 - 1e-9):
@@ -156,13 +161,10 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
 
 def _check_file_only(file: str, scene: HubScene) -> None:
     """What a virtual measurement can choose, and files have as they are."""
-    for table, name, own in (
-        ("forces", "sampling_rate", scene.forces),
-        ("forces", "noise", scene.forces),
-        ("angles", "noise", scene.angles),
-    ):
-        if name in own.model_fields_set:
-            raise InputError(file, f"{table}.{name}", getattr(own, name), f"is that of {table}.file: drop it")
+    for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
+        entries = getattr(scene, table)
+        if name in entries.model_fields_set:
+            raise InputError(file, f"{table}.{name}", getattr(entries, name), f"is that of {table}.file: drop it")
 
 
 def _check_steps(file: str, scene: HubScene) -> None:

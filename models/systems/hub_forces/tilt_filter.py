@@ -14,12 +14,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.signals import Sampled
 from models.drift.score import SURPRISED
-from models.multibody.cut_rigid import rigid
 from models.multibody.cut_table import Drive
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
 from models.systems.hub_forces.tilt_march import march
-from models.vehicles.cut_vehicle import CutVehicle
+from models.vehicles.cut_vehicle import CutVehicle, rigid
 
 SURPRISE = 4.0
 """Largest mean of the normalised innovation squared, per measured value: errors twice as large as stated."""
@@ -95,16 +94,14 @@ class TiltFilter:
         one another, or are infinite.
         """
         _check_numbers(wrenches, angles, self.file)
-        own, count = self.state, len(angles)
-        if np.isnan(own.x[0]):
-            own.x, own.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
+        state, count = self.state, len(angles)
+        if np.isnan(state.x[0]):
+            state.x, state.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
         level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
-        turning = self.rigid.moments(level)
-        turning = turning @ self.inverse.T
+        turning, (states, spread) = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
-        states, spread = np.empty((count, 4)), np.empty((count, 4))
-        given = turning, angles, self.period, self.noise, self.variances
-        own.surprise += march(own.x, own.p, *given, own.sums, states, spread)
+        measured = turning, angles, self.period, self.noise, self.variances
+        state.surprise += march(state.x, state.p, *measured, state.sums, states, spread)
         if not self.surprise <= SURPRISE:
             raise InputError(
                 self.file,
@@ -141,10 +138,10 @@ class TiltFilter:
         )
         mean, error = self.biases()
         biased = [
-            f"the filter's innovations of {name} have a mean of {own:+.2g} deviations (of a right filter at most "
+            f"the filter's innovations of {name} have a mean of {average:+.2g} deviations (of a right filter at most "
             f"{BIASED:g}, and {SURE * wide:.2g} by chance): a gyro or forces have an offset, or an angle drifts"
-            for name, own, wide in zip(VALUES, mean, error, strict=True)
-            if abs(own) > max(BIASED, SURE * wide)
+            for name, average, wide in zip(VALUES, mean, error, strict=True)
+            if abs(average) > max(BIASED, SURE * wide)
         ]
         return (*([large] if self.surprise > SURPRISED else []), *biased)
 
@@ -158,37 +155,27 @@ class TiltFilter:
         """
         dt, length = self.period, round(BALANCED / self.period)
         for first in range(0, len(rates) - 1, length):
-            part, own = turning[first : first + length + 1], rates[first : first + length + 1]
-            if not np.isfinite(own).all():
+            part, measured = turning[first : first + length + 1], rates[first : first + length + 1]
+            if not np.isfinite(measured).all():
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
-            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(own) / 6
-            left = np.var(_level_line(own - integral), axis=0)
-            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(own, axis=0)
+            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
+            left = np.var(_level_line(measured - integral), axis=0)
+            self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
         unexplained, whole = self.state.rates
         share = np.sqrt(unexplained / np.where(whole > 0, whole, 1.0))
-        for name, found in zip(("roll", "pitch"), share, strict=True):
-            if not found <= UNEXPLAINED:
-                raise InputError(
-                    self.file,
-                    f"angles.{name}_rate",
-                    None,
-                    f"contradicts the hub forces: {found:.0%} of "
-                    "it is not the integral of their moment "
-                    f"(at most {UNEXPLAINED:.0%}): {REMEDY}",
-                )
+        for name, part in zip(("roll", "pitch"), share, strict=True):
+            if not part <= UNEXPLAINED:
+                said = f"{part:.0%} of it is not the integral of their moment (at most {UNEXPLAINED:.0%}): {REMEDY}"
+                raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {said}")
 
 
 def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
     """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
-    for name, value in (
-        ("period", period),
-        ("angle_deviations", min(angle_deviations)),
-        ("model", model),
-        ("angle_deviations", max(angle_deviations)),
-    ):
+    told = {"period": (period,), "angle_deviations": angle_deviations, "model": (model,)}
+    for name, value in ((name, value) for name, values in told.items() for value in sorted(values)):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
 
@@ -223,9 +210,9 @@ def estimate(
         )
     if np.isnan(angles.samples).all():
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
-    own = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
-    states, spread = own.advance(forces.samples, angles.samples)
-    return Tilt(states, spread, forces.period, own.surprise, own.doubts())
+    tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
+    states, spread = tilt_filter.advance(forces.samples, angles.samples)
+    return Tilt(states, spread, forces.period, tilt_filter.surprise, tilt_filter.doubts())
 
 
 def _level(wrenches: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -20,12 +20,11 @@ from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
 from models.measured.recording import Recording
-from models.multibody.cut_rigid import rigid
 from models.multibody.cut_table import Drive, table
 from models.systems.measured.checkpoint import Checkpoint, digest, digest_of
 from models.systems.measured.inputs import Grid, Inputs, Prescribed
 from models.systems.measured.sections import Answer, Sections
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
 
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import TiltFilter

@@ -1,6 +1,6 @@
 """How long a free run of a vehicle in space on measured hub forces can be trusted, said before it starts.
 
-The cut vehicle as one rigid body (``models.multibody.cut_rigid``). An error of roll, pitch and heading, e (3,), obeys
+The cut vehicle as one rigid body (``models.vehicles.cut_vehicle``). An error of roll, pitch and heading, e (3,), obeys
 
     e'' = A e + I^-1 (moment of noise and bias),
 
@@ -22,9 +22,8 @@ import numpy as np
 
 from models.engines.cut_vehicle import UPRIGHT
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_rigid import Rigid, rigid
 from models.systems.pitch_plane.trust import ANGLE, Trust
-from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, Rigid, rigid
 
 POINTS = 2000
 """Times at which the laws are summed."""

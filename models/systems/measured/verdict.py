@@ -16,11 +16,10 @@ from models.core.finding import Finding
 from models.drift import score
 from models.drift.score import SURPRISED, Errors, Limits, Own, Verdict, low_pass, rms
 from models.fatigue.damage import SLOPE, damage_ratio
-from models.multibody.cut_rigid import rigid
 from models.systems.measured.comparison import Compared
 from models.systems.measured.section_run import DAMPING, Hold, Outcome
 from models.systems.measured.virtual import VirtualMeasurement
-from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid
 
 LIMITS = Limits(artificial_share=0.1)
 """From where on a run is not good enough. A pull of 5 Hz, whose moment is 12 % of what turns the chassis, takes 5 % off

@@ -99,7 +99,7 @@ def in_time_only(vehicle: SpatialVehicle) -> bool:
 def linear_vehicle(vehicle: SpatialVehicle, engine: str = "reference") -> Linear:
     """The vehicle at a speed (m/s), linearised by an engine or from its equations."""
     if engine != "reference":
-        from models.engines.spatial_speeds import at_speeds
+        from models.engines.spatial_protocol import at_speeds
 
         return at_speeds(engine, vehicle)
     if vehicle.side_forces or vehicle.drags:

@@ -8,10 +8,9 @@ from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.vehicles.limits import NONE
 from models.vehicles.linear_vehicle import Wheel
 from models.vehicles.plausible import plausible
-from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial import NONE, SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 
 

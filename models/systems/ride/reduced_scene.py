@@ -7,8 +7,7 @@ from models.core.scene_effects import without as without_own
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import RideScene
-from models.vehicles.limits import Limits
-from models.vehicles.spatial import Freedom, SpatialVehicle
+from models.vehicles.spatial import Freedom, Limits, SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
 

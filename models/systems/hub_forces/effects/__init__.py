@@ -1,1 +1,107 @@
-"""Effects of scenes of hub forces, one file each: see ``models.core.scene_effects``."""
+"""Effects of scenes of hub forces: see ``models.core.scene_effects``."""
+
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.scene_effects import Entry, Table
+
+
+def _chosen(
+    says: str, place: str, cost: str, counts: dict[str, int], usual: str, instead: str | None, **more: Any
+) -> Entry:
+    """An effect that a word of the scene names, ``usual``; the word without it is ``instead``, None for the default.
+
+    One that needs the virtual measurement is none where the scene has files. What is stated of noise stays without it:
+    the filter is told the same deviations as before.
+    """
+    name, key = place.split(".")
+
+    def there(scene: Any) -> bool:
+        word = getattr(getattr(scene, name), key)
+        named = word == usual if key != "frame" else word != instead
+        return named and not (more.get("needs") and scene.road is None)
+
+    def leave_out(table: Table, scene: Any) -> None:
+        if instead is None:
+            del table[name][key]
+        else:
+            table.setdefault(name, {})[key] = instead
+
+    def put_in(table: Table, scene: Any) -> None:
+        table.setdefault(name, {})[key] = usual
+
+    return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in, **more)
+
+
+def _keep_road(table: Table, scene: Any) -> None:
+    """InputError: files must take its place."""
+    raise InputError(scene.file, "road", None, "can only give way to forces.file and angles.file: name them")
+
+
+NOISE: dict[str, Any] = {"needs": ("virtual_measurement",), "why": "for files have the noise that they have"}
+HOLDING = "as one moment holds roll and pitch"
+FILTER = tuple(f"models.systems.hub_forces.{name}" for name in ("tilt_filter", "tilt_march"))
+TABLE = {
+    "angle_noise": _chosen(
+        "White noise on every sample of roll, pitch and their rates",
+        "angles.noise",
+        "four random numbers per sample before the run; only a stabiliser reads them",
+        {"noisy angles": 4},
+        "white",
+        "none",
+        **NOISE,
+    ),
+    "force_noise": _chosen(
+        "White noise on every sample of the hub forces",
+        "forces.noise",
+        "a random number per component and sample before the run, no more in it",
+        {"noisy forces": 24},
+        "white",
+        "none",
+        **NOISE,
+    ),
+    "kalman_filter": _chosen(
+        "Roll and pitch held by a moment towards a Kalman filter's estimate",
+        "stabilise.method",
+        "a filter over all samples before the run, and two springs and dampers in it",
+        {"pulled angles": 2},
+        "kalman",
+        "none",
+        excludes=("prescribed_angles",),
+        why=HOLDING,
+        modules=FILTER,
+    ),
+    "prescribed_angles": _chosen(
+        "Roll and pitch enforced as measured, smoothed",
+        "stabilise.method",
+        "derivatives of the smoothed angles before the run, and in every call a mass matrix solved for two moments",
+        {"enforced angles": 2},
+        "prescribed",
+        "none",
+        excludes=("kalman_filter",),
+        why=HOLDING,
+    ),
+    "smooth_forces": _chosen(
+        "Forces with continuous rates between the samples",
+        "forces.interpolation",
+        "cubic pieces in place of straight ones",
+        {"curves between samples": 1},
+        "smooth",
+        None,
+    ),
+    "turning_forces": _chosen(
+        "Forces that turn with the hub or the chassis",
+        "forces.frame",
+        "a rotation per hub and call",
+        {"turning hubs": 4},
+        "hub",
+        "inertial",
+    ),
+    "virtual_measurement": Entry(
+        "Forces and angles of a virtual measurement on two tracks of a random road",
+        "road",
+        "a run of the whole vehicle on its tyres before the others",
+        {"runs on tyres": 1},
+        leave_out=_keep_road,
+    ),
+}

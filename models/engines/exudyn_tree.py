@@ -1,0 +1,174 @@
+"""Bodies of a vehicle in space in Exudyn: kinematic trees, sliders, and markers of their points.
+
+A body without parent and all that ride on it are one tree with a link per coordinate; only the last link of a body has
+mass. (Rigid bodies whose missing freedoms are constrained would be wrong: the explicit solvers drop constrained rows
+after solving with the full mass matrix, which couples them.)
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from models.engines.exudyn_system import KINDS, items, lists
+from models.vehicles.free_vehicle import anchor, joints
+from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle, Vector, steiner
+from models.vehicles.spatial_linear import Preloads
+
+JOINTS = {
+    freedom: getattr(exu.JointType, f"{'Revolute' if freedom.startswith('r') else 'Prismatic'}{freedom[-1].upper()}")
+    for freedom in FREEDOMS
+}
+SLIDES = {
+    "x": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "y": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+    "z": [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
+}
+"""Where a body of one slide has its own axes: its first one lies along the slide."""
+
+
+@dataclass
+class Build:
+    """Exudyn's system while it is put together.
+
+    links: (object, last link or None, where its joint is) of every body; places: (node, index within it) of every
+    coordinate; markers by body and point.
+    """
+
+    vehicle: SpatialVehicle
+    mbs: Any
+    held: Preloads
+    ground: Any
+    links: dict[str, tuple[Any, int | None, Vector]] = field(default_factory=dict)
+    places: dict[tuple[str, str], tuple[Any, int]] = field(default_factory=dict)
+    markers: dict[tuple[str | None, Vector, bool], Any] = field(default_factory=dict)
+    callbacks: int = 0
+
+    def marker(self, body: str | None, point: Vector, turning: bool = False) -> Any:
+        """Marker of a point, made once; ``turning``: it is asked for its axes or its turning, too."""
+        apart = turning and body is not None and self.links[body][1] is None
+        key = (body, point, apart or (body, point, True) in self.markers)
+        if key not in self.markers:
+            self.markers[key] = self.mbs.AddMarker(self._new_marker(*key))
+        return self.markers[key]
+
+    def _new_marker(self, body: str | None, point: Vector, turning: bool) -> Any:
+        if body is None:
+            return items.MarkerBodyRigid(bodyNumber=self.ground, localPosition=list(point))
+        tree, link, origin = self.links[body]
+        local = self.own(body, np.subtract(point, origin))
+        if link is None:
+            kind = items.MarkerBodyRigid if turning else items.MarkerBodyPosition
+            return kind(bodyNumber=tree, localPosition=local)
+        return items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=link, localPosition=local)
+
+    def reader(self, body: str, freedom: str, kind: Any = KINDS.Coordinates) -> Callable[[], float]:
+        """Function that reads a coordinate, or its rate, at the stage; 0 where the body does not have it."""
+        if (body, freedom) not in self.places:
+            return lambda: 0.0
+        read, (node, index) = self.mbs.GetNodeOutput, self.places[body, freedom]
+        if self.size(node) == 1:  # Exudyn gives a number, no array
+            return lambda: read(node, kind)
+        return lambda: read(node, kind)[index]
+
+    def size(self, node: Any) -> int:
+        """How many coordinates a node has."""
+        return sum(node == each for each, _ in self.places.values())
+
+    def own(self, body: str | None, vector: np.ndarray) -> np.ndarray:
+        """A vector (3,) of the design position in the axes that Exudyn gives a body."""
+        if body is None or self.links[body][1] is not None:
+            return vector
+        return np.array(SLIDES[self.vehicle.body(body).freedoms[0]]).T @ vector
+
+    def coordinate(self, node: Any, index: int) -> Any:
+        """Marker of one coordinate of a node."""
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=index))
+
+    def spring(self, first: Any, second: Any, **law: Any) -> None:
+        """A native spring-damper between two points along the space's axes, or a function of its place and speed."""
+        self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first, second], **law))
+        self.callbacks += "springForceUserFunction" in law
+
+    def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
+        """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
+        self.spring(
+            first, second, springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate)
+        )
+
+
+@dataclass
+class Link:
+    """The mass behind a joint; ``centre`` counts from the joint, ``inertia`` about the centre."""
+
+    mass: float = 0.0
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def load(self, body: Body, at: np.ndarray) -> None:
+        """Add a body's mass with its centre there."""
+        mass = self.mass + body.mass
+        centre = (self.mass * self.centre + body.mass * at) / mass if mass else at
+        self.inertia = (
+            self.inertia
+            + steiner(self.mass, self.centre - centre)
+            + np.array(body.inertia, float)
+            + steiner(body.mass, at - centre)
+        )
+        self.mass, self.centre = mass, centre
+
+
+def add_tree(built: Build, bodies: list[Body]) -> None:
+    """A body without parent and its riders: a link per coordinate, mass on the last one of each body.
+
+    A rider without freedoms adds its mass to the last link of what it rides on.
+    """
+    part = replace(built.vehicle, bodies=tuple(bodies))
+    rows, places, ends = joints(part), part.coordinates(), {body.name: anchor(part, body.name) for body in bodies}
+    links, zero = [Link() for _ in places], [0.0] * len(places)
+    for body in bodies:
+        last, origin = ends[body.name]
+        links[last].load(body, np.subtract(body.position, origin))
+    node = built.mbs.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=zero,
+            initialCoordinates=zero,
+            initialCoordinates_t=zero,
+            numberOfODE2Coordinates=len(links),
+        )
+    )
+    tree = built.mbs.AddObject(
+        items.ObjectKinematicTree(
+            nodeNumber=node,
+            gravity=[0, 0, -built.vehicle.gravity],
+            jointTypes=[JOINTS[freedom] for _, freedom in places],
+            linkParents=rows[:, 1].astype(int).tolist(),
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * len(links)),
+            jointOffsets=lists.Vector3DList(list(rows[:, 2:])),
+            linkInertiasCOM=lists.Matrix3DList([link.inertia for link in links]),
+            linkCOMs=lists.Vector3DList([link.centre for link in links]),
+            linkMasses=[link.mass for link in links],
+        )
+    )
+    built.links |= {name: (tree, *end) for name, end in ends.items()}
+    built.places |= {place: (node, i) for i, place in enumerate(places)}
+
+
+def add_slider(built: Build, body: Body) -> None:
+    """A body of one slide on the ground that carries nothing: with trees of one link a car takes 1.6 times as long."""
+    still, (freedom,) = [0.0], body.freedoms
+    node = built.mbs.AddNode(
+        items.Node1D(referenceCoordinates=still, initialCoordinates=still, initialVelocities=still)
+    )
+    mass = built.mbs.AddObject(
+        items.Mass1D(
+            nodeNumber=node, mass=body.mass, referencePosition=list(body.position), referenceRotation=SLIDES[freedom]
+        )
+    )
+    built.links[body.name], built.places[body.name, freedom] = (mass, None, body.position), (node, 0)
+    if freedom == "z" and built.vehicle.gravity:
+        built.mbs.AddLoad(
+            items.LoadCoordinate(markerNumber=built.coordinate(node, 0), load=-body.mass * built.vehicle.gravity)
+        )

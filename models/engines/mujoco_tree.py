@@ -1,0 +1,97 @@
+"""Bodies and joints of a vehicle in space in MuJoCo, their masses, and where MuJoCo keeps them.
+
+World axes are those of ride, z up. A body has one joint per freedom, in their order. MuJoCo counts bodies and joints
+from the root of a tree to its leaves: a rider may come earlier there than in the vehicle. Masses and inertias are
+written into the compiled model: MuJoCo refuses bodies without inertia, even where they never turn, and tensors that
+no distribution of mass has, which published vehicles contain.
+"""
+
+from collections.abc import Iterable, Mapping
+
+import mujoco
+import numpy as np
+
+from models.vehicles.spatial import FREEDOMS, Body, SpatialVehicle
+
+AXES = {freedom: np.eye(3)[i % 3].tolist() for i, freedom in enumerate(FREEDOMS)}
+NONE: Mapping[str, str] = {}
+"""Carriers, where no body is one with another: the body that rides on each, by their names."""
+
+
+def spec_of(vehicle: SpatialVehicle, step: float, carriers: Mapping[str, str] = NONE) -> mujoco.MjSpec:
+    """Bodies and joints, with masses and inertias of 1 for the moment (see ``weigh``).
+
+    Their names are numbers: a user's body may be called "world". carriers : bodies that are one with the only one that
+    rides on them, whose frame and name they get.
+    """
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = [0, 0, -vehicle.gravity]
+    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
+    off = mujoco.mjtDisableBit
+    spec.option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT
+    for body in (body for body in vehicle.bodies if body.name not in carriers):
+        joined = [part for part in vehicle.bodies if _merged(carriers, part.name) == body.name]
+        parent = joined[0].parent
+        below = spec.worldbody if parent is None else spec.body(numbers[parent])
+        built = below.add_body(
+            name=numbers[body.name],
+            pos=np.subtract(body.position, (0.0, 0.0, 0.0) if parent is None else vehicle.body(parent).position),
+            ipos=[0, 0, 0],
+            mass=1.0,
+            iquat=principal(body)[1],
+            inertia=[1.0, 1.0, 1.0],
+            explicitinertial=True,
+        )
+        for part, freedom in ((part, freedom) for part in joined for freedom in FREEDOMS if freedom in part.freedoms):
+            built.add_joint(
+                name=f"{numbers[part.name]} {freedom}",
+                type=mujoco.mjtJoint.mjJNT_HINGE if freedom.startswith("r") else mujoco.mjtJoint.mjJNT_SLIDE,
+                axis=AXES[freedom],
+                pos=np.subtract(part.position, body.position),
+            )
+    return spec
+
+
+def _merged(carriers: Mapping[str, str], name: str) -> str:
+    """The body that a body is one with in MuJoCo."""
+    while name in carriers:
+        name = carriers[name]
+    return name
+
+
+def principal(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Principal inertias (3,) and the quaternion of their axes; nothing turns where there are no products."""
+    tensor, quaternion = np.array(body.inertia, float), np.array([1.0, 0.0, 0.0, 0.0])
+    if np.array_equal(tensor, np.diag(tensor.diagonal())):
+        return tensor.diagonal(), quaternion
+    inertias, axes = np.linalg.eigh(tensor)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    return inertias, quaternion
+
+
+class Numbers:
+    """Where MuJoCo keeps a vehicle's bodies and coordinates: ids by name, columns (n,) by the vehicle's order.
+
+    carriers : bodies that are one there with the only one that rides on them, by its name.
+    """
+
+    def __init__(self, vehicle: SpatialVehicle, model: mujoco.MjModel, carriers: Mapping[str, str] = NONE) -> None:
+        order = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+        self.bodies = {name: int(model.body(order[_merged(carriers, name)]).id) for name in order}
+        self.joints: dict[tuple[str, str], int] = {
+            (name, freedom): int(model.joint(f"{order[name]} {freedom}").id) for name, freedom in vehicle.coordinates()
+        }
+        self.columns = np.array(list(self.joints.values()))
+
+
+def weigh(model: mujoco.MjModel, numbers: Numbers, bodies: Iterable[Body]) -> None:
+    """Give the bodies their masses and principal inertias, summed where they are one."""
+    model.body_mass[1:] = model.body_inertia[1:] = 0.0
+    for body in bodies:
+        number = numbers.bodies[body.name]
+        model.body_mass[number] += body.mass
+        model.body_inertia[number] += principal(body)[0]
+    mujoco.mj_setConst(model, mujoco.MjData(model))

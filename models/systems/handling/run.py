@@ -1,0 +1,216 @@
+"""A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.core.resolved import check_resolved
+from models.core.result import Channel, Result, result
+from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.spatial_protocol import SpatialRun
+from models.engines.spatial_reference import SpatialReference
+from models.multibody import forces as at
+from models.multibody.numbers import GRAVITY, Handling
+from models.systems.handling.scene import HandlingScene
+from models.tyre.bristles import SLOW
+from models.vehicles.free_vehicle import SWAY, chassis_of
+from models.vehicles.spatial_linear import mass
+
+LIMIT = 2.78
+"""Step times rate up to which the classical Runge-Kutta method damps what is damped."""
+UPRIGHT = 0.5
+"""Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane."""
+REPORTS = {
+    "load": (at.PRESS, "N", "of the tyre on the road"),
+    "fx": (at.FX, "N", "creep force along the wheel"),
+    "fy": (at.FY, "N", "creep force to its left"),
+    "mz": (at.MZ, "N m", "creep moment"),
+    "slip_x": (at.SLIP_X, "m/s", "slip along"),
+    "slip_y": (at.SLIP_Y, "m/s", "slip to the left"),
+    "tread": (at.TREAD, "m/s", "speed of the tread through the contact"),
+    "steer": (at.ANGLE, "rad", "steer angle"),
+    "power": (at.POWER, "W", "of the creep forces"),
+}
+"""Channels of every tyre: column of its report, unit, meaning."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A run (times, positions, rates) and its reports: tyres (m, w, REPORTED) and ledgers (m, LEDGER) of ``forces``;
+    CPU seconds of the march."""
+
+    handling: Handling
+    run: SpatialRun
+    tyres: np.ndarray
+    ledger: np.ndarray
+    seconds: float = 0.0
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        """(m, w): a channel of REPORTS."""
+        return self.tyres[:, :, REPORTS[channel][0]]
+
+    @property
+    def path(self) -> np.ndarray:
+        """(m, 3): x, y (m) of the chassis' place on the road, and yaw (rad)."""
+        return self.run.positions[:, :3]
+
+    def velocity(self) -> np.ndarray:
+        """(m, 3): velocities ahead and to the left (m/s) below the chassis' centre, yaw rate (rad/s)."""
+        yaw, rates = self.run.positions[:, 2], self.run.rates
+        place = chassis_of(self.handling.given).position
+        ahead = np.cos(yaw) * rates[:, 0] + np.sin(yaw) * rates[:, 1] - rates[:, 2] * place[1]
+        aside = np.cos(yaw) * rates[:, 1] - np.sin(yaw) * rates[:, 0] + rates[:, 2] * place[0]
+        return np.column_stack([ahead, aside, rates[:, 2]])
+
+    def lateral_acceleration(self) -> np.ndarray:
+        """(m,) m/s^2 along the vehicle's left, of the place below the chassis' centre."""
+        ahead, aside, turning = self.velocity().T
+        return np.gradient(aside, self.run.times) + ahead * turning
+
+    def slip_angles(self) -> np.ndarray:
+        """(m, w) rad: direction in which each wheel's contact moves beside its plane, right of it positive."""
+        return np.arctan2(-self["slip_y"], np.abs(self["tread"] + self["slip_x"]))
+
+    def grip(self) -> np.ndarray:
+        """(m, w) N: mu N, the largest horizontal force of each tyre."""
+        return self.handling.tyres.friction * self["load"]
+
+    def friction_used(self) -> np.ndarray:
+        """(m, w): horizontal force of each tyre by mu N, 0 in the air."""
+        return np.hypot(self["fx"], self["fy"]) / np.where(self.grip() > 0.0, self.grip(), 1.0)
+
+    def power(self) -> np.ndarray:
+        """(m,) W: of all that the ledgers tell and of the tyres' creep forces."""
+        ledger = self.ledger
+        power = ledger[:, at.DISSIPATED] + ledger[:, at.TORQUE_POWER] + ledger[:, at.STEER_POWER]
+        return power + self["power"].sum(axis=1)
+
+
+def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None) -> Result:
+    """A manoeuvre, the first where none is named, in "exudyn" or "mujoco"; the result's detail is the Drive.
+
+    Raises RunFailed where it does not end well.
+    """
+    name = manoeuvre or next(iter(scene.manoeuvres))
+    asked, handling = scene.manoeuvres[name], scene.handling(name)
+    drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
+    channels = {
+        key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
+        for key, per in (("positions", ""), ("rates", ", per s"))
+    }
+    channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
+    axes = {
+        "time": Channel("time", drive.run.times, "s"),
+        "coordinate": Channel("coordinate", [".".join(place) for place in handling.vehicle.coordinates()]),
+        "tyre": Channel("tyre", [tyre.name for tyre in handling.vehicle.tyres]),
+    }
+    counts, seconds = drive.run.counts, drive.seconds
+    return result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=name)
+
+
+def build(engine: str, handling: Handling) -> FreeModel:
+    """The vehicle in "exudyn" or "mujoco"."""
+    return free_model(engine, driven_by(handling))
+
+
+def driven_by(handling: Handling) -> Driven:
+    """What an engine builds: the bodies, and the compiled forces with their table."""
+    return Driven(handling.vehicle, handling.gravity, handling.numbers, at.forces, at.set_forces)
+
+
+def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
+    """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
+    model = build(engine, handling)
+    begun = time.process_time()
+    try:
+        path = model.run(*handling.straight(speed), duration, step)
+    except RunFailed as error:  # a car on its roof is soon no state that an engine can march
+        if error.state is not None:
+            _check_upright(handling, np.array([error.time]), error.state[None], engine)
+        raise
+    return read(handling, path, engine, time.process_time() - begun)
+
+
+def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float = 0.0) -> Drive:
+    """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
+    count, tyres = len(run.times), len(handling.vehicle.tyres)
+    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
+    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
+    at.reports(handling.numbers, run.times, *states, report, ledger)
+    if not np.isfinite(report).all():
+        raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
+    drive = Drive(handling, run, report, ledger, seconds)
+    _check_upright(handling, run.times, run.positions, engine)
+    _check_step(drive, engine)
+    check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
+    return drive
+
+
+def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
+    """Refuse a run whose car turns over: what follows is no car's motion."""
+    leans = [h.vehicle.coordinates().index((SWAY, turn)) for turn in ("rx", "ry")]
+    over = (np.abs(positions[:, leans]) > UPRIGHT).any(axis=1)
+    if over.any():
+        raise RunFailed(
+            engine,
+            f"the car turns over: it leans by more than {UPRIGHT} rad; drive more slowly or steer less",
+            float(times[np.argmax(over)]),
+        )
+
+
+def _check_step(drive: Drive, engine: str) -> None:
+    """Bristles that hold damp a wheel at C / u, u the speed of the tread: refuse a step that lets it swing up."""
+    h, times = drive.handling, drive.run.times
+    step, force = float(times[1] - times[0]), np.hypot(drive["fx"], drive["fy"])
+    for i, tyre in enumerate(h.vehicle.tyres):
+        n, load, tread = h.tyre_numbers(i), drive["load"][:, i], drive["tread"][:, i]
+        stiffness = 8.0 / 3.0 * n[at.RADIUS] * load / n[at.VERTICAL] * n[at.HALF_WIDTH] * n[at.BRISTLES]
+        lightness = 1.0 / h.vehicle.body(tyre.body).mass
+        if n[at.ROTOR] >= 0.0:
+            lightness += tyre.point[2] ** 2 / h.tyres.spin_inertia
+        holds = force[:, i] < 0.95 * n[at.GRIP] * load
+        damped = holds * stiffness * lightness / np.maximum(np.abs(tread), SLOW)
+        if step * damped.max() > LIMIT:
+            row = int(np.argmax(step * damped > LIMIT))
+            raise RunFailed(
+                engine,
+                f"tyre {tyre.name!r}, at {tread[row]:.3g} m/s, damps its wheel faster than "
+                f"steps of {step:g} s can follow; use at most {0.9 * LIMIT / damped.max():.2g} s, "
+                "or end the run before",
+                float(times[row]),
+            )
+
+
+def energy(drive: Drive) -> np.ndarray:
+    """(m,) J: kinetic energy, weights, springs and tyres, by the rigid bodies' own velocities."""
+    run = drive.run
+    motion = np.array([bodies_energy(drive.handling, q, v) for q, v in zip(run.positions, run.rates, strict=True)])
+    return motion + drive.ledger[:, at.POTENTIAL]
+
+
+def unaccounted(drive: Drive) -> np.ndarray:
+    """(m,) J: energy less what it was at the start and less what was put in and taken out since, by Simpson's rule.
+
+    Rows lie at every second step: the middle one of three belongs to the rule.
+    """
+    power, times, whole = drive.power(), drive.run.times, energy(drive)[::2]
+    work = np.cumsum((times[1] - times[0]) / 3.0 * (power[:-2:2] + 4.0 * power[1:-1:2] + power[2::2]))
+    return whole[1:] - whole[0] - work
+
+
+def bodies_energy(handling: Handling, q: np.ndarray, v: np.ndarray) -> float:
+    """Kinetic energy and that of weights (J), body by body by the written-out motion: without any engine."""
+    total, motions = 0.0, SpatialReference(handling.vehicle).motions_of(q, v)
+    for body in handling.vehicle.bodies:
+        motion = motions[body.name]
+        speed, spin = motion.shift @ v, motion.rotation.T @ (motion.turn @ v)
+        total += 0.5 * body.mass * speed @ speed + 0.5 * spin @ np.array(body.inertia) @ spin
+        total -= body.mass * handling.gravity @ motion.centre
+    return float(total)
+
+
+def friction_distance(speed: float, mu: float) -> float:
+    """Distance (m) in which sliding friction alone stops: v^2 / (2 mu g)."""
+    return speed**2 / (2.0 * mu * GRAVITY)

@@ -1,0 +1,120 @@
+"""Runs of a scene of hub forces with every stabiliser and without, and what is computed of them: errors, damage."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.core.result import Result
+from models.engines.cut_vehicle import build
+from models.fatigue.damage import damage_ratio
+from models.systems.hub_forces.run import MOTION, Measurement, check_halved, labelled, measure
+from models.systems.hub_forces.run import run as run_scene
+from models.systems.hub_forces.scene import HubScene, Method
+
+Progress = Callable[[str, float], None]
+FREE, FILTER, PRESCRIBED = "free", "filter", "prescribed"
+METHODS: dict[str, Method] = {FREE: "none", FILTER: "kalman", PRESCRIBED: "prescribed"}
+"""Runs that are compared, whatever the scene's own method, and how roll and pitch are held in them."""
+DRIFTED = 0.05
+"""rad: a roll or pitch that is off by more is drift-off, as in the study of the pitch plane."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A measurement, its runs by their names, why others failed, and the true run, None where nobody knows it."""
+
+    measurement: Measurement
+    runs: dict[str, Result]
+    failed: dict[str, str]
+    truth: Result | None
+
+    @property
+    def beside(self) -> str:
+        """What errors and damages are taken against."""
+        return "the true run" if self.truth is not None else "the run with the filter; the true one is not known"
+
+    def errors(self, run: Result) -> np.ndarray:
+        """Errors (m, 6) of roll, pitch, heading (rad), x, y, z (m) against the true run.
+
+        Where that is not known, those of roll and pitch against the filter's estimate, the others NaN.
+        """
+        if self.truth is not None:
+            return np.column_stack([run[name] - self.truth[name] for name in MOTION])
+        tilt, off = self.measurement.tilt, np.full((len(run.times), len(MOTION)), np.nan)
+        times = self.measurement.angles.period * np.arange(len(tilt.states))
+        for i, name in enumerate(("roll", "pitch")):
+            off[:, i] = run[name] - np.interp(run.times, times, tilt.states[:, i])
+        return off
+
+    def damages(self, forces: np.ndarray) -> dict[str, float]:
+        """Damage of every element by section forces (m, e), divided by that of the true run, or of the filter's."""
+        true = (self.truth or self.runs[FILTER])["section_force"]
+        names = (element.name for element in self.measurement.vehicle.elements)
+        return {name: damage_ratio(forces[:, i], true[:, i]) for i, name in enumerate(names)}
+
+    def drift_off(self, run: Result) -> float:
+        """First time (s) at which roll or pitch is off by DRIFTED; infinite if never."""
+        off = np.abs(self.errors(run)[:, :2]).max(axis=1) > DRIFTED
+        return float(run.times[np.argmax(off)]) if off.any() else float("inf")
+
+    def answer(self) -> dict[str, Any]:
+        """Per run: largest errors, rms of the stabiliser's moments, damage of every element; all against ``beside``."""
+        out: dict[str, Any] = {"beside": self.beside}
+        out |= {name: {"failed": text} for name, text in self.failed.items()}
+        for name, run in self.runs.items():
+            out[name] = {
+                **dict(zip(MOTION, map(float, np.abs(self.errors(run)).max(axis=0)), strict=True)),
+                "moments": np.sqrt(np.mean(run["holding_moment"] ** 2, axis=0)).tolist(),
+                "damage": self.damages(run["section_force"]),
+            }
+        return out
+
+    def engines_apart(self) -> float:
+        """Largest difference of any coordinate or rate between the engines, before drift-off, of what several ran."""
+        kinds = [[run for name, run in self.runs.items() if name.startswith(kind)] for kind in METHODS]
+        alike = max(kinds, key=len)
+        first, times = alike[0].detail.states, alike[0].times
+        rows = int(min(min(map(self.drift_off, alike)), times[-1]) / times[1]) + 1
+        return max(float(np.abs(run.detail.states[:rows] - first[:rows]).max()) for run in alike)
+
+
+def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lambda text, part: None) -> Comparison:
+    """All runs: by the scene's own method in every engine, by the others in the last one, which is the fastest.
+
+    Raises RunFailed where even the filter cannot hold the vehicle, or where the step is too long for its springs.
+    """
+    last, planned = engines[-1], planned_runs(scene, engines)
+    progress("virtual measurement", 0.05)
+    measurement = measure(scene, last)
+    progress("Kalman filter", 0.2)
+    measurement.tilt  # noqa: B018
+    runs, failed = dict[str, Result](), dict[str, str]()
+    for i, (name, (method, engine)) in enumerate(planned.items()):
+        progress(name, 0.3 + 0.6 * i / len(planned))
+        try:
+            runs[name] = run_scene(scene, engine, method, measurement)
+        except RunFailed as error:
+            if name == FILTER:  # what the others are compared with
+                raise
+            failed[name] = str(error)
+    vehicle, true = measurement.vehicle, measurement.truth
+    check_halved(
+        last,
+        runs[FILTER].detail,
+        [element.name for element in vehicle.elements],
+        lambda step, steps: build(last, vehicle, measurement.drive("kalman", step, steps), step, step * steps).run(),
+    )
+    return Comparison(measurement, runs, failed, labelled(measurement, true, last) if true is not None else None)
+
+
+def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:
+    """Method and engine of every run by its name; those of a stabiliser in the last engine need none beside theirs."""
+    return {
+        name if name != FREE and engine == engines[-1] else f"{name}, {engine}": (method, engine)
+        for name, method in METHODS.items()
+        for engine in engines
+        if method == scene.stabilise.method or engine == engines[-1]
+    }

@@ -1,0 +1,105 @@
+"""R19-free on its tyres or cut at its wheels, a twin without any symmetry, and what all of them are checked by."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+import numpy as np
+
+from models.engines.cut_vehicle import HubModel
+from models.engines.free_vehicle_mujoco import FreeMujoco
+from models.multibody import forces as at
+from models.multibody.cut_kernel import WRENCH
+from models.multibody.cut_table import Drive
+from models.multibody.numbers import Handling
+from models.tyre.bristles import brush
+from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+
+SEED = 31
+"""Of the wrenches that shake a vehicle."""
+
+
+@cache
+def r19() -> CutVehicle:
+    """The shipped car, cut."""
+    return cut(load_vehicle("r19_free"), "body")
+
+
+def twin() -> SpatialVehicle:
+    """R19-free without any symmetry: every spring, mount and wheel differs from every other, left from right."""
+    whole = load_vehicle("r19_free")
+    springs = tuple(
+        replace(s, stiffness=s.stiffness * (1 + 0.02 * i), damping=s.damping * (1.3 - 0.02 * i))
+        for i, s in enumerate(whole.springs)
+    )
+    bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
+    chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
+    return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
+
+
+def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:
+    """Hub forces that carry the vehicle at rest."""
+    forces = np.zeros((rows, WRENCH * len(vehicle.hubs)))
+    forces[:, 2::WRENCH] = vehicle.loads
+    return Drive(forces, frame)
+
+
+def anywhere(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates at random, the chassis turned by any heading and by up to a radian."""
+    rng = np.random.default_rng(seed)
+    q, v = rng.uniform(-0.03, 0.03, vehicle.size), rng.uniform(-0.5, 0.5, vehicle.size)
+    q[:6] = *rng.uniform(-5, 5, 3), rng.uniform(-3, 3), *rng.uniform(-1, 1, 2)
+    return q, v
+
+
+def shaken(vehicle: CutVehicle, frame: str, guide: bool) -> Drive:
+    """A row of six random components per hub, with a stabiliser or without."""
+    rng = np.random.default_rng(SEED)
+    drive = static(vehicle, 3, frame)
+    hubs = drive.hubs + rng.normal(0, 500.0, drive.hubs.shape[1])
+    return replace(drive, hubs=hubs, guide=rng.normal(0, 0.1, (1, 6)).repeat(3, axis=0) if guide else None)
+
+
+def by_jacobians(built: HubModel, q: np.ndarray, wrenches: np.ndarray, frame: str = "hub") -> np.ndarray:
+    """Joint forces (n,) of wrenches (6 h,) at the hubs, in axes of these or "inertial" ones, by MuJoCo's Jacobians."""
+    assert isinstance(built.model, FreeMujoco)
+    model, names = built.model.model, [body.name for body in built.vehicle.tree.bodies]
+    data, forces = mujoco.MjData(model), np.zeros(built.size)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    for tyre, wrench in zip(built.vehicle.whole.tyres, wrenches.reshape(-1, 2, 3), strict=True):
+        body = int(model.body(str(names.index(tyre.body))).id)
+        force, moment = wrench if frame == "inertial" else wrench @ data.xmat[body].reshape(3, 3).T
+        mujoco.mj_applyFT(model, data, force, moment, data.xpos[body], body, forces)
+    return forces
+
+
+def cornering_error(handling: Handling, slip: float = 1e-7) -> float:
+    """Largest error of a tyre's cornering stiffness at its static load, out of its table, by the ride vehicle's."""
+    wanted, worst = {force.name: force.stiffness for force in handling.given.side_forces}, 0.0
+    for i, tyre in enumerate(handling.vehicle.tyres):
+        n = handling.tyre_numbers(i)
+        half = np.sqrt(n[at.RADIUS] * n[at.STATIC] / n[at.VERTICAL])
+        slides = np.array([[0, slip, 0, 1.0]])
+        force = brush(n[at.STATIC], n[at.GRIP], half, n[at.HALF_WIDTH], n[at.BRISTLES], slides)[0, 1]
+        worst = max(worst, abs(float(-force / slip) / wanted[tyre.name] - 1.0))
+    return worst
+
+
+def mirrored(handling: Handling, values: np.ndarray) -> np.ndarray:
+    """Values (..., n) of the coordinates of a car as those of its mirror image, left and right exchanged."""
+    places = handling.vehicle.coordinates()
+    swap = [places.index((_opposite(name), freedom)) for name, freedom in places]
+    return np.array([-1.0 if freedom in ("y", "rx", "rz") else 1.0 for _, freedom in places]) * values[..., swap]
+
+
+def _opposite(name: str) -> str:
+    """The body on the other side."""
+    for left, right in (("fl", "fr"), ("rl", "rr"), ("left", "right")):
+        for side, opposite in ((left, right), (right, left)):
+            if name.startswith(side):
+                return name.replace(side, opposite, 1)
+    return name
