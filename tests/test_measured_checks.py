@@ -10,14 +10,13 @@ import pytest
 from models.core.finding import Finding, gathered, queries
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.means import mean
-from models.measured.checks.place import Place
 from models.measured.checks.response import Response
+from models.measured.checks.spectra import mean
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import Place, Quantity, Signal
 from models.multibody.cut_rigid import rigid
 from models.systems.hub_forces.tilt_filter import TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, told

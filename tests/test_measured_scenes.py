@@ -9,16 +9,14 @@ import pytest
 from models.core.errors import InputError
 from models.measured.channel import Channel
 from models.measured.formats import open_source
-from models.measured.no_value import without_absurd
-from models.measured.places import Places
+from models.measured.gaps import without_absurd
 from models.measured.resampling import onto
-from models.measured.signal import Signal
+from models.measured.signal import Places, Signal
 from models.measured.timing import timing
 from models.measured.units import conversion
 from models.systems.measured.channel_map import signals
 from models.systems.measured.clock import record
-from models.systems.measured.guess import guess
-from models.systems.measured.listing import describe
+from models.systems.measured.listing import describe, guess
 from models.systems.measured.plan import check
 from models.systems.measured.scene import build
 from studies.recording import run

@@ -95,10 +95,11 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
 
 def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, dict[str, int]]:
     """The scene's files, or those of its virtual measurement, on one clock; how many channels do not tell the truth."""
+    from models.systems.measured.pattern import write_pattern
+
     from models.measured.faults_of_measurement import Faults
     from models.systems.measured import plan
     from models.systems.measured.clock import record
-    from models.systems.measured.pattern import write_pattern
     from models.systems.measured.virtual import virtual_measurement
 
     rig, own, faulty = scene.rig(), scene.virtual, np.zeros((2, 1), bool)

@@ -11,8 +11,8 @@ from scipy.interpolate import make_interp_spline
 
 from models.core.finding import Finding
 from models.measured.checks import check
-from models.measured.checks.place import Place
 from models.measured.faults_of_measurement import Faults
+from models.measured.signal import Place
 from models.systems.hub_forces.scene import Road
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, cut

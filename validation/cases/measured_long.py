@@ -11,10 +11,10 @@ from models.engines.cut_vehicle import build
 from models.fatigue.counting import count, level_crossings, range_pairs
 from models.fatigue.rainflow_cycles import cycles
 from models.measured.formats import open_source
-from models.systems.measured.comparison import checks, compare
-from models.systems.measured.hand_on import hand_on
+from models.systems.measured.run import hand_on
 from models.systems.measured.section_run import Hold, run
 from models.systems.measured.sections import Sections, guided
+from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import cut
 from validation.cases.hub_forces import _anywhere, _shaken, twin
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, within

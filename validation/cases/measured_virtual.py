@@ -15,12 +15,11 @@ from models.core.systems import load
 from models.engines.cut_vehicle import ENGINES
 from models.measured.channel import BLOCK
 from models.measured.checks import check as check_recording
-from models.measured.checks.place import Place
 from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import Place, Signal
 from models.multibody.cut_rigid import rigid
 from models.systems.hub_forces.measurement import HubForces, model
 from models.systems.measured import plan

@@ -15,6 +15,7 @@ run are right whatever its tilt is. What ends its trust for them is tumbling, wh
 forces keep their directions an error of ``ANGLE`` turns as much of every force into another axis.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -41,8 +42,8 @@ class Level:
     force: float
     moment: float
     bias: np.ndarray | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)
-    rate: tuple[float, float] = (0.0, 0.0)
+    tilt: Sequence[float] = (0.0, 0.0)
+    rate: Sequence[float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
