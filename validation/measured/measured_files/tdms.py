@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.measured.formats.write_tdms import write_tdms
-from models.measured.formats.writing import Group
+from models.measured.formats.writing import Group, write_tdms
 from validation.measured.measured_files.csv import BACK, MANY, WIDE, raw
 from validation.measured.measured_files.odd import (
     COUNT,
