@@ -169,8 +169,8 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
         announced = whole(path, parameters, "SAMPLES", announced)
     else:
         texts.append(
-            f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at the "
-            "end may be padding of the last group"
+            f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "
+            "the end may be padding of the last group"
         )
     count, extra = min(announced, there), data - size * -(-announced // layout.points)
     if count == 0:

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -145,7 +145,7 @@ def _csv_header(group: Group, start: datetime | None, comment: str) -> str:
     for name, text in zip(group.names, group.comments, strict=True):
         lines += [f"channel {json.dumps(name, ensure_ascii=False)}: {line}" for line in text.splitlines()]
     headings, names = io.StringIO(), [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)]
-    quoting = csv.QUOTE_ALL if ";" in "".join(names) else csv.QUOTE_MINIMAL  # it would look like a separator
+    quoting: Literal[0, 1] = 1 if ";" in "".join(names) else 0  # of all: it would look like a separator
     csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *names])
     return "".join(f"# {line}\n" for line in lines) + headings.getvalue()
 
