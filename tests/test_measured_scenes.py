@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
+from models.core.result import load as load_result
 from models.measured.channel import Channel
 from models.measured.formats import open_source
 from models.measured.gaps import without_absurd
@@ -384,6 +385,10 @@ def test_from_the_road_to_the_page(tmp_path):
     handed = open_source(tmp_path / "section_forces.csv")
     assert {channel.name for channel in handed.channels} == {"front left F", *(f"fl hub {axis}" for axis in AXES)}
     (block,) = handed.blocks(["front left F"])
+    saved = load_result(tmp_path / "recording.nc").data
+    assert saved["section_force"].values.tolist() == list(summary["channels"]) and saved.attrs["system"] == "measured"
+    assert saved["greatest"].values[0] == block.values.max() and saved["damage"].shape == (7, 1)
+    assert np.array_equal(saved["front left F"].values, block.values[:, 0]) and saved.attrs["run"] == "kalman"
     assert numbers(summary)["front left F, max [N]"] == np.abs(block.values).max()  # what a sweep draws
 
 

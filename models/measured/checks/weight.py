@@ -9,6 +9,7 @@ from scipy.linalg import null_space
 
 from models.core.finding import Finding
 from models.measured import axle_forces
+from models.measured.axle_balance import axles
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.response import number
 from models.measured.checks.spectra import mean
@@ -52,8 +53,8 @@ class Balance:
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are shares of the load, in %, or recorded by true value where sign or unit is wrong."""
     if evidence.plane is not None:
-        axles = axle_forces.axles(evidence.recording, evidence.plane)
-        return axle_forces.check(axles) if axles else []
+        forces = axles(evidence.recording, evidence.plane)
+        return axle_forces.check(forces) if forces else []
     vehicle, own = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
     if vehicle is None or set(own) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import tee
 from pathlib import Path
 
 import numpy as np
@@ -23,19 +24,6 @@ DATED = "2026-11-21T08:00:00+00:00"
 
 
 @dataclass(frozen=True)
-class Spans:
-    """Blocks from sample ``first`` to ``count``, made as they are asked for: a damaged file may claim billions."""
-
-    first: int
-    count: int
-    length: int
-
-    def __iter__(self) -> Iterator[Span]:
-        """Every block in turn, from the beginning each time."""
-        return ((i, min(self.length, self.count - i)) for i in range(self.first, self.count, self.length))
-
-
-@dataclass(frozen=True)
 class Opened(ABC):
     """A file whose channels are known; its samples are read when asked for, and no handle stays open between."""
 
@@ -49,7 +37,8 @@ class Opened(ABC):
         """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
-        return self._checked(chosen, Spans(first, count, length))
+        spans = ((i, min(length, count - i)) for i in range(first, count, length))  # a damaged file may claim billions
+        return self._checked(chosen, spans)
 
     @abstractmethod
     def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -68,9 +57,9 @@ class Opened(ABC):
 
     def _checked(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[Block]:
         """Blocks that are complete, with times and values that are numbers or NaN."""
-        names = [self.channels[i].name for i in chosen]
+        names, (mine, theirs) = [self.channels[i].name for i in chosen], tee(spans)
         with readable(self.path):
-            for (first, count), (times, values) in zip(spans, self.pieces(chosen, spans), strict=True):
+            for (first, count), (times, values) in zip(mine, self.pieces(chosen, theirs), strict=True):
                 if len(times) != count:
                     ends = f"the data end here, although {first + count} samples or more are announced"
                     raise InputError(self.path, f"sample {first + len(times)}", None, ends)

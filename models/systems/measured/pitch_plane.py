@@ -21,7 +21,7 @@ from models.drift import score
 from models.drift.score import Limits, Verdict
 from models.drift.section_forces import section_forces
 from models.measured import axle_forces
-from models.measured.axle_forces import AXLES, axle_signals, axles
+from models.measured.axle_balance import AXLES, axle_signals, axles
 from models.measured.columns import Columns
 from models.measured.gaps import bridged
 from models.measured.recording import Recording

@@ -12,7 +12,7 @@ from models.core.scene_effects import with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted, quantity
 from models.drift.score import Limits
-from models.measured.axle_forces import AXLES
+from models.measured.axle_balance import AXLES
 from models.measured.signal import Frame, Place, Places, Quantity
 from models.systems.measured.pitch_plane import CHASSIS, SPRINGS
 from models.systems.measured.sections import names
