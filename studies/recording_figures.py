@@ -48,7 +48,9 @@ def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
     signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
     if not signals:
         return None
-    if finding.check in ("weight", "gain", "sign", "unit") and _loads(evidence, signals):
+    vertical, hubs = evidence.vertical(), evidence.vehicle.hubs if evidence.vehicle else ()
+    loads = len(vertical) == len(hubs) > 0 and set(signals) <= set(vertical.values())
+    if finding.check in ("weight", "gain", "sign", "unit") and loads:
         return _means(evidence, path)
     if evidence.agreement is not None and fault is not None:
         return _exchange(evidence, fault, path) if fault.kind == "swapped" else _ratio(evidence, fault, path)
@@ -62,12 +64,6 @@ def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str =
         drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
     drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
     return save(drawn, path)
-
-
-def _loads(evidence: Evidence, signals: tuple[Signal, ...]) -> bool:
-    """Whether signals are vertical forces of a vehicle whose hubs all have one."""
-    own = evidence.vertical()
-    return evidence.vehicle is not None and len(own) == len(evidence.vehicle.hubs) and set(signals) <= set(own.values())
 
 
 def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,75 +36,63 @@ def columns(virtual: VirtualMeasurement, *names: str) -> list[int]:
     return [[s.name for s in virtual.signals].index(name) for name in names]
 
 
-def _times(names: tuple[str, ...], factor: float, add: float, virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
+    """A change of a recording's samples, asked for by what it takes beside these."""
+
+    def made(*settings: Any, **named: Any) -> Spoil:
+        return lambda virtual, samples: change(virtual, samples, *settings, **named)
+
+    return wraps(change)(made)
+
+
+@spoiling
+def times(virtual: VirtualMeasurement, samples: np.ndarray, factor: float, *names: str, add: float = 0.0) -> None:
+    """Samples of some channels, times a factor."""
     samples[:, columns(virtual, *names)] = factor * samples[:, columns(virtual, *names)] + add
 
 
-def times(factor: float, *names: str, add: float = 0.0) -> Spoil:
-    """Samples of some channels, times a factor."""
-    return partial(_times, names, factor, add)
-
-
-def _exchanged(pairs: tuple[tuple[str, str], ...], virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
+    """All channels of hubs, exchanged."""
     for pair in pairs:
         first, second = (columns(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB)) for hub in pair)
         samples[:, first + second] = samples[:, second + first]
 
 
-def exchanged(*pairs: tuple[str, str]) -> Spoil:
-    """All channels of hubs, exchanged."""
-    return partial(_exchanged, pairs)
-
-
-def _lost(name: str, begin: float, length: float, virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def lost(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+    """A channel that is silent from a time on, for another (s)."""
     first = round(begin / virtual.period)
     samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
 
 
-def lost(name: str, begin: float, length: float) -> Spoil:
-    """A channel that is silent from a time on, for another (s)."""
-    return partial(_lost, name, begin, length)
-
-
-def _held(name: str, begin: float, length: float, virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def held(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+    """A channel that keeps its value from a time on, for another (s)."""
     first, (own,) = round(begin / virtual.period), columns(virtual, name)
     samples[first : first + round(length / virtual.period), own] = samples[first, own]
 
 
-def held(name: str, begin: float, length: float) -> Spoil:
-    """A channel that keeps its value from a time on, for another (s)."""
-    return partial(_held, name, begin, length)
-
-
-def _spiked(name: str, time: float, height: float, virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: float, height: float) -> None:
+    """One sample of a channel too high."""
     samples[round(time / virtual.period), columns(virtual, name)] += height
 
 
-def spiked(name: str, time: float, height: float) -> Spoil:
-    """One sample of a channel too high."""
-    return partial(_spiked, name, time, height)
-
-
-def _clipped(name: str, part: float, virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, part: float) -> None:
+    """The largest samples of a channel cut off."""
     (own,) = columns(virtual, name)
     samples[:, own] = np.minimum(samples[:, own], np.quantile(samples[:, own], 1 - part))
 
 
-def clipped(name: str, part: float) -> Spoil:
-    """The largest samples of a channel cut off."""
-    return partial(_clipped, name, part)
-
-
-def _referred(lever: float, hubs: tuple[str, ...], virtual: VirtualMeasurement, samples: np.ndarray) -> None:
+@spoiling
+def referred(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hubs: str) -> None:
+    """Moments of hubs about a point so far (m) above them: (Mx + r Fy, My - r Fx)."""
     for hub in hubs:
         fx, fy, mx, my = columns(virtual, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
         samples[:, mx] += lever * samples[:, fy]
         samples[:, my] -= lever * samples[:, fx]
-
-
-def referred(lever: float, *hubs: str) -> Spoil:
-    """Moments of hubs about a point so far (m) above them: (Mx + r Fy, My - r Fx)."""
-    return partial(_referred, lever, hubs)
 
 
 @dataclass(frozen=True)

@@ -77,8 +77,10 @@ class Evidence:
 
     @cached_property
     def dead(self) -> tuple[str, ...]:
-        """Names of forces and inertial signals that never change."""
-        return tuple(s.name for s in (*self.forces, *self.inertial) if _still(self.recording.samples(s)))
+        """Names of forces and inertial signals all of whose measured samples are one value."""
+        samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial))
+        known = ((name, values[np.isfinite(values)]) for name, values in samples)
+        return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
     def coarse(self) -> dict[Signal, float]:
@@ -155,8 +157,3 @@ class Evidence:
             if fault.kind == "crossed" and signal in fault.signals:
                 return next(s.at for s in fault.signals if s != signal)
         return signal.at
-
-
-def _still(values: np.ndarray) -> bool:
-    """Whether all that was measured is one value."""
-    return bool(np.nanmin(values) == np.nanmax(values)) if np.isfinite(values).any() else True

@@ -28,10 +28,10 @@ def check(evidence: Evidence) -> list[Finding]:
                 f"{unit}: correct [noise], or predictions and filter are off."
             )
             doubts.append(Finding(NAME, "doubt", signal.name, text, size, unit, (signal.name,)))
-    return doubts + [_note(what, np.array(own)) for what, own in sizes.items() if np.isfinite(own).any()]
-
-
-def _note(what: Quantity, sizes: np.ndarray) -> Finding:
-    low, high, unit = float(np.nanmin(sizes)), float(np.nanmax(sizes)), UNITS[what]
-    text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
-    return Finding(NAME, "note", "", text, float(np.nanmean(sizes)), unit)
+    notes = list[Finding]()
+    for what, own in sizes.items():
+        if np.isfinite(own).any():
+            unit, low, high = UNITS[what], float(np.nanmin(own)), float(np.nanmax(own))
+            text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
+            notes.append(Finding(NAME, "note", "", text, float(np.nanmean(own)), unit))
+    return doubts + notes

@@ -136,7 +136,9 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
     said, samples = list[Finding](), remarks.samples
     if left:
-        whole = _cells_of_end(path, layout, left) == layout.width
+        with path.open("rb") as file:
+            file.seek(-left, io.SEEK_END)
+            whole = narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
         ends = "may be" if whole else "is"
         text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
         said.append(notice(path, "note" if whole else "doubt", text))
@@ -146,13 +148,6 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
     return said
-
-
-def _cells_of_end(path: Path, layout: Layout, left: int) -> int:
-    """Cells of what follows the last line end, its last ``left`` bytes."""
-    with path.open("rb") as file:
-        file.seek(-left, io.SEEK_END)
-        return narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1
 
 
 def _factor(path: Path, head: Head, clock: int, unit: str) -> float:

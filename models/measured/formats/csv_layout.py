@@ -291,7 +291,9 @@ def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, 
         weight: Weight = "doubt" if units[i] or heading(head.names[i])[1] else "note"
         said.append(notice(path, weight, f"left out, no numbers: {head.names[i]!r}"))
     for i in nameless:
-        weight = "note" if _counts(columns[i]) else "doubt"
+        cells = columns[i]
+        counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
+        weight = "note" if counts else "doubt"
         said.append(notice(path, weight, f"column {i + 1} has no name and is left out"))
     return layout, said + [notice(path, "note", text) for text in _how(layout, list(numbers))]
 
@@ -316,11 +318,6 @@ def _how(layout: Layout, cells: list[str]) -> Iterator[str]:
 def is_stamp(cell: str) -> bool:
     """Whether a cell is a time of the clock."""
     return not is_number(cell) and TIMED.fullmatch(cell) is not None
-
-
-def _counts(cells: list[str]) -> bool:
-    """Whether a column counts the rows."""
-    return bool(cells) and cells[0] in ("0", "1") and cells == [str(i + int(cells[0])) for i in range(len(cells))]
 
 
 def _is_text(cells: list[str]) -> bool:

@@ -119,19 +119,14 @@ def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
 def open_mdf(path: Path) -> MdfFile:
     """List the channels of a file; raises InputError where it is damaged."""
     with readable(path):
-        version = _version(path)
+        with path.open("rb") as file:
+            identification = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
+        if identification is None:
+            raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
+        version = int(identification[1])
         found = check_blocks(path) if version == 4 else []
         with opened(path) as mdf:
             return _listed(path, mdf, version, found)
-
-
-def _version(path: Path) -> int:
-    """Version of MDF, from the first 64 bytes of the file."""
-    with path.open("rb") as file:
-        found = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
-    if found is None:
-        raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
-    return int(found[1])
 
 
 def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile:

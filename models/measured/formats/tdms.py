@@ -55,7 +55,11 @@ class TdmsData(Opened):
             for first, count in spans:
                 values = [np.asarray(data[one.group][one.name].read_data(first, count), float) for one in places]
                 least = min(len(column) for column in values)
-                yield _times(data, places[0], first, least), np.column_stack([column[:least] for column in values])
+                place = places[0]
+                times = place.increment * np.arange(first, first + least)
+                if place.clock:
+                    times = np.asarray(data[place.group][place.clock].read_data(first, least), float)
+                yield place.first + times, np.column_stack([column[:least] for column in values])
 
 
 class Bounded(io.BufferedReader):
@@ -79,13 +83,6 @@ def opened(path: Path, file: Bounded) -> Any:
         raise InputError(path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
     log_manager.set_level(logging.CRITICAL)
     return TdmsFile.open(file, raw_timestamps=True)
-
-
-def _times(data: Any, place: Place, first: int, count: int) -> np.ndarray:
-    """Times (n,) in s since the start of the file."""
-    if place.clock:
-        return place.first + np.asarray(data[place.group][place.clock].read_data(first, count), float)
-    return place.first + place.increment * np.arange(first, first + count)
 
 
 def open_tdms(path: Path) -> TdmsData:

@@ -33,7 +33,13 @@ def signals(scene: MeasuredScene, sources: Sequence[Source], places: Places) -> 
     for place, row, source in rows:
         name = row.channel if names.count(row.channel) == 1 else f"{row.channel} ({source.path.name})"
         signal = _signal(scene.file, place, row, source, places, name)
-        _check_new(scene.file, place, signal, mapped)
+        for before in mapped:
+            if before.name == signal.name:
+                raise InputError(scene.file, place, row.channel, "is mapped twice: each channel is one signal")
+            same = (before.quantity, before.at, before.component) == (signal.quantity, signal.at, signal.component)
+            if same and not (signal.check or before.check):
+                text = f"measures the same as {before.channel!r}: say check = true of one of them"
+                raise InputError(scene.file, place, row.channel, text)
         mapped.append(signal)
     frames = {signal.frame: signal for signal in mapped if signal.at in places.hubs and not signal.check}
     if len(frames) > 1:
@@ -102,14 +108,3 @@ def _check_place(file: str, place: str, row: MappedChannel, places: Places) -> N
             allowed = f"must be {', '.join(axes[:-1])} or {axes[-1]}"
         text = f"{allowed} ({row.quantity} at {row.at!r})"
         raise InputError(file, f"{place}, component", row.component or None, text)
-
-
-def _check_new(file: str, place: str, signal: Signal, before: list[Signal]) -> None:
-    """Refuse a channel that is mapped twice, and two that would both be put in as the same."""
-    for other in before:
-        if other.name == signal.name:
-            raise InputError(file, place, signal.channel, "is mapped twice: each channel is one signal")
-        same = (other.quantity, other.at, other.component) == (signal.quantity, signal.at, signal.component)
-        if same and not (signal.check or other.check):
-            text = f"measures the same as {other.channel!r}: say check = true of one of them"
-            raise InputError(file, place, signal.channel, text)

@@ -178,18 +178,15 @@ class Prescribed:
 
     def rows(self, first: int, count: int) -> np.ndarray:
         """Roll, pitch, their rates and accelerations (count, 6) at half steps after sample ``first``."""
-        begin, out, done = int(first / self.grid.part), np.empty((count, 6)), 0
+        begin, out, done, period = int(first / self.grid.part), np.empty((count, 6)), 0, self.grid.period
         while done < count:
             window, offset = divmod(begin + done, self._per)
             taken = min(self._per - offset, count - done)
-            out[done : done + taken] = self._stretch(window)[offset : offset + taken]
+            stretch = window * self._length
+            start = max(stretch - OVERLAP, 0)
+            samples = self.angles[start : stretch + self._length + OVERLAP + 1]
+            spline = Smooth(samples, period, derivatives=2, degree=5)
+            rows = spline.sample((stretch - start) * period, self.grid.step / 2, self._per)
+            out[done : done + taken] = rows[offset : offset + taken]
             done += taken
         return out
-
-    def _stretch(self, window: int) -> np.ndarray:
-        """Rows of one stretch of samples."""
-        first, period = window * self._length, self.grid.period
-        start = max(first - OVERLAP, 0)
-        samples = self.angles[start : first + self._length + OVERLAP + 1]
-        spline = Smooth(samples, period, derivatives=2, degree=5)
-        return spline.sample((first - start) * period, self.grid.step / 2, self._per)

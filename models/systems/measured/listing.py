@@ -169,21 +169,15 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
     blocks = [next(source.blocks(names, BLOCK, first)) for first in firsts]
     if not blocks:
         return dict.fromkeys(names, f"{'':>10} {0:>10}")
-    rate = _rate(np.concatenate([np.diff(block.times) for block in blocks]))
+    steps = np.concatenate([np.diff(block.times) for block in blocks])
+    step, mean = (float(fun(steps)) if len(steps) else 0.0 for fun in (np.median, np.mean))  # rounded times repeat
+    rate = f"{1.0 / step:.6g}" if step > 0 else f"~{1.0 / mean:.4g}" if mean > 0 else "none"
     low, high = (
         fun([fun(block.values, axis=0, initial=start, where=np.isfinite(block.values)) for block in blocks], axis=0)
         for fun, start in ((np.min, np.inf), (np.max, -np.inf))
     )
     head = f"{rate:>10} {count:>10} {blocks[0].times[0]:>9.6g} {blocks[-1].times[-1]:>9.6g}"
     return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(names, low, high, strict=True)}
-
-
-def _rate(steps: np.ndarray) -> str:
-    """Samples per second by the steps (s) between them, their mean where rounded times repeat; none of one sample."""
-    step = float(np.median(steps)) if len(steps) else 0.0
-    if step > 0:
-        return f"{1.0 / step:.6g}"
-    return f"~{1.0 / steps.mean():.4g}" if len(steps) and steps.mean() > 0 else "none"
 
 
 def scene_text(source: Source) -> str:

@@ -92,7 +92,11 @@ class Sections:
         joined = joints(self.vehicle)
         object.__setattr__(self, "answers", tuple(answer for _, answer in kept))
         object.__setattr__(self, "columns", np.array([column for column, _ in kept]))
-        object.__setattr__(self, "_guides", (*_guides(self.vehicle, joined), _points(self.points, joined)))
+        rows = [
+            [joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in self.points
+        ]
+        points = np.array(rows, float).reshape(len(rows), 5)
+        object.__setattr__(self, "_guides", (*_guides(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
         """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
@@ -171,11 +175,6 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
     last = np.array([joined.last[name] for name in guided(vehicle)], np.int64)
     rows = [[float(behind(owner, name)) for owner in owners] for name in guided(vehicle)]
     return last, np.array(rows).reshape(len(last), len(owners))
-
-
-def _points(points: tuple[Point, ...], joined: Joints) -> np.ndarray:
-    rows = [[joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in points]
-    return np.array(rows, float).reshape(len(points), 5)
 
 
 def points(vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, Place]) -> tuple[Point, ...]:

@@ -102,7 +102,10 @@ def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, fil
     drive = two_tracks(vehicle, left, right, own.road.speed, own.step, round(own.duration / own.step))
     run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
     hubs = run.wrenches.reshape(len(run.times), -1)
-    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), _checks(vehicle, run, drive, own)])
+    elements = [element.name for element in vehicle.elements]
+    forces, gauged = ([elements.index(name) for name in names] for names in (own.sections, own.travels))
+    checks = [run.elements[:, forces], *([travels(vehicle, run, drive)[:, gauged]] if gauged else [])]
+    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), *checks])
     return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
 
 
@@ -170,15 +173,6 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
             -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch),
         ]
     )
-
-
-def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> np.ndarray:
-    """Forces and travels (n, m) of springs, mounts and bars, only to be compared with."""
-    names = [element.name for element in vehicle.elements]
-    forces = run.elements[:, [names.index(name) for name in own.sections]]
-    if not own.travels:
-        return forces
-    return np.hstack([forces, travels(vehicle, run, drive)[:, [names.index(name) for name in own.travels]]])
 
 
 def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:

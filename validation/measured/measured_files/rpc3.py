@@ -37,15 +37,10 @@ def with_parameters(make: Make = RPC, **changed: str | None) -> Make:
         values |= {names.get(key, key): value for key, value in changed.items()}
         kept = {name: value for name, value in values.items() if value is not None}
         kept["NUM_PARAMS"] = changed.get("NUM_PARAMS") or str(len(kept))
-        records = [_record(name, value) for name, value in kept.items()]
-        return b"".join(records).ljust(size, b"\0") + data[size:]
+        latin = [(name.encode().ljust(KEY, b"\0"), value.encode("latin-1")) for name, value in kept.items()]
+        return b"".join(key + value.ljust(RECORD - KEY, b"\0") for key, value in latin).ljust(size, b"\0") + data[size:]
 
     return altered(make, change)
-
-
-def _record(key: str, value: str) -> bytes:
-    """One parameter."""
-    return key.encode().ljust(KEY, b"\0") + value.encode("latin-1").ljust(RECORD - KEY, b"\0")
 
 
 def _values(data: bytes) -> dict[str, Any]:
