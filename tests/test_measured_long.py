@@ -17,8 +17,8 @@ from models.fatigue.rainflow_cycles import cycles
 from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import TiltFilter
+from models.systems.measured.hand_on import hand_on
 from models.systems.measured.inputs import Grid, Inputs
-from models.systems.measured.run import hand_on
 from models.systems.measured.section_run import Checkpoint, Hold, SectionRun, run
 from models.systems.measured.sections import Point, Sections, points
 from models.systems.measured.verdict import checks, compare

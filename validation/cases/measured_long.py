@@ -12,7 +12,7 @@ from models.fatigue.counting import count, level_crossings, range_pairs
 from models.fatigue.rainflow_cycles import cycles
 from models.measured.formats import open_source
 from models.measured.signal import HUB
-from models.systems.measured.run import hand_on
+from models.systems.measured.hand_on import hand_on
 from models.systems.measured.section_run import Hold, run
 from models.systems.measured.sections import Sections, guided
 from models.systems.measured.verdict import checks, compare

@@ -316,38 +316,15 @@ def _moving(folder: Path) -> list[Row]:
     ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
     up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
+    id, gyro = "measured_virtual.moving", f"{what} pitch rate of the gyro by the derivative of the camera's angle"
+    late = f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it"
+    means, why = f"{what} mean of the accelerations", "a telephone's accelerometers are off by one or two per cent"
+    mounted, size = "two devices, each as it was mounted", float(np.linalg.norm(up))
+    gyro = f"{gyro}, as the check finds it"
     return [
-        within(
-            "measured_virtual.moving_gyro",
-            SYSTEM,
-            f"{what} pitch rate of the gyro by the derivative of the camera's angle, as the check finds it",
-            ratio or 0.0,
-            "1",
-            1.0,
-            0.1,
-            "two devices, each as it was mounted",
-            "none",
-        ),
-        finding(
-            "measured_virtual.moving_shift",
-            SYSTEM,
-            f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it",
-            shift or 0.0,
-            "s",
-            "",
-            "two clocks",
-        ),
-        within(
-            "measured_virtual.moving_gravity",
-            SYSTEM,
-            f"{what} mean of the accelerations",
-            float(np.linalg.norm(up)),
-            "m/s^2",
-            9.81,
-            0.2,
-            "a telephone's accelerometers are off by one or two per cent",
-            "none",
-        ),
+        within(f"{id}_gyro", SYSTEM, gyro, ratio or 0.0, "1", 1.0, 0.1, mounted, "none"),
+        finding(f"{id}_shift", SYSTEM, late, shift or 0.0, "s", "", "two clocks"),
+        within(f"{id}_gravity", SYSTEM, means, size, "m/s^2", 9.81, 0.2, why, "none"),
     ]
 
 

@@ -7,9 +7,8 @@ run that is handed on as far as they are a block, figures of every section force
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,22 +17,20 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
-from models.core.result import Channel, Result, result
+from models.core.result import Result
 from models.core.systems import load
-from models.drift.score import Verdict, rms
+from models.drift.score import Verdict
 from models.fatigue.counting import Counted, count
-from models.measured.channel import BLOCK
 from models.measured.checks import findings
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
 from models.measured.checks.weight import moments
-from models.measured.formats import write
-from models.measured.formats.writing import Group
 from models.measured.recording import Progress, Recording, silent
 from models.measured.signal import Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
 from models.systems.measured.clock import record
 from models.systems.measured.consequences import Consequence, consequences, judged
+from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
 from models.systems.measured.plan import mapped, opened
@@ -51,8 +48,6 @@ from models.vehicles.cut_vehicle import CutVehicle
 WORK = "work"
 """Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
 FREE = "free"
-FILES = "section_forces"
-"""Name of the files that are handed on, before their extensions."""
 NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
 """Keys of the scene's table ``noise``, and the quantities that they are of."""
 
@@ -342,87 +337,19 @@ def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:
     hand_on(outcome, folder, formats, answers, exam.recording.start, comment)
 
 
-def hand_on(
-    outcome: Outcome,
-    folder: Path,
-    formats: Iterable[str],
-    answers: Sequence[Answer] | None = None,
-    start: datetime | None = None,
-    comment: str = "",
-) -> list[Path]:
-    """Write forces and moments of a run, or the answers named, as ``section_forces.EXT`` for every extension.
-
-    Names, units and comments (axes and signs) go along, block by block. Returns the paths; raises InputError where a
-    file exists or a format has no room for a name.
-    """
-    answers = forces(outcome.answers) if answers is None else answers
-    names, units, comments = (tuple(getattr(a, key) for a in answers) for key in ("name", "unit", "comment"))
-
-    def blocks() -> Iterator[np.ndarray]:
-        for first in range(0, outcome.done, BLOCK):
-            yield outcome.columns.block(names, first, min(BLOCK, outcome.done - first))
-
-    return [
-        write(
-            folder / f"{FILES}.{form}",
-            [Group(names, units, comments, outcome.period, outcome.done, blocks())],
-            start,
-            comment,
-        )
-        for form in formats
-    ]
-
-
-def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
-    """Those answers that are section forces and moments."""
-    return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
-
-
 def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
-    """The run that is handed on: its answers over time, where they are no more than a block, and figures of the section
-    forces; where it was not made, what is said of it alone."""
-    outcome, channels, axes, attributes = exam.outcome, dict[str, Channel](), dict[str, Channel](), dict[str, str]()
-    if outcome is not None:
-        attributes["columns"] = str(outcome.columns.path.relative_to(folder))
-        attributes["columns_of"] = json.dumps([answer.name for answer in outcome.answers])
-        if outcome.done <= BLOCK:
-            axes["time"] = Channel("time", outcome.period * np.arange(outcome.done), "s", "time")
-            channels = {
-                answer.name.replace("/", "|"): Channel("time", outcome.samples(answer), answer.unit, answer.comment)
-                for answer in outcome.answers
-            }
-        if exam.counted:
-            axes["section_force"] = Channel("section_force", [answer.name for answer in exam.counted])
-            axes["slope"] = Channel("slope", [*dict.fromkeys(scene.hand_on.slopes)], "1", "Woehler exponent")
-            channels |= _figures(exam, outcome)
-    return result(
+    """The result of a scene, whose detail is its examination."""
+    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
+    return labelled(
         scene,
-        channels,
-        axes,
+        exam.outcome,
+        exam.counted,
+        folder,
         engine=exam.engine,
-        counts=outcome.counts if outcome else {},
         seconds=exam.seconds.get("march", 0.0),
         doubts=[finding.text for finding in exam.findings if finding.weight != "note"],
         detail=exam,
         run=exam.chosen,
-        verdicts=json.dumps({name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}),
+        verdicts=json.dumps(verdicts),
         failed=json.dumps(exam.failed),
-        **attributes,
     )
-
-
-def _figures(exam: Examination, outcome: Outcome) -> dict[str, Channel]:
-    """Extremes, mean, rms and damage of every section force."""
-    counted, unit = exam.counted, "that of the section force"
-    damage = np.array([list(each.damage.values()) for each in counted.values()])
-    numbers = {
-        "least": [each.least for each in counted.values()],
-        "greatest": [each.greatest for each in counted.values()],
-        "mean": [each.mean for each in counted.values()],
-        "rms": [rms(outcome.samples(answer)) for answer in counted],
-    }
-    return {
-        **{name: Channel("section_force", values, "", unit) for name, values in numbers.items()},
-        "unit": Channel("section_force", [answer.unit for answer in counted]),
-        "damage": Channel(("section_force", "slope"), damage, "", f"pseudo-damage: {unit}, to the slope"),
-    }
