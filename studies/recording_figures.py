@@ -1,16 +1,23 @@
-"""One figure for each finding of the checks of a recording: what an engineer looks at before he believes it."""
+"""Figures of a recording: one for each finding of its checks, what drives the vehicle, how it drifts, its forces."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import shorten
+from typing import Any
 
 import numpy as np
 
 from models.core.finding import Finding
 from models.drawing.figures import plt, save
-from models.measured.checks.agreement import Agreement, Fault, Group
+from models.fatigue.counting import Counted
+from models.measured.checks.agreement import Fault, Group
 from models.measured.checks.evidence import Evidence
 from models.measured.signal import UNITS, Signal
-from models.vehicles.cut_vehicle import GRAVITY
+from models.systems.measured.run import FREE, Examination
+from models.systems.measured.section_run import Outcome
+from models.systems.measured.sections import Answer
+from models.systems.measured.verdict import Compared, overlay
+from models.vehicles.cut_vehicle import ANGLES, GRAVITY
 
 AROUND, LONGEST, MOST = 0.6, 15.0, 20_000
 """s drawn beside a marked time; s drawn where none is marked; samples drawn at the most."""
@@ -18,51 +25,57 @@ SHOWN = 4
 """Signals drawn at the most."""
 TITLE = 60
 """Letters of a place in a title."""
-LOUD, QUIET, MARK = "#d55e00", "#222222", "#f0e442"
-
-
-def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
-    """Draw what a finding says into ``path``; None where there is nothing to draw."""
-    fault = next(
-        (
-            f
-            for f in evidence.faults
-            if {s.name for s in f.signals} == set(finding.signals) and finding.check in KINDS.get(f.kind, ())
-        ),
-        None,
-    )
-    signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
-    if not signals:
-        return None
-    if finding.check in ("weight", "gain", "sign", "unit") and _loads(evidence, signals):
-        return _means(evidence, path)
-    if evidence.agreement is not None and fault is not None:
-        return _exchange(evidence.agreement, fault, path) if fault.kind == "swapped" else _ratio(evidence, fault, path)
-    return _spectrum(evidence, signals, path) if finding.check == "noise" else _times(finding, evidence, signals, path)
-
-
+POINTS = 1200
+"""Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
+LOUD, QUIET, MARK, PALE = "#d55e00", "#222222", "#f0e442", "#b5b5b5"
+RUNS = {
+    "measured": ("measured", PALE),
+    "truth": ("truth", QUIET),
+    FREE: ("free run", LOUD),
+    "kalman": ("held by the Kalman filter", "#0072b2"),
+    "prescribed": ("held to the measured angles", "#0072b2"),
+}
+"""Label and colour of each run, and of what it is drawn beside."""
+WHEELS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
 """Checks that tell a kind of fault."""
 
 
-def _loads(evidence: Evidence, signals: tuple[Signal, ...]) -> bool:
-    """Whether signals are vertical forces of a vehicle whose hubs all have one."""
-    own = evidence.vertical()
-    return evidence.vehicle is not None and len(own) == len(evidence.vehicle.hubs) and set(signals) <= set(own.values())
+def figure(finding: Finding, evidence: Evidence, path: Path) -> Path | None:
+    """Draw what a finding says into ``path``; None where there is nothing to draw."""
+    telling = (f for f in evidence.faults if finding.check in KINDS.get(f.kind, ()))
+    fault = next((f for f in telling if set(f.names) == set(finding.signals)), None)
+    signals = tuple(s for s in evidence.recording.signals if s.name in finding.signals)
+    if not signals:
+        return None
+    vertical, hubs = evidence.vertical(), evidence.vehicle.hubs if evidence.vehicle else ()
+    loads = len(vertical) == len(hubs) > 0 and set(signals) <= set(vertical.values())
+    if finding.check in ("weight", "gain", "sign", "unit") and loads:
+        return _means(evidence, path)
+    if evidence.agreement is not None and fault is not None:
+        return _exchange(evidence, fault, path) if fault.kind == "swapped" else _ratio(evidence, fault, path)
+    return _spectrum(evidence, signals, path) if finding.check == "noise" else _times(finding, evidence, signals, path)
+
+
+def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str = "outside upper right") -> Path:
+    """Give a figure its title, the legend of an axis, and save it."""
+    if legend is not None:
+        columns = 3 if "lower" in place else 2
+        drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
+    drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    return save(drawn, path)
 
 
 def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
     """Signals over time, what is meant marked."""
-    own, marked = evidence.recording, finding.times
+    own, marked, shown = evidence.recording, finding.times, signals[:SHOWN]
     begin = max(marked[0] - AROUND, 0.0) if marked else 0.0
-    end = min(marked[1] + AROUND, own.duration) if marked else min(LONGEST, own.duration)
+    end = min(marked[1] + AROUND if marked else LONGEST, own.duration)
     first, last = round(begin / own.period), round(end / own.period) + 1
     every = max((last - first) // MOST, 1)
     times = own.period * np.arange(first, last)[::every]
-    drawn, axes = plt.subplots(
-        len(signals[:SHOWN]), 1, figsize=(8, 1.2 + 1.5 * len(signals[:SHOWN])), sharex=True, squeeze=False
-    )
-    for axis, signal in zip(axes[:, 0], signals[:SHOWN], strict=False):
+    drawn, axes = plt.subplots(len(shown), 1, figsize=(8, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
+    for axis, signal in zip(axes[:, 0], shown, strict=True):
         values = own.columns.read(signal.name, first, last - first)[::every]
         axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
         axis.set_ylabel(f"{signal.name} [{UNITS[signal.quantity]}]")
@@ -74,96 +87,70 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
         if finding.check == "clipped" and marked:
             axis.axhline(float(own.columns.read(signal.name, round(marked[0] / own.period), 1)[0]), color=LOUD, ls="--")
     axes[-1, 0].set_xlabel("time [s]" + ("; yellow: what is meant" if marked else ""))
-    place = shorten(finding.place or "Recording", TITLE, placeholder=" ...")
-    drawn.suptitle(f"{place}: as recorded", x=0.01, ha="left", fontweight="bold")
-    return save(drawn, path)
+    return _titled(drawn, f"{shorten(finding.place or 'Recording', TITLE, placeholder=' ...')}: as recorded", path)
 
 
 def _means(evidence: Evidence, path: Path) -> Path:
     """Mean vertical forces beside the static loads."""
     assert evidence.vehicle is not None
-    hubs, loads = evidence.vehicle.hubs, evidence.vehicle.loads
-    found = np.array([evidence.mean(evidence.vertical()[hub]) for hub in hubs])
+    hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
+    means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
     drawn, axis = plt.subplots(figsize=(8, 3.2))
     at = np.arange(len(hubs))
     axis.bar(at - 0.2, loads, 0.38, color="#bbbbbb", label="static load by the vehicle file")
-    bars = axis.bar(at + 0.2, found, 0.38, color=LOUD, label="mean of the recording")
-    axis.bar_label(bars, [f"{part:+.2%}" if abs(part) < 0.5 else f"x {part + 1:.3g}" for part in found / loads - 1])
-    axis.set_xticks(at, [f"{hub}\n{evidence.vertical()[hub].name}" for hub in hubs])
+    bars = axis.bar(at + 0.2, means, 0.38, color=LOUD, label="mean of the recording")
+    axis.bar_label(bars, [f"{part:+.2%}" if abs(part) < 0.5 else f"x {part + 1:.3g}" for part in means / loads - 1])
+    axis.set_xticks(at, [f"{hub}\n{vertical[hub].name}" for hub in hubs])
     axis.set_ylabel("vertical force [N]")
-    if np.abs(found).max() > 10 * loads.max():
+    if np.abs(means).max() > 10 * loads.max():
         axis.set_yscale("symlog", linthresh=float(loads.max()))
     axis.margins(y=0.2)
-    drawn.legend(*axis.get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    drawn.suptitle("Mean vertical forces", x=0.01, ha="left", fontweight="bold")
-    return save(drawn, path)
+    return _titled(drawn, "Mean vertical forces", path, axis)
 
 
 def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     """What a channel reads by what it should, by frequency: a delay is a slope of the phase, a factor a level."""
-    assert evidence.agreement is not None
     own = evidence.agreement
-    f, ratio, sure = _measured_ratio(_before(own, evidence.faults, fault), fault)
+    assert own is not None
+    for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
+        own = own.without(before)
+    among = own.inputs if fault.signals[0] in own.inputs else own.outputs
+    group = Group(fault.name, among is own.inputs, tuple(among.index(s) for s in fault.signals))
+    line, size = ((own.weights * part).sum(axis=1) for part in own.share(group))
+    f, ratio, sure = own.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
+    told = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
     expected = factor * np.exp(-2j * np.pi * f * late)
     turned = -360 * f * late + (180.0 if factor < 0 else 0.0)
     drawn, axes = plt.subplots(2, 1, figsize=(8, 4.4), sharex=True)
     for axis, measured, said, level in (
         (axes[0], np.abs(ratio), np.abs(expected), 1.0),
-        (axes[1], _degrees(ratio / expected) + turned, turned, 0.0),
+        (axes[1], np.degrees(np.angle(ratio / expected)) + turned, turned, 0.0),
     ):
         axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET, label="measured; larger: surer")
-        axis.plot(f, said, color=LOUD, label=_said(fault))
+        axis.plot(f, said, color=LOUD, label=told)
         axis.axhline(level, color="#999999", ls=":", label="as it should be")
     axes[0].set_ylabel("size [-]")
     axes[1].set_ylabel("phase [deg]")
     axes[0].set_ylim(0.0, 2 * max(abs(factor), 1.0))
     axes[1].set_xlabel("frequency [Hz]")
-    drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     title = f"{fault.name}: recorded by what the motion of the vehicle tells"
-    drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
-    return save(drawn, path)
+    return _titled(drawn, title, path, axes[0], "outside lower center")
 
 
-def _degrees(values: np.ndarray) -> np.ndarray:
-    return np.degrees(np.angle(values))
-
-
-def _said(fault: Fault) -> str:
-    return f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
-
-
-def _before(own: Agreement, faults: tuple[Fault, ...], fault: Fault) -> Agreement:
-    """The agreement in which this fault was found: without those that were found before it."""
-    for other in faults[: faults.index(fault)]:
-        own = own.without(other)
-    return own
-
-
-def _measured_ratio(own: Agreement, fault: Fault) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frequencies (f,), recorded by true value (f,), and how sure it is (f,), up to 1."""
-    among = own.inputs if fault.signals[0] in own.inputs else own.outputs
-    group = Group(fault.name, among is own.inputs, tuple(among.index(s) for s in fault.signals))
-    cross, power = own.share(group)
-    weights = own.weights
-    line, size = (weights * cross).sum(axis=1), (weights * power).sum(axis=1)
-    ratio = line / size
-    return own.frequencies, 1 / ratio if group.forces else ratio, size / size.max()
-
-
-def _exchange(own: Agreement, fault: Fault, path: Path) -> Path:
+def _exchange(evidence: Evidence, fault: Fault, path: Path) -> Path:
     """Unexplained shares of every reading, as mapped and exchanged."""
-    other, names = own.without(fault), [s.name for s in own.outputs]
+    own = evidence.agreement
+    assert own is not None
+    names = [s.name for s in own.outputs]
     drawn, axis = plt.subplots(figsize=(8, 1.4 + 0.24 * len(names)))
     at = np.arange(len(names))
     axis.barh(at - 0.2, 100 * own.unexplained, 0.38, color=LOUD, label="as mapped")
-    axis.barh(at + 0.2, 100 * other.unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
+    axis.barh(at + 0.2, 100 * own.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
     axis.set_yticks(at, names)
     axis.invert_yaxis()
     axis.set_xlabel("what the hub forces leave unexplained of each reading [%]")
-    drawn.legend(*axis.get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    drawn.suptitle("Exchanged hubs", x=0.01, ha="left", fontweight="bold")
-    return save(drawn, path)
+    return _titled(drawn, "Exchanged hubs", path, axis)
 
 
 def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
@@ -181,6 +168,127 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
             axis.axhline(stated * np.sqrt(2 * own.period), color=LOUD, ls="--", label=f"stated for {signal.name}")
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel(f"spectral density [{UNITS[signals[0].quantity]} / sqrt(Hz)]")
-    drawn.legend(*axis.get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    drawn.suptitle("Noise: where the spectrum goes flat", x=0.01, ha="left", fontweight="bold")
+    return _titled(drawn, "Noise: where the spectrum goes flat", path, axis)
+
+
+def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values (m,) with the least and the greatest of every stretch, of as many as can be seen."""
+    width = len(times) // POINTS
+    if width < 3:
+        return times, values
+    rows = len(times) // width
+    parts = values[: rows * width].reshape(rows, width)
+    empty = ~np.isfinite(parts).any(axis=1)
+    safe = np.where(np.isfinite(parts) | empty[:, None], parts, np.nanmean(values))
+    both = np.column_stack([safe.min(axis=1), safe.max(axis=1)])
+    both[empty] = np.nan
+    return np.repeat(times[: rows * width : width], 2), both.ravel()
+
+
+def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
+    """A figure of rows over time."""
+    drawn, panels = plt.subplots(rows, figsize=(9.5, height), squeeze=False, **more)
+    for panel in panels[-1]:
+        panel.set_xlabel("time [s]")
+    return drawn, panels
+
+
+def inputs_figure(exam: Examination, path: Path) -> Path:
+    """Forces at all hubs along each axis."""
+    own, axes = exam.recording, [a for a in "zxy" if exam.recording.find("force", component=a)]
+    drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
+    times = own.period * np.arange(own.count)
+    for panel, axis in zip(panels[:, 0], axes, strict=True):
+        for i, hub in enumerate(exam.rig.hubs):
+            for signal in (s for s in own.find("force", hub, axis) if not s.check):
+                panel.plot(*thinned(times, own.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7)
+        panel.set_title(f"force on the hub along {axis} [kN]")
+    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(exam.rig.hubs))
+    return save(drawn, path)
+
+
+def drift_figure(exam: Examination, path: Path) -> Path:
+    """Roll and pitch of every run, beside what was measured and, of a virtual measurement, the truth."""
+    angles = exam.rig.angles
+    drawn, panels = _timed(len(angles), 2.0 * len(angles) + 0.6, sharex=True)
+    for panel, angle in zip(panels[:, 0], angles, strict=True):
+        curves = _angles(exam, angle)
+        for name, (times, values) in curves.items():
+            label, colour = RUNS[name]
+            panel.plot(*thinned(times, np.degrees(values)), color=colour, label=label, lw=1.0)
+        if exam.drift is not None and exam.chosen != FREE and exam.chosen in curves:
+            about = np.interp(exam.drift.times, *curves[exam.chosen])
+            spread = exam.drift.deviations[:, ("roll", "pitch").index(angle)]
+            label = "free run as predicted, 1 standard deviation"
+            bounds = np.degrees(about - spread), np.degrees(about + spread)
+            panel.fill_between(exam.drift.times, *bounds, color=LOUD, alpha=0.15, lw=0, label=label)
+        panel.set_title(f"{angle} of the {exam.rig.chassis} [degrees]")
+        low, high = panel.get_ylim()
+        panel.set_ylim(max(-30.0, low), min(30.0, high))  # a run that topples must not squeeze all else to a line
+    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
+    return save(drawn, path)
+
+
+def _angles(exam: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Times (s) and values (rad) of an angle as measured, in every run, and in truth."""
+    own, chassis = exam.recording, exam.rig.chassis
+    curves = dict[str, tuple[np.ndarray, np.ndarray]]()
+    for signal in own.find("angle", chassis, angle)[:1]:
+        curves["measured"] = own.period * np.arange(own.count), own.samples(signal)
+    for name, run in exam.runs.items():
+        curves[name] = run.period * np.arange(run.done), run.samples(f"{chassis} {angle}")
+    if exam.virtual is not None:
+        curves["truth"] = exam.virtual.run.times, exam.virtual.run.states[:, ANGLES[angle]]
+    return curves
+
+
+def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str = "") -> Path:
+    """Up to six section forces over the whole recording, and two seconds of each about its greatest range."""
+    times, colour = run.period * np.arange(run.done), RUNS.get(name, RUNS["kalman"])[1]
+    drawn, panels = _timed(len(answers), 1.5 * len(answers) + 0.5, ncols=2, width_ratios=(2.4, 1))
+    for (left, right), answer in zip(panels, answers, strict=True):
+        values, unit, scale = run.samples(answer), f"k{answer.unit}", 1e-3
+        if np.abs(values).max() < 1e3:
+            unit, scale = answer.unit, 1.0
+        left.plot(*thinned(times, scale * values), color=colour, lw=0.7)
+        left.set_title(f"{answer.name} [{unit}]")
+        near = np.abs(times - times[int(np.argmax(np.abs(values - values.mean())))]) <= 1.0
+        right.plot(times[near], scale * values[near], color=colour)
+        right.set_title("two seconds about its peak", color="#555555")
+    return save(drawn, path)
+
+
+def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
+    """Level crossings and range pairs of some loads."""
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.6))
+    for colour, (answer, own) in zip(WHEELS, counted.items(), strict=False):
+        left.plot(np.maximum(own.crossings, 0.5), 1e-3 * own.levels, drawstyle="steps-mid", color=colour)
+        right.plot(np.maximum(own.pairs, 0.25), 1e-3 * own.ranges, color=colour, label=answer.name)
+    for panel, title, what in (
+        (left, "level crossings, upwards", "level"),
+        (right, "range pairs of at least", "range"),
+    ):
+        panel.set_title(title)
+        panel.set_xscale("log")
+        panel.set_xlabel("number")
+        panel.set_ylabel(f"{what} [kN, kN m]")
+    drawn.legend(loc="outside upper right", ncols=3)
+    return save(drawn, path)
+
+
+def overlay_figure(exam: Examination, run: Outcome, compared: Sequence[Compared], path: Path) -> Path:
+    """Channels that were not put in beside the run: the whole, and two seconds where the error is largest."""
+    drawn, panels = _timed(len(compared), 1.5 * len(compared) + 0.7, ncols=2, width_ratios=(2.4, 1))
+    for (left, right), each in zip(panels, compared, strict=True):
+        times, measured, computed = overlay(exam.recording, run, each.signal, each.answer)
+        near = np.abs(times - times[int(np.nanargmax(np.abs(computed - measured)))]) <= 1.0
+        for values, colour, width, label in (
+            (measured, PALE, 2.6, "measured"),
+            (computed, RUNS[exam.chosen][1], 0.8, "computed"),
+        ):
+            left.plot(*thinned(times, values), color=colour, lw=width, label=label)
+            right.plot(times[near], values[near], color=colour, lw=width)
+        left.set_title(f"{each.signal.name} [{each.answer.unit}]")
+        right.set_title("about the largest error", color="#555555")
+    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return save(drawn, path)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import takewhile
 from typing import Any
 
 LONGEST = 8
@@ -43,25 +44,20 @@ def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]
             yield f"{_joined(name, 'largest')}{unit}", max(map(abs, own))
             yield f"{_joined(name, 'rms')}{unit}", math.sqrt(math.fsum(value * value for value in own) / len(own))
     else:
-        for label, value in zip(_labels(values), values, strict=True):
+        leading = (takewhile(_is_text, value.values()) if isinstance(value, dict) else () for value in values)
+        labels = [", ".join(texts) for texts in leading]
+        if len(set(labels)) < len(labels) or not all(labels):
+            labels = [str(i + 1) for i in range(len(values))]
+        for label, value in zip(labels, values, strict=True):
             yield from _walk(_joined(name, label), unit, value)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
 
 
 def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _labels(values: list[Any]) -> list[str]:
-    """A name for each entry: its leading texts, or its place counted from 1."""
-    told = [", ".join(_leading(value)) if isinstance(value, dict) else "" for value in values]
-    return told if len(set(told)) == len(told) and all(told) else [str(i + 1) for i in range(len(values))]
-
-
-def _leading(value: dict[str, Any]) -> Iterator[str]:
-    for inner in value.values():
-        if not isinstance(inner, str):
-            return
-        yield inner
 
 
 def _joined(name: str, key: str) -> str:

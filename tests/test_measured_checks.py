@@ -10,14 +10,13 @@ import pytest
 from models.core.finding import Finding, gathered, queries
 from models.measured.checks import check, clipped, drift, findings, gaps, gravity, noise, spikes, turning, weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.means import mean
-from models.measured.checks.place import Place
 from models.measured.checks.response import Response
+from models.measured.checks.spectra import mean
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import Place, Quantity, Signal
 from models.systems.hub_forces.tilt_filter import TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, told
 from models.systems.measured.inputs import Inputs
@@ -26,6 +25,7 @@ from models.systems.measured.verdict import surprised
 from models.systems.measured.virtual import VirtualMeasurement, recording
 from models.vehicles.cut_vehicle import rigid
 from validation.cases import measured_checks as case
+from validation.measured import planted as bench
 from validation.spatial.cars import r19
 
 PERIOD = 2e-3
@@ -34,7 +34,7 @@ PERIOD = 2e-3
 @pytest.fixture(scope="module")
 def ridden() -> VirtualMeasurement:
     """Five seconds of a car on a road."""
-    return case.measurement(road=("C", 1, 20.0, 5.0))
+    return bench.measurement(road=("C", 1, 20.0, 5.0))
 
 
 def made(folder: Path, **columns: np.ndarray) -> Recording:
@@ -62,24 +62,27 @@ def white(count: int = 5000, seed: int = 3) -> np.ndarray:
 
 @pytest.mark.parametrize("seconds", [1.0, 1.5, 3.0])
 def test_a_short_recording_that_is_right_is_not_accused(seconds, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=case.NOISE), 3)[: round(seconds / PERIOD)]
+    samples = ridden.samples(Faults(noise=bench.NOISE), 3)[: round(seconds / PERIOD)]
     turning_alone = [i for i, s in enumerate(ridden.signals) if s.quantity != "acceleration"]
     few = replace(ridden, signals=tuple(ridden.signals[i] for i in turning_alone))
-    assert not case.findings(few, samples[:, turning_alone], tmp_path)
+    assert not bench.findings(few, samples[:, turning_alone], tmp_path)
     hubs = [i for i in turning_alone if ridden.signals[i].at in ridden.vehicle.hubs]
     others = samples[::-1, turning_alone].copy()  # the motion backwards: by these forces nobody moves so
     others[:, : len(hubs)] = samples[:, hubs]
-    said = case.findings(few, others, tmp_path)
+    said = bench.findings(few, others, tmp_path)
     assert seconds < 2.0 or any(one.check in ("swapped", "shift", "sign") for one in said)
 
 
 @pytest.mark.parametrize("fault", case.QUICK, ids=lambda fault: fault.name)
 def test_a_planted_fault_is_named_with_its_size(fault, ridden, tmp_path):
-    assert all(row.status == "passed" for row in case._rows(fault, case.planted(fault, ridden, tmp_path)))
+    assert all(
+        row.status == "passed"
+        for row in case._rows(fault, bench.planted(ridden, tmp_path, fault.spoil, **fault.faults))
+    )
 
 
 def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
-    assert not case.findings(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path)
+    assert not bench.findings(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +91,7 @@ def test_a_clean_recording_of_five_seconds_raises_nothing(ridden, tmp_path):
 )
 def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, tmp_path):
     # the mean moment of the hub forces is what the gyros say that it must be
-    (found,) = case.findings(ridden, ridden.samples(Faults(noise=case.NOISE, **fault), 5), tmp_path)
+    (found,) = bench.findings(ridden, ridden.samples(Faults(noise=bench.NOISE, **fault), 5), tmp_path)
     assert found.check == check_name and found.size == pytest.approx(size, rel=0.2) and "offset of" in found.text
 
 
@@ -97,10 +100,10 @@ def test_two_percent_are_seen_in_five_seconds(fault, check_name, size, ridden, t
 )
 def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
     """Hubs as a whole were looked for, and a sign, or a delay, that would not have helped was named instead."""
-    samples = ridden.samples(Faults(noise=case.NOISE), 5)
-    one, other = case._columns(ridden, *pair)
+    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    one, other = bench.columns(ridden, *pair)
     samples[:, [one, other]] = samples[:, [other, one]]
-    found = case.findings(ridden, samples, tmp_path)
+    found = bench.findings(ridden, samples, tmp_path)
     assert [(f.check, set(f.signals)) for f in found if f.check in ("exchanged", "sign", "shift", "swapped")] == [
         ("exchanged", set(pair))
     ]
@@ -113,17 +116,17 @@ def test_two_channels_that_are_exchanged_are_named(pair, ridden, tmp_path):
 
 def test_an_angle_and_a_rate_of_different_axes_have_no_sign_to_turn(ridden, tmp_path):
     """Their ratio is chance: the sign of one was called wrong, and the run stopped with a remedy that does not help."""
-    samples = ridden.samples(Faults(noise=case.NOISE), 5)
-    one, other = case._columns(ridden, "roll", "pitch")
+    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    one, other = bench.columns(ridden, "roll", "pitch")
     samples[:, [one, other]] = samples[:, [other, one]]
-    own = case.recording(ridden, samples, tmp_path / "a.columns")
+    own = recording(ridden, samples, tmp_path / "a.columns")
     for vehicle in (ridden.vehicle, None):
         found = [f for f in turning.check(Evidence(own, vehicle)) if f.weight != "note"]
         assert all(f.weight == "doubt" and "is not the derivative" in f.text for f in found)
 
 
 def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_path):
-    own = case.recording(ridden, ridden.samples(Faults(noise=case.NOISE), 5), tmp_path / "a.columns")
+    own = recording(ridden, ridden.samples(Faults(noise=bench.NOISE), 5), tmp_path / "a.columns")
     notes = [f.text for f in check(own, ridden.vehicle) if f.check == "exchanged"]
     assert len(notes) == 1 and "fl_my with fr_my" in notes[0] and "fl_fz with fr_fz" not in notes[0]
 
@@ -131,7 +134,7 @@ def test_pairs_that_move_the_vehicle_alike_are_named_as_not_seen(ridden, tmp_pat
 @pytest.mark.parametrize("count, period", [(200, 2e-6), (1000, 2.0), (110, 1e-3), (100, 5e-4), (300, 1e-3)])
 def test_recordings_with_no_line_or_few_in_the_band_of_the_motion(ridden, tmp_path, count, period):
     """Times of another unit, and short ones: the spectra had no line, which ended in a traceback."""
-    own = case.recording(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
+    own = recording(ridden, ridden.samples(Faults(), 1)[:count], tmp_path / "a.columns")
     check(replace(own, period=period), ridden.vehicle)
 
 
@@ -158,15 +161,15 @@ def test_the_slope_of_delays_and_its_error_by_their_scatter():
 
 @pytest.mark.full
 def test_a_clock_that_is_fast_is_named_and_nothing_else(tmp_path):
-    (found,) = (one for one in case.drifting(case.measurement(), -5e-4, tmp_path) if one.check != "noise")
+    (found,) = (one for one in bench.drifting(bench.measurement(), -5e-4, tmp_path) if one.check != "noise")
     assert found.check == "drift" and found.place == "inertial" and found.size == pytest.approx(-5e-4, rel=0.2)
-    assert not case.drifting(case.measurement(), 0.0, tmp_path)  # no noise is filtered by interpolation, either
+    assert not bench.drifting(bench.measurement(), 0.0, tmp_path)  # no noise is filtered by interpolation, either
 
 
 def test_moments_of_an_offset_are_known_before_a_run(ridden, tmp_path):
-    values = [ridden.samples(Faults(noise=case.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
+    values = [ridden.samples(Faults(noise=bench.NOISE, bias=bias), 5) for bias in ({}, {"fl_fz": 30.0})]
     clean, off = (
-        weight.moments(Evidence(case.recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
+        weight.moments(Evidence(recording(ridden, own, tmp_path / f"{i}.columns"), ridden.vehicle))
         for i, own in enumerate(values)
     )
     arm = rigid(ridden.vehicle).arms[0]
@@ -177,8 +180,8 @@ def test_hub_forces_explain_the_motion_through_the_vehicle_and_only_with_their_s
     clean = ridden.samples(Faults(), 1)
     share = {}
     for sign in (1, -1):
-        clean[:, case._columns(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
-        own = case.recording(ridden, clean, tmp_path / f"{sign}.columns")
+        clean[:, bench.columns(ridden, "fl_fy", "fr_fy", "rl_fy", "rr_fy")] *= sign
+        own = recording(ridden, clean, tmp_path / f"{sign}.columns")
         agreement = Evidence(own, ridden.vehicle).agreement
         assert agreement is not None
         share[sign] = agreement.typical()
@@ -245,10 +248,10 @@ def test_a_spike_is_named_with_its_height_and_noise_is_none(width, tmp_path):
 
 def test_a_spike_does_not_hide_an_error_of_its_channel(ridden, tmp_path):
     """One sample, of which a doubt is told, in a channel in kN that stops the run."""
-    samples = ridden.samples(Faults(noise=case.NOISE), 5)
-    samples[1000, case._columns(ridden, "rr_fz")] += 5e4
-    samples[:, case._columns(ridden, "rr_fz")] *= 1e-3
-    assert {(one.check, one.weight) for one in case.findings(ridden, samples, tmp_path)} >= {
+    samples = ridden.samples(Faults(noise=bench.NOISE), 5)
+    samples[1000, bench.columns(ridden, "rr_fz")] += 5e4
+    samples[:, bench.columns(ridden, "rr_fz")] *= 1e-3
+    assert {(one.check, one.weight) for one in bench.findings(ridden, samples, tmp_path)} >= {
         ("spikes", "doubt"),
         ("unit", "error"),
     }
@@ -312,10 +315,10 @@ def test_findings_of_means_of_times_and_of_motion_have_their_figures(ridden, tmp
     pytest.importorskip("matplotlib")
     from studies.recording_figures import figure
 
-    samples = ridden.samples(Faults(noise=case.NOISE, delay={"fl_fz": 3e-3}), 1)
-    samples[:, case._columns(ridden, "rr_fz")] *= 1e-3
-    samples[500:700, case._columns(ridden, "rl_mz")] = 0.0
-    evidence = Evidence(case.recording(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
+    samples = ridden.samples(Faults(noise=bench.NOISE, delay={"fl_fz": 3e-3}), 1)
+    samples[:, bench.columns(ridden, "rr_fz")] *= 1e-3
+    samples[500:700, bench.columns(ridden, "rl_mz")] = 0.0
+    evidence = Evidence(recording(ridden, samples, tmp_path / "own.columns"), ridden.vehicle)
     drawn = {
         one.check
         for i, one in enumerate(findings(evidence))
@@ -350,8 +353,9 @@ def test_what_was_noticed_while_reading_is_carried_and_errors_come_first(ridden,
 
 @pytest.mark.parametrize("hubs, lever", [(("fl", "fr", "rl", "rr"), -0.3), (("rr",), -0.34), (("fl", "fr"), 0.3)])
 def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=case.NOISE), case.SEED)
-    said = case.findings(ridden, case.referred(lever, *hubs)(ridden, samples), tmp_path)
+    samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
+    bench.referred(lever, *hubs)(ridden, samples)
+    said = bench.findings(ridden, samples, tmp_path)
     assert [one.check for one in said] == ["lever"]
     # the fit has a standard error of 0.01 m here, and the vehicle is not linear
     assert said[0].size == pytest.approx(lever, abs=0.04)
@@ -363,10 +367,10 @@ def test_moments_about_the_contact_patch_are_recognised(hubs, lever, ridden, tmp
     [({}, ""), ({"pitch_rate": 3e-3}, "innovations of pitch "), ({"roll_rate": -5e-3}, "innovations of roll ")],
 )
 def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=case.NOISE, bias=bias), case.SEED)
+    samples = ridden.samples(Faults(noise=bench.NOISE, bias=bias), bench.SEED)
     own = recording(ridden, samples, tmp_path / "a.columns")
     inputs = Inputs(own, ridden.vehicle)
-    forces = np.tile(np.repeat([case.NOISE["force"], case.NOISE["moment"]], 3), 4)
+    forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)
     followed = TiltFilter(ridden.vehicle, "hub", own.period, forces, (1.75e-3, 5e-3), 10.0)
     followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
     assert [named in text for text in followed.doubts()] == [True] * bool(bias)

@@ -16,7 +16,7 @@ from models.systems.measured.consequences import DAMAGE, FORCE, Consequence, con
 from models.systems.measured.section_run import Hold, Outcome, SectionRun, run
 from models.systems.measured.sections import Sections
 from models.systems.measured.virtual import VirtualMeasurement, recording
-from validation.cases import measured_checks as case
+from validation.measured import planted as bench
 
 SECTION = "rear right F"
 
@@ -24,7 +24,7 @@ SECTION = "rear right F"
 @pytest.fixture(scope="module")
 def ridden() -> VirtualMeasurement:
     """Five seconds of a car on a road."""
-    return case.measurement(road=("C", 1, 20.0, 5.0))
+    return bench.measurement(road=("C", 1, 20.0, 5.0))
 
 
 def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> Outcome:
@@ -34,7 +34,7 @@ def made(ridden: VirtualMeasurement, own: Recording, folder: Path) -> Outcome:
 
 def of(ridden: VirtualMeasurement, faults: dict, finding: Finding, folder: Path) -> tuple[Consequence, float, float]:
     """The consequence of a finding, and what the planted fault really does to the force of a spring."""
-    samples = [ridden.samples(Faults(**one, noise=case.NOISE), case.SEED) for one in (faults, {})]
+    samples = [ridden.samples(Faults(**one, noise=bench.NOISE), bench.SEED) for one in (faults, {})]
     own, right = (recording(ridden, values, folder / f"{i}.columns") for i, values in enumerate(samples))
     answers = [a for a in Sections(ridden.vehicle).answers if a.name == SECTION]
     (found,) = consequences([finding], own, partial(made, ridden), answers, folder / "work")
@@ -64,7 +64,7 @@ def test_a_wrong_factor_is_judged_by_what_it_does(ridden, tmp_path):
 
 
 def test_lost_samples_are_judged_by_what_their_bridging_is_known_to(ridden, tmp_path):
-    samples = ridden.samples(Faults(noise=case.NOISE), case.SEED)
+    samples = ridden.samples(Faults(noise=bench.NOISE), bench.SEED)
     grades = []
     for length, every in ((2, 1000), (40, 60)):
         lossy = samples.copy()

@@ -1,13 +1,19 @@
 """Effects of virtual transducers, each left out and put in by itself; what a price and a choice see of a recording."""
 
+import json
+
+import numpy as np
 import pytest
 
 from models.advice.choice.choose import Chooser
 from models.advice.choice.systems import measured
 from models.advice.choice.variants import Variants
 from models.core.errors import InputError
+from models.core.result import load as load_result
 from models.core.scene_effects import absent, beside, named, without
 from models.core.systems import load
+from models.measured.columns import Columns
+from models.systems import run
 from models.systems.measured.scene import build
 from studies.asked import SCENES
 from validation.absence.measured import FAULTS, write
@@ -46,6 +52,22 @@ def test_a_price_and_a_choice_see_what_a_fault_changes_in_the_answers():
     seats = [one.quantities["left seat F"].cases[0] for one in told]
     assert len(seats[0]) == 181 and told[0].counts["steps"] == measured.steps(noisy) == 180
     assert len({seat.tobytes() for seat in seats}) == 3
+
+
+def test_a_recording_is_run_as_every_scene_is_and_its_result_says_where_its_samples_lie(tmp_path):
+    scene = short()
+    result = run(scene, "mujoco", folder=tmp_path)
+    exam = result.detail
+    seat = next(answer for answer in exam.outcome.answers if answer.name == "left seat F")
+    assert np.array_equal(result["left seat F"], exam.outcome.samples(seat))
+    result.save(tmp_path / "a.nc")
+    saved = load_result(tmp_path / "a.nc").data
+    assert np.array_equal(saved["left seat F"].values, result["left seat F"]) and saved["left seat F"].units == "N"
+    assert json.loads(saved.scene_table) == scene.table() and "commit" in json.loads(saved.provenance)
+    names = tuple(json.loads(saved.columns_of))
+    columns = Columns(tmp_path / saved.attrs["columns"], names, len(result.times))
+    assert np.array_equal(columns.read("left seat F"), result["left seat F"])
+    assert result.counts()["force calls"] == 4 * result.counts()["steps"] == 720
 
 
 def test_a_recording_is_run_for_a_part_and_in_longer_steps(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from validation.cases import measured_formats as case
 from validation.measured.measured_files import csv as csv_files
 from validation.measured.measured_files import mdf4 as mdf4_files
 from validation.measured.measured_files import tdms as tdms_files
-from validation.measured.measured_files.odd import FX, FZ, TIMES, Sweep, read, usual, written
+from validation.measured.measured_files.odd import FX, FZ, TIMES, Sweep, read, two_rates, usual, written
 
 EXTENSIONS = (".csv", ".mf4", ".rsp", ".tdms")
 
@@ -82,7 +82,7 @@ def test_channels_are_asked_for_by_names_that_exist(tmp_path, extension):
 
 
 def test_channels_of_two_rates_are_not_read_as_one(tmp_path):
-    source = open_source(mdf4_files.two_rates(tmp_path))
+    source = open_source(two_rates(".mf4")(tmp_path))
     with pytest.raises(InputError, match="one sampling rate"):
         source.blocks(["Fz", "Fx"])
 

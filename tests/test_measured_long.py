@@ -17,12 +17,11 @@ from models.fatigue.rainflow_cycles import cycles
 from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.systems.hub_forces.tilt_filter import TiltFilter
-from models.systems.measured.checkpoint import Checkpoint
-from models.systems.measured.comparison import checks, compare
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.inputs import Grid, Inputs
-from models.systems.measured.section_run import Hold, SectionRun, run
+from models.systems.measured.section_run import Checkpoint, Hold, SectionRun, run
 from models.systems.measured.sections import Point, Sections, points
+from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import PITCH, ROLL
 from validation.cases import measured_long as case
 from validation.measured.long_recording import answers_of, killed, pattern, recorded, run_of

@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
+from models.core.result import load as load_result
 from models.measured.channel import Channel
 from models.measured.formats import open_source
-from models.measured.no_value import without_absurd
-from models.measured.places import Places
+from models.measured.gaps import without_absurd
 from models.measured.resampling import onto
-from models.measured.signal import Signal
+from models.measured.signal import Places, Signal
 from models.measured.timing import timing
 from models.measured.units import conversion
 from models.systems.measured.channel_map import signals
 from models.systems.measured.clock import record
-from models.systems.measured.guess import guess
-from models.systems.measured.listing import describe
+from models.systems.measured.listing import describe, guess
 from models.systems.measured.plan import check
 from models.systems.measured.scene import build
 from studies.recording import run
@@ -386,6 +385,10 @@ def test_from_the_road_to_the_page(tmp_path):
     handed = open_source(tmp_path / "section_forces.csv")
     assert {channel.name for channel in handed.channels} == {"front left F", *(f"fl hub {axis}" for axis in AXES)}
     (block,) = handed.blocks(["front left F"])
+    saved = load_result(tmp_path / "recording.nc").data
+    assert saved["section_force"].values.tolist() == list(summary["channels"]) and saved.attrs["system"] == "measured"
+    assert saved["greatest"].values[0] == block.values.max() and saved["damage"].shape == (7, 1)
+    assert np.array_equal(saved["front left F"].values, block.values[:, 0]) and saved.attrs["run"] == "kalman"
     assert numbers(summary)["front left F, max [N]"] == np.abs(block.values).max()  # what a sweep draws
 
 

@@ -14,14 +14,13 @@ from models.measured.faults_of_measurement import Faults, check, measured
 from models.measured.gaps import filled
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
-from models.systems.measured.comparison import Band, Compared
 from models.systems.measured.inputs import Grid, Inputs
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as plane_run
 from models.systems.measured.section_run import DAMPING, Hold
 from models.systems.measured.sections import Answer
 from models.systems.measured.trust import Level, drift, position
-from models.systems.measured.verdict import disagreement, uncertainty
+from models.systems.measured.verdict import Band, Compared, disagreement, uncertainty
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
 from models.systems.measured.virtual import check as check_virtual
 from models.systems.pitch_plane.run import run as simulate

@@ -6,6 +6,7 @@ all, so that whoever is interrupted goes on where the journal says.
 
 import json
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,19 @@ from models.core.whole_files import write_whole
 ITEM = np.dtype("<f8")
 
 
-class Columns:
+class Readable(ABC):
+    """Samples of signals that can be read one by one."""
+
+    @abstractmethod
+    def read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
+        """Samples (n,) of one signal."""
+
+    def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
+        """Samples (n, names) of several signals."""
+        return np.column_stack([self.read(name, first, count) for name in names])
+
+
+class Columns(Readable):
     """Samples (signals, count) of doubles in one file; NaN is no measurement."""
 
     def __init__(self, path: Path, names: tuple[str, ...], count: int) -> None:
@@ -60,17 +73,13 @@ class Columns:
         offset = (self.names.index(name) * self.count + first) * ITEM.itemsize
         return np.fromfile(self.path, ITEM, n, offset=offset)
 
-    def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
-        """Samples (n, names) of several signals."""
-        return np.column_stack([self.read(name, first, count) for name in names])
-
     def remove(self) -> None:
         """Delete the file and its journal."""
         self.path.unlink()
         self._journal.unlink()
 
 
-class MemoryColumns:
+class MemoryColumns(Readable):
     """The same of samples (count, signals) that are in memory, to be read only."""
 
     def __init__(self, names: tuple[str, ...], samples: np.ndarray) -> None:
@@ -80,7 +89,3 @@ class MemoryColumns:
         """Samples (n,) of one signal."""
         last = self.count if count is None else first + count
         return np.array(self._samples[first:last, self.names.index(name)])
-
-    def block(self, names: tuple[str, ...], first: int, count: int) -> np.ndarray:
-        """Samples (n, names) of several signals."""
-        return np.column_stack([self.read(name, first, count) for name in names])

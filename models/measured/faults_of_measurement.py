@@ -18,6 +18,7 @@ from models.measured.signal import Signal
 
 Amounts = dict[str, float]
 """Name of a channel, a transducer or a quantity -> amount in SI."""
+AMOUNTS = ("gain", "bias", "delay", "noise")
 ROOM = 1.25
 """Full scale of a quantised channel by its largest value: an amplifier is not driven to its end."""
 
@@ -56,17 +57,16 @@ def amount(amounts: Amounts, signal: Signal) -> float:
 def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str = "virtual.faults") -> None:
     """Raise InputError for a name that no signal has, a negative noise or a delay out of reach."""
     known = tuple(dict.fromkeys(name for signal in signals for name in _names(signal)))
-    tables = {"gain": faults.gain, "bias": faults.bias, "delay": faults.delay, "noise": faults.noise}
-    lists = {"quantisation": faults.quantisation, "dropouts": faults.dropouts}
-    named = [(kind, name) for kind, amounts in tables.items() for name in amounts]
-    named += [(f"{kind}.channels", name) for kind, own in lists.items() if own for name in own.channels]
+    amounts, lists = {kind: getattr(faults, kind) for kind in AMOUNTS}, (faults.quantisation, faults.dropouts)
+    named = [(kind, name) for kind, own in amounts.items() for name in own]
+    for kind, own in zip(("quantisation", "dropouts"), lists, strict=True):
+        named += [(f"{kind}.channels", name) for name in own.channels] if own else []
     for kind, name in named:
         if name not in known:
-            raise InputError(
-                file, f"{place}.{kind}", name, f"no such channel, transducer or quantity{suggestion(name, known)}"
-            )
+            wrong = f"no such channel, transducer or quantity{suggestion(name, known)}"
+            raise InputError(file, f"{place}.{kind}", name, wrong)
     for kind in ("noise", "delay"):
-        for name, value in tables[kind].items():
+        for name, value in amounts[kind].items():
             if value < 0:
                 raise InputError(file, f"{place}.{kind}.{name}", value, "must be 0 or more")
 

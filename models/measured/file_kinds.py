@@ -130,7 +130,9 @@ def format_of(path: Path, head: bytes) -> str:
         return "RPC III"
     kind = next((kind for kind in KINDS if re.match(kind.begins, head.removeprefix(b"\xef\xbb\xbf"), re.DOTALL)), None)
     if kind is not None:
-        raise InputError(path, "", None, f"this is {_inside(path, kind)}; {KNOWN}")
+        if kind.extensions == (".zip",):
+            kind = _of_archive(path) or kind
+        raise InputError(path, "", None, f"this is {kind.name}: {kind.remedy}; {KNOWN}")
     if is_text(head):
         return "CSV"
     allowed = f"this is the beginning of no known format{by_extension(path)}; {KNOWN}"
@@ -167,13 +169,6 @@ def is_measurement(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return not is_text(file.read(256))
-
-
-def _inside(path: Path, kind: Kind) -> str:
-    """What a file is and its remedy; archives are looked into."""
-    if kind.extensions == (".zip",):
-        kind = _of_archive(path) or kind
-    return f"{kind.name}: {kind.remedy}"
 
 
 def _of_archive(path: Path) -> Kind | None:

@@ -1,14 +1,22 @@
-"""Short gaps in a channel, filled by what the channel itself makes most likely, with how far that can be trusted.
+"""Samples that were not measured: short gaps filled by what the channel makes most likely, and marks for no value.
 
 The samples are taken as a stationary process of the channel's own autocovariance. What was lost has then a normal
 law, given its neighbours (simple kriging): its mean is the filling, its standard deviation the doubt. A straight line
 or a spline through the neighbours knows nothing of the wheel hop that goes on inside a gap: on hub forces it errs by
 four to six times as much.
+
+Exporters write 9.9E+34, 1E+30, the largest number of a format, or infinity where nothing was measured. Such a sample
+is taken as not measured, NaN, before anything is resampled: it would drown whatever is filtered or averaged with it.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from models.core.errors import InputError
+from models.core.finding import Finding
+from models.measured.recording import Recording
+from models.measured.signal import UNITS, Quantity, Signal
 
 BRIDGED = 0.1
 """s: the longest gap in a hub force that is bridged."""
@@ -16,6 +24,21 @@ SPAN = 0.3
 """s of neighbours on either side that the filling is drawn from: several waves of wheel hop and the chassis' roll."""
 MOST = 200
 """Neighbours, about: those close to the gap all count, those farther away every so many."""
+LIMITS: dict[Quantity, float] = {
+    "force": 1e6,
+    "moment": 1e6,
+    "acceleration": 1e4,
+    "angular rate": 1e3,
+    "angle": 100.0,
+    "travel": 100.0,
+    "strain": 1.0,
+}
+"""SI: ten times and more what the transducers of a vehicle measure (a force of 100 t, 1000 g)."""
+FAR = 1000.0
+"""Times the departure from the median that half of all samples do not exceed. A wrong unit makes all samples large
+alike, and is the business of the checks of weight and motion."""
+MARK = 1e30
+"""What is beyond this is a mark, however many samples have it."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +51,10 @@ class Gap:
     doubt: float
 
 
-def gaps(values: np.ndarray) -> list[tuple[int, int]]:
-    """First sample and the one after the last of every run of NaN in values (n,)."""
-    lost = np.concatenate(([False], np.isnan(values), [False]))
-    return [(int(a), int(b)) for a, b in np.flatnonzero(np.diff(lost)).reshape(-1, 2)]
+def runs(holds: np.ndarray) -> np.ndarray:
+    """First index and end (r, 2) of every run of true values of (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int8), [0]))))
+    return edges.reshape(-1, 2)
 
 
 def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarray, list[Gap]]:
@@ -39,21 +62,44 @@ def filled(values: np.ndarray, period: float, longest: float) -> tuple[np.ndarra
 
     Wheels hop at 10 to 15 Hz: of a gap of 0.02 s a third to a tenth of the motion is doubtful, of one of 0.05 s most.
     """
-    found = gaps(values)
-    if not found:
+    lost = runs(np.isnan(values)).tolist()
+    if not lost:
         return values, []
     out, mean, span = values.copy(), float(np.nanmean(values)), max(round(SPAN / period), 4)
     every = max(2 * span // MOST, 1)
     law = autocovariance(values - mean, 2 * span + round(longest / period) + 2)
-    said = []
-    for first, end in found:
+    gaps = []
+    for first, end in lost:
         doubt = np.nan
         known = _neighbours(values, first, end, span, every)
         if len(known) and (end - first) * period <= longest * (1 + 1e-9):
             guess, doubt = _likely(law, known, np.arange(first, end), values[known] - mean)
             out[first:end] = mean + guess
-        said.append(Gap(first, end, doubt))
-    return out, said
+        gaps.append(Gap(first, end, doubt))
+    return out, gaps
+
+
+def bridged(recording: Recording, signal: Signal) -> tuple[np.ndarray, list[Gap], tuple[Finding, ...]]:
+    """All samples (n,) of a signal with its short gaps filled, the gaps, and what to say of them; InputError where one
+    is too long."""
+    period = recording.period
+    values, gaps = filled(recording.samples(signal), period, BRIDGED)
+    for gap in (gap for gap in gaps if np.isnan(gap.doubt)):
+        text = (
+            f"is silent from {gap.first * period:.6g} s to {gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are "
+            "bridged; take a stretch without this one (clock.start, clock.duration)"
+        )
+        raise InputError(signal.file, signal.channel, None, text)
+    if not gaps:
+        return values, gaps, ()
+    longest, worst = max(gap.end - gap.first for gap in gaps) * period, max(gaps, key=lambda gap: gap.doubt)
+    text = (
+        f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged by what the channel itself "
+        f"makes most likely, with a standard deviation of {worst.doubt:.3g} {UNITS[signal.quantity]} at "
+        f"{worst.first * period:.6g} s, the largest."
+    )
+    times = gaps[0].first * period, gaps[-1].end * period
+    return values, gaps, (Finding("gaps", "doubt", signal.name, text, longest, "s", (signal.name,), times),)
 
 
 def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
@@ -61,8 +107,8 @@ def autocovariance(values: np.ndarray, lags: int) -> np.ndarray:
     there = np.nan_to_num(values)
     size = 1 << (2 * len(there) - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(there, size)) ** 2
-    found = np.fft.irfft(spectrum, size)[: min(lags, len(there))] / np.count_nonzero(~np.isnan(values))
-    return np.pad(found, (0, max(lags - len(there), 0)))
+    law = np.fft.irfft(spectrum, size)[: min(lags, len(there))] / np.count_nonzero(~np.isnan(values))
+    return np.pad(law, (0, max(lags - len(there), 0)))
 
 
 def _neighbours(values: np.ndarray, first: int, end: int, span: int, every: int) -> np.ndarray:
@@ -82,3 +128,32 @@ def _likely(law: np.ndarray, known: np.ndarray, lost: np.ndarray, values: np.nda
     weights = np.linalg.solve(among, between.T)
     left = law[0] - np.sum(between.T * weights, axis=0)
     return values @ weights, float(np.sqrt(np.maximum(left, 0.0).max()))
+
+
+def without_absurd(signal: Signal, values: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, Finding | None]:
+    """Values (n,) in SI with NaN for what cannot have been measured, and the finding that says so; times (n,) in s.
+
+    A sample is absurd if it is a mark, or beyond LIMITS and FAR times farther from the median than half of all.
+    """
+    if not (np.abs(values) > LIMITS[signal.quantity]).any():
+        return values, None
+    absurd = ~(np.abs(values) < MARK) & ~np.isnan(values)
+    good = values[~absurd & ~np.isnan(values)]
+    if len(good):
+        away = np.abs(good - np.median(good))
+        far = np.maximum(FAR * np.median(away), LIMITS[signal.quantity])
+        absurd[np.flatnonzero(~absurd & ~np.isnan(values))[away > far]] = True
+    if not absurd.any():
+        return values, None
+    stretches, count = runs(absurd), int(absurd.sum())
+    first, last = stretches[0, 0], stretches[-1, 1] - 1
+    written = values[first] / (signal.sign * signal.factor) + signal.zero
+    many = f"{count} samples in {len(stretches)} stretch(es) are" if count > 1 else "a sample is"
+    text = (
+        f"{signal.file}, {signal.channel}: {many} no {signal.quantity}: {written:.4g} {signal.unit}".rstrip()
+        + f" at {times[first]:.6g} s is an exporter's mark for no value, or a spike of the telemetry. Such samples "
+        "are taken as not measured."
+    )
+    marked = float(times[first]), float(times[last])
+    finding = Finding("no value", "doubt", signal.name, text, float(count), "samples", (signal.name,), marked)
+    return np.where(absurd, np.nan, values), finding

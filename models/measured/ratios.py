@@ -61,18 +61,14 @@ def sentence(
         "gain": own,
         "size": f"{reads}, which no usual unit explains",
     }
-    between = "; " if kind == "sign" else ": "
-    return kind, f"{texts[kind]}{between}{(remedies or _in_map(signal))[kind]}."
-
-
-def _in_map(signal: Signal) -> dict[Wrong, str]:
-    """Remedies of a channel map."""
-    return {
+    in_map: dict[Wrong, str] = {
         "sign": f"give sign = {-signal.sign} in the channel map",
         "unit": "correct its unit in the channel map",
         "gain": "check its calibration factor",
         "size": "check its calibration factor and the vehicle file",
     }
+    between = "; " if kind == "sign" else ": "
+    return kind, f"{texts[kind]}{between}{(remedies or in_map)[kind]}."
 
 
 def counted_from_load(name: str, mean: float, load: float) -> str:

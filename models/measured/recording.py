@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,13 @@ from models.core.finding import Finding
 from models.measured.channel import BLOCK
 from models.measured.columns import Columns, MemoryColumns
 from models.measured.signal import Signal
+
+Progress = Callable[[str, float], None]
+"""Told what is done now, and which part of all is."""
+
+
+def silent(*told: Any) -> None:
+    """Progress that nobody is told of."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""One signal of a recording: which quantity, of what, along which axis of which frame."""
+"""One signal of a recording: which quantity, of what, along which axis of which frame; and where that can be."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Quantity = Literal["force", "moment", "acceleration", "angular rate", "angle", "travel", "strain"]
 UNITS: dict[Quantity, str] = {
@@ -14,6 +15,15 @@ UNITS: dict[Quantity, str] = {
     "strain": "-",
 }
 """The SI unit of each quantity: that of every recording."""
+HUB: tuple[tuple[str, Quantity, str, str], ...] = (
+    ("Fx", "force", "x", "N"),
+    ("Fy", "force", "y", "N"),
+    ("Fz", "force", "z", "N"),
+    ("Mx", "moment", "x", "N m"),
+    ("My", "moment", "y", "N m"),
+    ("Mz", "moment", "z", "N m"),
+)
+"""Components of what acts on a hub or through a guide: name, quantity, axis, unit."""
 Frame = Literal["hub", "body", "inertial", "sensor"]
 
 
@@ -39,3 +49,28 @@ class Signal:
     zero: float = 0.0
     gravity: bool = True
     check: bool = False
+
+
+class Place(NamedTuple):
+    """Where a transducer sits: the body that carries it, and its position (m) in the vehicle's design axes."""
+
+    body: str
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Places:
+    """Names of a vehicle that a channel can be at: hubs, bodies, connectors (springs, mounts, bars), sensors."""
+
+    hubs: tuple[str, ...]
+    bodies: tuple[str, ...]
+    connectors: tuple[str, ...]
+    sensors: tuple[str, ...] = ()
+
+    def of(self, quantity: Quantity) -> Mapping[str, tuple[str, ...]]:
+        """Kinds of places at which a quantity is measured, with their names; none if anywhere."""
+        connectors = {"springs, mounts and bars": self.connectors}
+        if quantity in ("force", "moment"):
+            return {"hubs": self.hubs, **connectors}
+        moving = {"bodies": self.bodies, "sensors": self.sensors}
+        return {"travel": connectors, "strain": {}}.get(quantity, moving)

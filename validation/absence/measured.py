@@ -1,16 +1,17 @@
 """Recordings: a bare scene has one file and holds nothing; what its run is made of, and its answers."""
 
-import tempfile
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
-from models.core.systems import load
 from models.core.time_series import write_time_series
-from models.measured.recording import Recording
+from models.measured.faults_of_measurement import Faults
+from models.multibody import cut_kernel as kernel
 from models.systems.hub_forces.scene import ANGLES
+from models.systems.measured import section_run
+from models.systems.measured.run import Examination, run
 from models.systems.measured.scene import MeasuredScene
 
 ENGINES = ("reference", "exudyn", "mujoco")
@@ -65,51 +66,26 @@ def write(folder: Path) -> None:
 
 def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of the run that a recording drives, as an engine is handed it, and its answers."""
-    from models.multibody import cut_kernel as kernel
-    from models.systems.measured import section_run
-    from models.systems.measured.sections import Sections
+    tables, build = list[np.ndarray](), section_run.build
 
-    tables, build, said = list[np.ndarray](), section_run.build, scene.stabilise
-
-    def watched(*given: Any) -> Any:
-        tables.append((model := build(*given)).numbers)
+    def watched(*settings: Any) -> Any:
+        tables.append((model := build(*settings)).numbers)
         return model
 
-    with tempfile.TemporaryDirectory() as name, mock.patch.object(section_run, "build", watched):
-        vehicle, (own, faults) = scene.rig().vehicle, _recorded(scene, engine, Path(name))
-        assert vehicle is not None
-        hold = section_run.Hold(said.method, smoothing=said.smoothing)
-        job = section_run.SectionRun(vehicle, own, Sections(vehicle), engine, hold)
-        found = section_run.run(job, Path(name) / "run")
-        path = b"".join(found.samples(answer).tobytes() for answer in found.answers)
-    guides = {int(table[kernel.GUIDE]) for table in tables}
+    with mock.patch.object(section_run, "build", watched):
+        exam: Examination = run(scene, engine).detail
+    assert exam.outcome is not None
+    path = b"".join(exam.outcome.samples(answer).tobytes() for answer in exam.outcome.answers)
+    guides, faulty = {int(table[kernel.GUIDE]) for table in tables}, np.zeros((2, 1), bool)
+    if scene.virtual is not None and exam.virtual is not None:
+        samples, true = (exam.virtual.samples(own, scene.virtual.seed) for own in (scene.virtual.faults, Faults()))
+        faulty = np.array([(samples != true).any(axis=0), np.isnan(samples).any(axis=0)])
     counts = {
-        "runs on tyres": int(scene.virtual is not None),
-        **faults,
+        "runs on tyres": int(exam.virtual is not None),
+        "faulty channels": int(faulty[0].sum()),
+        "silent channels": int(faulty[1].sum()),
         "pulled angles": 2 * (guides == {kernel.PULLED}),
         "enforced angles": 2 * (guides == {kernel.HELD}),
         "moved clocks": sum(bool(file.offset or file.drift) for file in scene.files),
     }
     return counts, path
-
-
-def _recorded(scene: MeasuredScene, engine: str, folder: Path) -> tuple[Recording, dict[str, int]]:
-    """The scene's files, or those of its virtual measurement, on one clock; how many channels do not tell the truth."""
-    from models.measured.faults_of_measurement import Faults
-    from models.systems.measured import plan
-    from models.systems.measured.clock import record
-    from models.systems.measured.pattern import write_pattern
-    from models.systems.measured.virtual import virtual_measurement
-
-    rig, own, faulty = scene.rig(), scene.virtual, np.zeros((2, 1), bool)
-    if own is not None and rig.vehicle is not None:
-        true = virtual_measurement(rig.vehicle, own, engine)
-        samples = true.samples(own.faults, own.seed)
-        faulty = np.array([(samples != true.samples(Faults(), own.seed)).any(axis=0), np.isnan(samples).any(axis=0)])
-        write_pattern(scene, true, samples, folder)
-        scene = load(folder / "scene.toml")
-    sources, counts = (
-        plan.opened(scene),
-        dict(zip(("faulty channels", "silent channels"), map(int, faulty.sum(axis=1)), strict=True)),
-    )
-    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder), counts

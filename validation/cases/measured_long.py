@@ -11,10 +11,11 @@ from models.engines.cut_vehicle import build
 from models.fatigue.counting import count, level_crossings, range_pairs
 from models.fatigue.rainflow_cycles import cycles
 from models.measured.formats import open_source
-from models.systems.measured.comparison import checks, compare
+from models.measured.signal import HUB
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.section_run import Hold, run
 from models.systems.measured.sections import Sections, guided
+from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import cut
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
@@ -93,15 +94,11 @@ def _guides(quick: bool) -> list[Row]:
 
 def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Forces and moments (guides, 6); components along which a body slides are nought."""
-    values = dict(
-        zip(
-            (answer.name for answer in sections.answers),
-            sections.read(numbers, np.concatenate((q, v))[None], 2)[0],
-            strict=True,
-        )
+    read = sections.read(numbers, np.concatenate((q, v))[None], 2)[0]
+    values = {answer.name: value for answer, value in zip(sections.answers, read, strict=True)}
+    return np.array(
+        [[values.get(f"{name} guide {axis}", 0.0) for axis, *_ in HUB] for name in guided(sections.vehicle)]
     )
-    axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-    return np.array([[values.get(f"{name} guide {axis}", 0.0) for axis in axes] for name in guided(sections.vehicle)])
 
 
 def _counting() -> list[Row]:
@@ -199,16 +196,8 @@ def _killed(folder: Path) -> Row:
 def _memory(folder: Path) -> list[Row]:
     """Memory that a longer recording takes, and what an hour of it would; how fast it goes."""
     run_of(folder, LONG, REPEATED)
-    command = [
-        sys.executable,
-        "-m",
-        "validation.measured.long_recording",
-        str(folder),
-        str(LONG),
-        str(REPEATED),
-        str(LONG / 10),
-        "2e-3",
-    ]
+    words = map(str, (folder, LONG, REPEATED, LONG / 10, 2e-3))
+    command = [sys.executable, "-m", "validation.measured.long_recording", *words]
     told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     lines = np.array([line.split() for line in told], float)  # of every block: seconds, memory, processor
     half, last = lines[len(lines) // 2], lines[-1]

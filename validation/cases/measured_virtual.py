@@ -7,32 +7,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from models.core.errors import RunFailed
 from models.core.strict import read
 from models.core.systems import load
 from models.engines.cut_vehicle import ENGINES
-from models.measured.channel import BLOCK
 from models.measured.checks import check as check_recording
-from models.measured.checks.place import Place
 from models.measured.faults_of_measurement import Faults
 from models.measured.formats import write
-from models.measured.formats.writing import Group
 from models.measured.recording import Recording
-from models.measured.signal import Signal
 from models.systems.hub_forces.measurement import HubForces, model
-from models.systems.measured import plan
-from models.systems.measured.clock import record
+from models.systems.measured.run import read as read_files
 from models.systems.measured.section_run import Hold, Outcome, SectionRun
 from models.systems.measured.section_run import run as march
 from models.systems.measured.sections import Sections
 from models.systems.measured.trust import Level, drift
 from models.systems.measured.verdict import errors, judge, judge_beside_truth
-from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, map_lines, virtual_measurement
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, group, map_lines, virtual_measurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, not_run, within
+from validation.measured import measured_car
 from validation.measured import recording as moving_car
 
 TITLE = "Measurement files against the truth"
@@ -93,58 +88,35 @@ def own_vehicle(folder: Path) -> str:
 
 def measured(proof: Proof, folder: Path, duration: float) -> VirtualMeasurement:
     """The vehicle on its road, its faults left to each sample."""
+    table = {"duration": duration, "sampling_rate": RATE, "frame": proof.frame, "sections": ["front left"]}
     vehicle = cut(load_vehicle(proof.vehicle, folder), "body")
-    own = read(
-        VirtualTable,
-        {"duration": duration, "sampling_rate": RATE, "frame": proof.frame, "sections": ["front left"]},
-        "",
-    )
-    return virtual_measurement(vehicle, own, "mujoco")
+    return virtual_measurement(vehicle, read(VirtualTable, table, ""), "mujoco")
 
 
 def faults(bits: int) -> Faults:
     """All that is planted."""
-    silent = {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]}
-    return read(
-        Faults,
-        {
-            "noise": NOISE,
-            "delay": dict.fromkeys(("angle", "angular rate"), LATE),
-            "quantisation": {"bits": bits},
-            "dropouts": silent,
-        },
-        "",
-    )
+    table = {
+        "noise": NOISE,
+        "delay": dict.fromkeys(("angle", "angular rate"), LATE),
+        "quantisation": {"bits": bits},
+        "dropouts": {"rate": 0.1, "length": 0.02, "channels": ["force", "moment"]},
+    }
+    return read(Faults, table, "")
 
 
-def recorded(found: VirtualMeasurement, samples: np.ndarray, vehicle: str, form: str, folder: Path) -> Recording:
+def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, form: str, folder: Path) -> Recording:
     """Samples written by two recorders, hubs and inertial unit, in a format, and read back as a scene says."""
     folder.mkdir(parents=True)
-    inertial = [signal.at == found.vehicle.chassis for signal in found.signals]
+    inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
-    for name, chosen, offset in (("hubs", ~np.array(inertial), 0.0), ("unit", np.array(inertial), -LATE)):
-        signals = tuple(signal for signal, own in zip(found.signals, chosen, strict=True) if own)
-        write(folder / f"{name}.{form}", [_group(signals, samples[:, chosen], found.period)])
+    for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -LATE)):
+        signals = tuple(signal for signal, own in zip(virtual.signals, chosen, strict=True) if own)
+        write(folder / f"{name}.{form}", [group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{form}", offset))
     (folder / "scene.toml").write_text("\n".join(text))
     if (own := folder.parent / vehicle).is_file():
         (folder / vehicle).write_bytes(own.read_bytes())
-    scene = load(folder / "scene.toml")
-    sources, rig = plan.opened(scene), scene.rig()
-    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder)
-
-
-def _group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
-    factors = np.array([signal.factor for signal in signals])
-    blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
-    return Group(
-        tuple(s.channel for s in signals),
-        tuple(s.unit for s in signals),
-        ("",) * len(signals),
-        period,
-        len(samples),
-        blocks,
-    )
+    return read_files(load(folder / "scene.toml"), folder)
 
 
 def held(recording: Recording, vehicle: CutVehicle, hold: Hold, folder: Path, engine: str = "mujoco") -> Outcome:
@@ -332,124 +304,27 @@ def true_frame(true: VirtualMeasurement) -> str:
 
 
 def _moving(folder: Path) -> list[Row]:
-    """A real car: a telephone's gyro and accelerometers, and its camera's angles, in two files of two clocks.
-
-    Nobody publishes wheel forces: at the hubs stands the static load, so that nothing here judges a run.
-    """
+    """A real car: a telephone's gyro and accelerometers, and its camera's angles, in two files of two clocks."""
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
-        return [
-            not_run(
-                "measured_virtual.moving_gyro",
-                SYSTEM,
-                f"{what} gyro by the camera's angles",
-                f"TWINRIG_DATA does not lead to {moving_car.FILE}",
-            )
-        ]
-    recording = _of_the_road(path, cut(load_vehicle("r19_free"), "body"), folder)
-    said = check_recording(recording, None, {"phone": Place("body", (0.0, 0.0, 1.0))}, {})
+        id, gyro = "measured_virtual.moving_gyro", f"{what} gyro by the camera's angles"
+        return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.FILE}")]
+    scene = measured_car.scene(path, cut(load_vehicle("r19_free"), "body"), folder)
+    recording = read_files(scene, folder)
+    said = check_recording(recording, None, scene.places, {})
     ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
     up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
+    id, gyro = "measured_virtual.moving", f"{what} pitch rate of the gyro by the derivative of the camera's angle"
+    late = f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it"
+    means, why = f"{what} mean of the accelerations", "a telephone's accelerometers are off by one or two per cent"
+    mounted, size = "two devices, each as it was mounted", float(np.linalg.norm(up))
+    gyro = f"{gyro}, as the check finds it"
     return [
-        within(
-            "measured_virtual.moving_gyro",
-            SYSTEM,
-            f"{what} pitch rate of the gyro by the derivative of the camera's angle, as the check finds it",
-            ratio or 0.0,
-            "1",
-            1.0,
-            0.1,
-            "two devices, each as it was mounted",
-            "none",
-        ),
-        finding(
-            "measured_virtual.moving_shift",
-            SYSTEM,
-            f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it",
-            shift or 0.0,
-            "s",
-            "",
-            "two clocks",
-        ),
-        within(
-            "measured_virtual.moving_gravity",
-            SYSTEM,
-            f"{what} mean of the accelerations",
-            float(np.linalg.norm(up)),
-            "m/s^2",
-            9.81,
-            0.2,
-            "a telephone's accelerometers are off by one or two per cent",
-            "none",
-        ),
+        within(f"{id}_gyro", SYSTEM, gyro, ratio or 0.0, "1", 1.0, 0.1, mounted, "none"),
+        finding(f"{id}_shift", SYSTEM, late, shift or 0.0, "s", "", "two clocks"),
+        within(f"{id}_gravity", SYSTEM, means, size, "m/s^2", 9.81, 0.2, why, "none"),
     ]
-
-
-def _of_the_road(path: Path, vehicle: CutVehicle, folder: Path) -> Recording:
-    """The public recording as files with a map that turns x forward, y right, z down into the axes of ISO 8855."""
-    folder.mkdir(parents=True)
-    with np.load(path) as data:
-        kept = {name: data[name] for name in ("acc_t", "acc", "gyro", "gyro_bias", "frame_t", "frame_q", "frame_p")}
-    start, camera = kept["acc_t"][0], Rotation.from_quat(kept["frame_q"], scalar_first=True).as_matrix()
-    down = -kept["frame_p"] / np.linalg.norm(kept["frame_p"], axis=1, keepdims=True)
-    forward, right, below = np.einsum("nij,ni->jn", camera, down)
-    angles = {"roll": np.arctan2(right, below), "pitch": -np.arcsin(forward)}
-    _csv(folder / "camera.csv", kept["frame_t"] - start, {f"{name} [rad]": angles[name] for name in angles})
-    rates = kept["gyro"] - kept["gyro_bias"]
-    named = {f"{axis}_rate [rad/s]": rates[:, i] for i, axis in enumerate(("roll", "pitch", "yaw"))}
-    named |= {f"a{axis} [m/s^2]": kept["acc"][:, i] for i, axis in enumerate("xyz")}
-    _csv(folder / "phone.csv", kept["acc_t"] - start, named)
-    count = int((kept["acc_t"][-1] - start) * 100)
-    loads = {f"{hub}_fz [N]": np.full(count, load) for hub, load in zip(vehicle.hubs, vehicle.loads, strict=True)}
-    _csv(folder / "hubs.csv", np.arange(count) / 100, loads)
-    (folder / "scene.toml").write_text(_moving_scene(vehicle))
-    scene = load(folder / "scene.toml")
-    sources, rig = plan.opened(scene), scene.rig()
-    return record(scene, sources, plan.mapped(scene, sources, rig), rig.hubs, folder)
-
-
-def _csv(path: Path, times: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-    """As a logger writes it, whatever its clock does."""
-    header = ",".join(("time [s]", *columns))
-    np.savetxt(path, np.column_stack([times, *columns.values()]), "%.9g", ",", header=header, comments="")
-
-
-def _moving_scene(vehicle: CutVehicle) -> str:
-    """Signs: y and z of the telephone point the other way."""
-
-    def entry(channel: str, what: str, at: str, component: str, frame: str, sign: int) -> str:
-        return (
-            f'  {{ channel = "{channel}", quantity = "{what}", at = "{at}", component = "{component}", '
-            f'frame = "{frame}", sign = {sign} }},'
-        )
-
-    hubs = [entry(f"{hub}_fz", "force", hub, "z", "hub", 1) for hub in vehicle.hubs]
-    camera = [entry(axis, "angle", "phone", axis, "inertial", sign) for axis, sign in (("roll", 1), ("pitch", -1))]
-    phone = [
-        entry(f"{axis}_rate", "angular rate", "phone", axis, "body", sign)
-        for axis, sign in (("roll", 1), ("pitch", -1), ("yaw", -1))
-    ]
-    phone += [
-        entry(f"a{axis}", "acceleration", "phone", axis, "body", sign)
-        for axis, sign in zip("xyz", (1, -1, -1), strict=True)
-    ]
-    files = [
-        f'[[files]]\nfile = "{name}.csv"\nchannels = [\n' + "\n".join(lines) + "\n]"
-        for name, lines in (("hubs", hubs), ("camera", camera), ("phone", phone))
-    ]
-    head = [
-        'title = "moving car"',
-        'system = "measured"',
-        "[vehicle]",
-        'file = "r19_free"',
-        "[stabilise]",
-        'method = "none"',
-        "[sensors.phone]",
-        'body = "body"',
-        "position = [0.0, 0.0, 1.0]",
-    ]
-    return "\n".join([*head, *files, ""])
 
 
 def _quick(folder: Path) -> list[Row]:

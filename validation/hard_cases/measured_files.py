@@ -1,6 +1,5 @@
 """Measurement files that are damaged or odd: read right, read as far as they go and said, or refused; never silent."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ from models.measured.formats.mdf4 import opened as mdf4_opened
 from models.measured.formats.tdms import Bounded, opened
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.measured.measured_files import csv, csv_forms, kinds, mdf4, rpc3, tdms
-from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, cut
+from validation.measured.measured_files.odd import FX, FZ, TOLERANCE, Odd, Sweep, raw
 
 CHECKS = {
     "right": "times, values and names as they were written",
@@ -20,7 +19,7 @@ CHECKS = {
 
 def cut_number(folder: Path) -> str:
     """What numpy makes of a number that was cut off."""
-    path = cut(csv.text()(folder), len(csv.plain()) - 3)
+    path = raw(csv.whole()[:-3].encode())(folder)
     last = np.genfromtxt(path, delimiter=",", skip_header=1)[-1, 2]
     return f"numpy reads the last value as {last:g}, which was {FX[-1]:g}"
 
@@ -63,10 +62,6 @@ def of_file(odd: Odd) -> Case:
     )
 
 
-def _silent(sweep: Sweep, _: str, folder: Path) -> float:
-    return sweep.silent(folder / "cut")
-
-
 def of_sweep(sweep: Sweep) -> Case:
     """The hard case of a file that is cut off at many places."""
     return Case(
@@ -76,7 +71,7 @@ def of_sweep(sweep: Sweep) -> Case:
         unit="silent cuts",
         tolerance=0.0,
         why="no file that was cut off may be used without a word",
-        error=partial(_silent, sweep),
+        error=lambda _, folder: sweep.silent(folder / "cut"),
         once=True,
     )
 

@@ -10,30 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from models.core.finding import Finding
-from models.measured.faults_of_measurement import Faults
-from validation.cases import measured_checks as bench
 from validation.hard_cases.case import Case
+from validation.measured import planted as bench
 
 ROAD: bench.Ride = ("C", 1, 20.0, 5.0)
 SIZE = 0.2
 
 
-def _found(folder: Path, change: bench.Samples | None = None, **faults: Any) -> tuple[Finding, ...]:
-    """Errors and doubts in the recording, spoilt."""
-    own = bench.measurement(road=ROAD)
-    samples = own.samples(Faults(**{"noise": bench.NOISE} | faults), bench.SEED)
-    return bench.findings(own, change(own, samples) if change else samples, folder)
-
-
 def spoilt(
-    check: str, place: str, size: float | None, change: bench.Samples | None = None, **faults: Any
+    check: str, place: str, size: float | None, spoil: bench.Spoil | None = None, **faults: Any
 ) -> Callable[[str, Path], float]:
     """A case of one fault: ``check`` must speak first, and of no other place than ``place``."""
 
     def error(implementation: str, folder: Path) -> float:
-        found = _found(folder, change, **faults)
-        if not found or found[0].check != check or not all(place in one.place for one in found):
+        found = bench.planted(bench.measurement(road=ROAD), folder, spoil, **faults)
+        if not found or found[0].check != check or not all(place in finding.place for finding in found):
             return np.inf
         return 0.0 if size is None else abs((found[0].size or 0.0) / size - 1.0)
 
@@ -42,7 +33,7 @@ def spoilt(
 
 def clean(implementation: str, folder: Path) -> float:
     """Errors and doubts in the recording as it is."""
-    return float(len(_found(folder)))
+    return float(len(bench.planted(bench.measurement(road=ROAD), folder)))
 
 
 CASES = (
@@ -63,43 +54,43 @@ CASES = (
                 "wheel force in kN read as N",
                 "a vehicle that flies off, or a plausible bias",
                 "unit named at its channel",
-                spoilt("unit", "fl_fz", 1e-3, bench._times(1e-3, "fl_fz")),
+                spoilt("unit", "fl_fz", 1e-3, bench.times(1e-3, "fl_fz")),
             ),
             (
                 "wheel force with the other sign",
                 "its mean is that of another load",
                 "sign named at its channel",
-                spoilt("sign", "rr_fz", -1.0, bench._times(-1.0, "rr_fz")),
+                spoilt("sign", "rr_fz", -1.0, bench.times(-1.0, "rr_fz")),
             ),
             (
                 "clipped wheel force",
                 "the worst loads are missing, the mean hardly changes",
                 "clipping, 3 % of samples",
-                spoilt("clipped", "fl_fz", 3.0, bench._clipped("fl_fz", 0.03)),
+                spoilt("clipped", "fl_fz", 3.0, bench.clipped("fl_fz", 0.03)),
             ),
             (
                 "spike of one sample",
                 "its damage is that of the whole recording; the mean hardly changes",
                 "its height",
-                spoilt("spikes", "fl_fz", 5e3, bench._spiked("fl_fz", 2.0, 5e3)),
+                spoilt("spikes", "fl_fz", 5e3, bench.spiked("fl_fz", 2.0, 5e3)),
             ),
             (
                 "value held for 0.06 s",
                 "shorter than a gap that is bridged: a straight line at any height",
                 "length and place",
-                spoilt("clipped", "fl_fz", 0.06, bench._held("fl_fz", 2.0, 0.06)),
+                spoilt("clipped", "fl_fz", 0.06, bench.held("fl_fz", 2.0, 0.06)),
             ),
             (
                 "dead channel",
                 "a constant is a valid number",
                 "named as dead",
-                spoilt("clipped", "fr_fz", None, bench._times(0.0, "fr_fz", add=3e3)),
+                spoilt("clipped", "fr_fz", None, bench.times(0.0, "fr_fz", add=3e3)),
             ),
             (
                 "front wheels exchanged",
                 "loads are alike left and right",
                 "the sides named",
-                spoilt("swapped", "fl with fr", None, bench._exchanged(("fl", "fr"))),
+                spoilt("swapped", "fl with fr", None, bench.exchanged(("fl", "fr"))),
             ),
             (
                 "one channel 3 ms late",
@@ -111,7 +102,7 @@ CASES = (
                 "gap of half a second",
                 "interpolated it is a road without roughness",
                 "length and place",
-                spoilt("gaps", "rr_fz", 0.5, bench._lost("rr_fz", 3.0, 0.5)),
+                spoilt("gaps", "rr_fz", 0.5, bench.lost("rr_fz", 3.0, 0.5)),
             ),
         )
     ),

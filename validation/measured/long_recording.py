@@ -66,11 +66,13 @@ def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
 
 
 def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
-    """The same as a recording, past all files and maps; ``path`` is where its samples lie."""
+    """The same as a recording, past all files and maps, which is made unless it is there; ``path`` is where its samples
+    lie."""
     signals, _ = pattern(repeated)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
-    for values in blocks(seconds, repeated):
+    for values in blocks(seconds, repeated) if columns.done == 0 else ():
         columns.write(columns.done, values)
+    assert columns.done == columns.count
     return Recording(signals, columns, PERIOD)
 
 
@@ -88,14 +90,8 @@ def run_of(
     step: float | None = None,
 ) -> SectionRun:
     """A run of a recording in this folder, which is made unless it is there."""
-    path, (signals, _) = folder / "recording.f64", pattern(repeated)
-    if path.with_suffix(".json").is_file():
-        columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
-        assert columns.done == columns.count
-        found = Recording(signals, columns, PERIOD)
-    else:
-        found = recorded(seconds, path, repeated)
-    return SectionRun(r19(), found, sections(), engine, hold or Hold(), step)
+    recording = recorded(seconds, folder / "recording.f64", repeated)
+    return SectionRun(r19(), recording, sections(), engine, hold or Hold(), step)
 
 
 def answers_of(folder: Path, name: str = "run") -> bytes:
@@ -113,10 +109,7 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
         sys.executable,
         "-m",
         "validation.measured.long_recording",
-        str(folder),
-        str(seconds),
-        str(repeated),
-        str(block),
+        *map(str, (folder, seconds, repeated, block)),
     ]
     while True:
         runs += 1

@@ -1,13 +1,19 @@
-"""The moving car of ``validation.measured.recording`` as an engineer's recording: accelerometers, gyros, angles."""
+"""The moving car of ``validation.measured.recording`` as an engineer's recording: accelerometers, gyros, angles.
+
+Nobody publishes wheel forces: in its files the static load stands at the hubs, so that nothing here judges a run.
+"""
 
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from models.measured.columns import Columns
 from models.measured.recording import Recording
 from models.measured.signal import Quantity, Signal
 from models.sensors.rotations import matrix
+from models.systems.measured.scene import MeasuredScene, build
+from models.vehicles.cut_vehicle import CutVehicle
 from validation.measured import recording as car
 
 CHANNELS: tuple[tuple[str, Quantity, str], ...] = (
@@ -47,3 +53,60 @@ def recording(values: np.ndarray, path: Path) -> Recording:
         Signal(name, "", name, what, "body", component, "body", 1, "", 1.0) for name, what, component in CHANNELS
     )
     return Recording(signals, own, car.PERIOD)
+
+
+def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
+    """A scene of the public recording in files of three clocks.
+
+    Its map turns x forward, y right, z down into the axes of ISO 8855.
+    """
+    folder.mkdir(parents=True)
+    with np.load(path) as data:
+        start, count = data["acc_t"][0], int((data["acc_t"][-1] - data["acc_t"][0]) * 100)
+        camera = Rotation.from_quat(data["frame_q"], scalar_first=True).as_matrix()
+        down = -data["frame_p"] / np.linalg.norm(data["frame_p"], axis=1, keepdims=True)
+        forward, right, below = np.einsum("nij,ni->jn", camera, down)
+        rates = data["gyro"] - data["gyro_bias"]
+        tables = {
+            "hubs": (np.arange(count) / 100, [np.full(count, load) for load in vehicle.loads]),
+            "camera": (data["frame_t"] - start, [np.arctan2(right, below), -np.arcsin(forward)]),
+            "phone": (data["acc_t"] - start, [*rates.T, *data["acc"].T]),
+        }
+    turns, signs = ("roll", "pitch", "yaw"), (1, -1, -1)
+    rows: dict[str, list[tuple[str, Quantity, str, str, str, int, str]]] = {
+        "hubs": [(f"{hub}_fz", "force", hub, "z", "hub", 1, "N") for hub in vehicle.hubs],
+        "camera": [
+            (axis, "angle", "phone", axis, "inertial", sign, "rad")
+            for axis, sign in zip(turns[:2], signs, strict=False)
+        ],
+        "phone": [
+            *(
+                (f"{axis}_rate", "angular rate", "phone", axis, "body", sign, "rad/s")
+                for axis, sign in zip(turns, signs, strict=True)
+            ),
+            *(
+                (f"a{axis}", "acceleration", "phone", axis, "body", sign, "m/s^2")
+                for axis, sign in zip("xyz", signs, strict=True)
+            ),
+        ],
+    }
+    keys = ("channel", "quantity", "at", "component", "frame", "sign", "unit")
+    for name, (times, columns) in tables.items():
+        header = ",".join(("time [s]", *(f"{row[0]} [{row[-1]}]" for row in rows[name])))
+        np.savetxt(folder / f"{name}.csv", np.column_stack([times, *columns]), "%.9g", ",", header=header, comments="")
+    files = [
+        {"file": f"{name}.csv", "channels": [dict(zip(keys, row, strict=True)) for row in own]}
+        for name, own in rows.items()
+    ]
+    return build(
+        {
+            "title": "moving car",
+            "system": "measured",
+            "vehicle": {"file": "r19_free"},
+            "stabilise": {"method": "none"},
+            "sensors": {"phone": {"body": "body", "position": [0.0, 0.0, 1.0]}},
+            "files": files,
+        },
+        "scene.toml",
+        folder,
+    )

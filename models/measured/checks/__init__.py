@@ -8,24 +8,10 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 
 from models.core.finding import Finding, Weight
-from models.measured.checks import (
-    clipped,
-    drift,
-    factor,
-    gaps,
-    gravity,
-    lever,
-    noise,
-    rigid,
-    shift,
-    spikes,
-    swapped,
-    turning,
-    weight,
-)
+from models.measured.checks import clipped, drift, faults, gaps, gravity, noise, rigid, spikes, swapped, turning, weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.place import Place
 from models.measured.recording import Recording
+from models.measured.signal import Place
 from models.vehicles.cut_vehicle import CutVehicle
 
 CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
@@ -35,10 +21,10 @@ CHECKS: tuple[Callable[[Evidence], list[Finding]], ...] = (
     gravity.check,
     swapped.check,
     weight.check,
-    lever.check,
-    factor.check,
+    faults.levers,
+    faults.factors,
     drift.check,
-    shift.check,
+    faults.shifts,
     turning.check,
     rigid.check,
     noise.check,
@@ -76,10 +62,10 @@ def check(
 
 def findings(evidence: Evidence) -> tuple[Finding, ...]:
     """The same, of evidence that is then at hand for figures."""
-    found = list(evidence.recording.noticed)
-    for each in CHECKS:
-        found += [finding for finding in each(evidence) if not _named(finding, found)]
-    return tuple(sorted(found, key=lambda finding: ORDER.index(finding.weight)))
+    said = list(evidence.recording.noticed)
+    for look in CHECKS:
+        said += [finding for finding in look(evidence) if not _named(finding, said)]
+    return tuple(sorted(said, key=lambda finding: ORDER.index(finding.weight)))
 
 
 def _named(finding: Finding, before: list[Finding]) -> bool:

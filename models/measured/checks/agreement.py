@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -63,6 +63,11 @@ class Fault:
     fall: float
     exchanged: tuple[tuple[str, str], ...] = ()
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the signals."""
+        return tuple(signal.name for signal in self.signals)
+
 
 @dataclass(frozen=True)
 class Agreement:
@@ -84,6 +89,16 @@ class Agreement:
     noise: np.ndarray
 
     @cached_property
+    def hubs(self) -> tuple[str, ...]:
+        """Where the forces act."""
+        return tuple(dict.fromkeys(s.at for s in self.inputs))
+
+    @cached_property
+    def places(self) -> dict[tuple[str, str, str], int]:
+        """Number of a force by its hub, quantity and component."""
+        return {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
+
+    @cached_property
     def expected(self) -> np.ndarray:
         """Powers (f, k) of the expected readings."""
         return np.einsum("fkc,fkc->fk", self._told, self.response.conj()).real
@@ -100,6 +115,15 @@ class Agreement:
         noise = len(self.frequencies) * self.noise
         share = (self.left.sum(axis=0) - noise) / np.maximum(self.readings.sum(axis=0) - noise, noise + TINY)
         return np.sqrt(np.maximum(share, 0.0))
+
+    def typical(self) -> float:
+        """Share of the readings that stays unexplained, the median over them."""
+        return float(np.median(self.unexplained))
+
+    @property
+    def rms(self) -> float:
+        """The same, root of the mean square."""
+        return float(np.sqrt(np.mean(self.unexplained**2)))
 
     @property
     def weights(self) -> np.ndarray:
@@ -125,18 +149,25 @@ class Agreement:
         """With a fault put right: true by recorded forces, or recorded by true readings, in the response."""
         response = self.response.copy()
         if fault.kind == "swapped":
-            return replace(self, response=response[:, :, self._order(dict(fault.exchanged))])
+            to = dict(fault.exchanged)
+            order = [self.places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
+            return replace(self, response=response[:, :, order])
         if fault.kind == "crossed":
-            return replace(self, response=self._crossed(fault.signals))
+            return self._crossed(fault.signals)
         if fault.kind == "lever":
             hubs = tuple(dict.fromkeys(s.at for s in fault.signals))
             return replace(self, response=response + fault.size * self._levers(hubs))
-        forces, turn = fault.signals[0] in self.inputs, 2j * np.pi * self.frequencies
+        turn = 2j * np.pi * self.frequencies
         wrong = np.exp(-turn * fault.size) if fault.kind == "late" else np.full(len(turn), fault.size, complex)
-        pick = [(self.inputs if forces else self.outputs).index(s) for s in fault.signals]
-        index = (slice(None), slice(None), pick) if forces else (slice(None), pick)
+        forces, index = self._picked(fault.signals)
         response[index] *= (1 / wrong if forces else wrong)[:, None, None]
         return replace(self, response=response)
+
+    def _picked(self, signals: tuple[Signal, ...]) -> tuple[bool, Any]:
+        """Whether signals are forces, and the index of what is theirs in the response (f, k, c)."""
+        forces = signals[0] in self.inputs
+        pick = [(self.inputs if forces else self.outputs).index(s) for s in signals]
+        return forces, (slice(None), slice(None), pick) if forces else (slice(None), pick)
 
     def _offers(self) -> Iterator[Fault]:
         """Every single fault that would explain more and is large enough to be named."""
@@ -216,8 +247,7 @@ class Agreement:
 
     def _about(self, weights: np.ndarray) -> Iterator[Fault]:
         """Moments about another point than the hub, above or below, of one hub, of two, or of all alike."""
-        hubs = tuple(dict.fromkeys(s.at for s in self.inputs))
-        for some in (hubs, *combinations(hubs, 2), *((hub,) for hub in hubs)):
+        for some in (self.hubs, *combinations(self.hubs, 2), *((hub,) for hub in self.hubs)):
             signals = tuple(s for s in self.inputs if s.at in some and s.quantity == "moment" and s.component in "xy")
             levers = self._levers(some)
             power = float((weights * _power(levers, self.forces)).sum())
@@ -235,19 +265,17 @@ class Agreement:
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
         """
-        places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
         out = np.zeros_like(self.response)
         for hub in hubs:
             for axis, other, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
-                moment, force = places.get((hub, "moment", axis)), places.get((hub, "force", other))
+                moment, force = self.places.get((hub, "moment", axis)), self.places.get((hub, "force", other))
                 if moment is not None and force is not None:
                     out[:, :, force] += sign * self.response[:, :, moment]
         return out
 
     def _swapped(self, weights: np.ndarray) -> Iterator[Fault]:
         """Two hubs as a whole, or two and two."""
-        hubs = tuple(dict.fromkeys(s.at for s in self.inputs))
-        pairs = list(combinations(hubs, 2))
+        pairs = list(combinations(self.hubs, 2))
         twice = [(a, b) for a, b in combinations(pairs, 2) if not set(a) & set(b)]
         before = float((weights * self.left).sum())
         for exchanged in (*((pair,) for pair in pairs), *twice):
@@ -256,16 +284,14 @@ class Agreement:
                 other = self.without(fault)
                 fall = before - float((weights * other.left).sum())
                 if fall > CERTAIN and other.left.sum() < self.left.sum():
-                    share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (self, other))
-                    yield replace(fault, size=share, error=rest, fall=fall)
+                    yield replace(fault, size=self.rms, error=other.rms, fall=fall)
 
     def _pairs(self, weights: np.ndarray) -> Iterator[Fault]:
         """Two channels that each have what the other one measured."""
         for pair, other in self._exchanges():
             fall = self._better(other, weights)
             if fall:
-                share, rest = (float(np.sqrt(np.mean(each.unexplained**2))) for each in (self, other))
-                yield Fault("crossed", " and ".join(s.name for s in pair), pair, share, rest, fall)
+                yield Fault("crossed", " and ".join(s.name for s in pair), pair, self.rms, other.rms, fall)
 
     def blind(self) -> list[tuple[Signal, ...]]:
         """Pairs of forces or moments of one axis that might be exchanged without being named."""
@@ -278,20 +304,18 @@ class Agreement:
             for pair in combinations(own, 2):
                 what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
                 if what == 1 and (at == 1 or axis == 1):
-                    yield pair, replace(self, response=self._crossed(pair))
+                    yield pair, self._crossed(pair)
 
     def _better(self, other: "Agreement", weights: np.ndarray) -> float:
         """Fall of chi square from this to the other one; 0 where it is not certain, or not worth its name."""
         fall = float((weights * (self.left - other.left)).sum())
         return fall if fall > CERTAIN and self._worth(other, weights) else 0.0
 
-    def _crossed(self, pair: tuple[Signal, ...]) -> np.ndarray:
-        """Response (f, k, c) if two channels are exchanged, both of the forces or both of the readings."""
-        forces, response = pair[0] in self.inputs, self.response.copy()
-        pick = [(self.inputs if forces else self.outputs).index(s) for s in pair]
-        index = (slice(None), slice(None)) if forces else (slice(None),)
-        response[(*index, pick)] = response[(*index, pick[::-1])]
-        return response
+    def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
+        """This with two channels exchanged, both of the forces or both of the readings."""
+        response = self.response.copy()
+        response[self._picked(pair)[1]] = self.response[self._picked(pair[::-1])[1]]
+        return replace(self, response=response)
 
     def _exchange(self, exchanged: tuple[tuple[str, str], ...]) -> Fault | None:
         """Of pairs of hubs; None where they do not have the same channels."""
@@ -301,14 +325,6 @@ class Agreement:
         if {(dict(both)[at], quantity, component) for at, quantity, component in keys} != keys:
             return None
         return Fault("swapped", " and ".join(f"{a} with {b}" for a, b in exchanged), signals, 0.0, 0.0, 0.0, both)
-
-    def _order(self, to: dict[str, str]) -> list[int]:
-        places = {(s.at, s.quantity, s.component): i for i, s in enumerate(self.inputs)}
-        return [places[to.get(s.at, s.at), s.quantity, s.component] for s in self.inputs]
-
-    def typical(self) -> float:
-        """Share of the readings that stays unexplained, the median over them."""
-        return float(np.median(self.unexplained))
 
     def seen(self) -> dict[str, tuple[float, float]]:
         """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""

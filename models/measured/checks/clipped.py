@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from models.core.finding import Finding
+from models.core.finding import Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.runs import runs
-from models.measured.gaps import BRIDGED
+from models.measured.gaps import BRIDGED, runs
 from models.measured.signal import UNITS, Signal
 
 NAME = "clipped"
@@ -72,9 +71,5 @@ def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:
         f"{signal.name} stands still at {held} for {end - first:.4g} s from {first:.4g} s on: its last value was "
         "held over a gap; leave these times out."
     )
-    doubtful = signal.check or end - first <= BRIDGED
-    return [
-        Finding(
-            NAME, "doubt" if doubtful else "error", signal.name, text, end - first, "s", (signal.name,), (first, end)
-        )
-    ]
+    weight: Weight = "doubt" if signal.check or end - first <= BRIDGED else "error"
+    return [Finding(NAME, weight, signal.name, text, end - first, "s", (signal.name,), (first, end))]

@@ -27,18 +27,13 @@ def check(evidence: Evidence) -> list[Finding]:
     if not others:
         return []
     windows = _windows(evidence) if evidence.searched and len(clocks) == 1 else []
+    needed = (
+        "was not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
+        f"{LEAST} stretches of {WINDOW:g} s without a gap."
+    )
     if len(windows) < LEAST:
-        return [
-            Finding(
-                NAME,
-                "note",
-                name,
-                f"Whether the clock of {name} runs as fast as that of the hub forces was "
-                "not looked at: this needs their motion by the vehicle file, hub forces in one file, and "
-                f"{LEAST} stretches of {WINDOW:g} s without a gap.",
-            )
-            for name in others
-        ]
+        what = "runs as fast as that of the hub forces"
+        return [Finding(NAME, "note", name, f"Whether the clock of {name} {what} {needed}") for name in others]
     return [_finding(evidence, windows, name, min(clocks)) for name in others]
 
 
@@ -48,24 +43,22 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
     now, own = evidence.searched[0], evidence.recording
     length = round(WINDOW / own.period)
     firsts = np.linspace(0, own.count - length, max(min(own.count // length, MOST), 1)).astype(int)
-    found = []
+    windows, c = [], len(now.inputs)
     for first in firsts if own.count >= length else ():
         part = spectra(own, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
         if part is not None:
             lines = np.abs(now.frequencies[:, None] - part.frequencies).argmin(axis=0)
-            c, cross = len(now.inputs), part.cross
-            readings = np.einsum("fkk->fk", cross[:, c:, c:]).real
             local = replace(
                 now,
                 frequencies=part.frequencies,
-                forces=cross[:, :c, :c],
-                between=cross[:, c:, :c],
-                readings=readings,
+                forces=part.cross[:, :c, :c],
+                between=part.cross[:, c:, :c],
+                readings=np.einsum("fkk->fk", part.cross[:, c:, c:]).real,
                 response=now.response[lines],
                 averages=part.averages,
             )
-            found.append(((first + length / 2) * own.period, local))
-    return found
+            windows.append(((first + length / 2) * own.period, local))
+    return windows
 
 
 def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:

@@ -7,14 +7,11 @@ from functools import cached_property, partial
 import numpy as np
 
 from models.measured.checks.agreement import Agreement, Fault
-from models.measured.checks.means import mean
-from models.measured.checks.noise_floor import noise
-from models.measured.checks.place import Place
-from models.measured.checks.response import AXES, Response
-from models.measured.checks.spectra import Spectra, spectra
+from models.measured.checks.response import AXES, Response, number
+from models.measured.checks.spectra import Spectra, mean, noise, spectra
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import Place, Signal
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 from models.vehicles.pitch_plane import Parameters
 
@@ -41,21 +38,15 @@ class Evidence:
     @cached_property
     def forces(self) -> tuple[Signal, ...]:
         """Components of the hubs of the vehicle."""
-        hubs = self.vehicle.hubs if self.vehicle else ()
-        return tuple(
-            s
-            for s in self.recording.signals
-            if s.at in hubs and s.component in ("x", "y", "z") and s.quantity in ("force", "moment")
-        )
+        hubs, signals = self.vehicle.hubs if self.vehicle else (), self.recording.signals
+        acting = [s for s in signals if s.quantity in ("force", "moment") and s.component in ("x", "y", "z")]
+        return tuple(s for s in acting if s.at in hubs)
 
     @cached_property
     def inertial(self) -> tuple[Signal, ...]:
         """Accelerations, rates and angles whose place on the vehicle is known."""
-        return tuple(
-            s
-            for s in self.recording.signals
-            if s.quantity in INERTIAL and s.component in AXES and self.place(s) is not None
-        )
+        moving = [s for s in self.recording.signals if s.quantity in INERTIAL and s.component in AXES]
+        return tuple(s for s in moving if self.place(s) is not None)
 
     def vertical(self) -> dict[str, Signal]:
         """Vertical force of every hub that has one."""
@@ -86,8 +77,10 @@ class Evidence:
 
     @cached_property
     def dead(self) -> tuple[str, ...]:
-        """Names of forces and inertial signals that never change."""
-        return tuple(s.name for s in (*self.forces, *self.inertial) if _still(self.recording.samples(s)))
+        """Names of forces and inertial signals all of whose measured samples are one value."""
+        samples = ((s.name, self.recording.samples(s)) for s in (*self.forces, *self.inertial))
+        known = ((name, values[np.isfinite(values)]) for name, values in samples)
+        return tuple(name for name, values in known if (values == values[:1]).all())
 
     @cached_property
     def coarse(self) -> dict[Signal, float]:
@@ -119,36 +112,22 @@ class Evidence:
         if self.lacking:
             return None
         assert self.vehicle is not None and self._spectra is not None
-        found, c = self._spectra, len(self.forces)
-        response = Response(self.vehicle, self.frame).at(found.frequencies, self.inertial, self._places)
-        hubs = [
-            6 * self.vehicle.hubs.index(s.at) + 3 * (s.quantity == "moment") + AXES[s.component] for s in self.forces
-        ]
-        readings = np.einsum("fkk->fk", found.cross[:, c:, c:]).real
+        own, c = self._spectra, len(self.forces)
+        places = [place for s in self.inertial if (place := self.place(s)) is not None]
+        response = Response(self.vehicle, self.frame).at(own.frequencies, self.inertial, places)
+        numbers = [number(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
         forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
-        response = response[:, :, hubs] / forces * felt[:, None]
         return Agreement(
-            found.frequencies,
+            own.frequencies,
             self.forces,
             self.inertial,
-            found.cross[:, :c, :c],
-            found.cross[:, c:, :c],
-            readings,
-            response,
-            found.averages,
-            self._noise,
+            own.cross[:, :c, :c],
+            own.cross[:, c:, :c],
+            np.einsum("fkk->fk", own.cross[:, c:, c:]).real,
+            response[:, :, numbers] / forces * felt[:, None],
+            own.averages,
+            own.white * np.square([noise(self.recording, s) for s in self.inertial]),
         )
-
-    @property
-    def _noise(self) -> np.ndarray:
-        """Power of the inertial signals' noise in every line of their spectra."""
-        assert self._spectra is not None
-        return self._spectra.white * np.square([noise(self.recording, s) for s in self.inertial])
-
-    @property
-    def _places(self) -> tuple[Place, ...]:
-        found = [self.place(s) for s in self.inertial]
-        return tuple(place for place in found if place is not None)
 
     @property
     def frame(self) -> str:
@@ -165,6 +144,11 @@ class Evidence:
         """Faults between forces and motion; none where they cannot be set against each other."""
         return self.searched[1] if self.searched else ()
 
+    @cached_property
+    def seen(self) -> dict[str, tuple[float, float]]:
+        """Smallest delay (s) and error of the factor of every signal that would be named; none where nothing is."""
+        return self.searched[0].seen() if self.searched else {}
+
     def hub(self, signal: Signal) -> str:
         """Hub that a force belongs to when exchanged hubs are put right."""
         for fault in self.faults:
@@ -173,8 +157,3 @@ class Evidence:
             if fault.kind == "crossed" and signal in fault.signals:
                 return next(s.at for s in fault.signals if s != signal)
         return signal.at
-
-
-def _still(values: np.ndarray) -> bool:
-    """Whether all that was measured is one value."""
-    return bool(np.nanmin(values) == np.nanmax(values)) if np.isfinite(values).any() else True

@@ -4,8 +4,7 @@ import numpy as np
 
 from models.core.finding import FEW, Finding, Weight
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.runs import runs
-from models.measured.gaps import BRIDGED
+from models.measured.gaps import BRIDGED, runs
 from models.measured.signal import Signal
 
 NAME = "gaps"
@@ -25,35 +24,19 @@ def check(evidence: Evidence) -> list[Finding]:
 
 
 def _finding(evidence: Evidence, lost: np.ndarray, signals: tuple[Signal, ...]) -> Finding:
-    period, lengths = evidence.recording.period, lost[:, 1] - lost[:, 0]
+    period, lengths, names = evidence.recording.period, lost[:, 1] - lost[:, 0], tuple(s.name for s in signals)
     longest = int(np.argmax(lengths))
-    first, end = period * lost[longest]
-    names = ", ".join(s.name for s in signals)
-    others = f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
-    stops = any(_driving(s) for s in signals) and lengths[longest] * period > BRIDGED
+    first, end, lasts = (float(period * samples) for samples in (*lost[longest], lengths[longest]))
+    driving = any(s.quantity in ("force", "moment") and not s.check for s in signals)
+    stops = driving and lengths[longest] * period > BRIDGED
     remedy = (
         "leave it out with [clock] start and duration, for no run can go on without hub forces"
         if stops
         else f"up to {BRIDGED:g} s are bridged in hub forces, and the filter goes on without angles"
     )
-    short = names if len(signals) <= FEW else f"{len(signals)} channels, {signals[0].name} to {signals[-1].name}"
-    text = (
-        f"{short}: {period * lengths[longest]:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
-        f"{others if len(lost) > 1 else ''}: {remedy}."
-    )
+    short = ", ".join(names) if len(names) <= FEW else f"{len(names)} channels, {names[0]} to {names[-1]}"
+    text = f"{short}: {lasts:.4g} s ({lengths[longest]} samples) are missing from {first:.4g} s on"
+    if len(lost) > 1:
+        text += f"; {len(lost) - 1} shorter gaps, {period * (lengths.sum() - lengths[longest]):.3g} s together"
     weight: Weight = "error" if stops else "doubt"
-    return Finding(
-        NAME,
-        weight,
-        names,
-        text,
-        float(period * lengths[longest]),
-        "s",
-        tuple(s.name for s in signals),
-        (float(first), float(end)),
-    )
-
-
-def _driving(signal: Signal) -> bool:
-    """Whether a run needs it."""
-    return signal.quantity in ("force", "moment") and not signal.check
+    return Finding(NAME, weight, ", ".join(names), f"{text}: {remedy}.", lasts, "s", names, (first, end))

@@ -4,8 +4,8 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.noise_floor import noise
-from models.measured.signal import UNITS, Quantity, Signal
+from models.measured.checks.spectra import noise
+from models.measured.signal import UNITS, Quantity
 
 NAME = "noise"
 OFF = 1.5
@@ -14,34 +14,24 @@ OFF = 1.5
 
 def check(evidence: Evidence) -> list[Finding]:
     """A doubt for every channel whose stated noise is wrong, and a note for each quantity."""
-    found = {s: noise(evidence.recording, s) for s in evidence.recording.signals}
-    doubts = [
-        _doubt(s, size, evidence.claimed[s.name])
-        for s, size in found.items()
-        if s.name in evidence.claimed
-        and np.isfinite(size)
-        and not 1 / OFF < size / max(evidence.claimed[s.name], 1e-300) < OFF
-    ]
-    return doubts + _notes(found)
-
-
-def _doubt(signal: Signal, size: float, stated: float) -> Finding:
-    unit = UNITS[signal.quantity]
-    text = (
-        f"The noise of {signal.name} is {size:.3g} {unit} on every sample, where the scene states {stated:.3g} "
-        f"{unit}: correct [noise], or predictions and filter are off."
-    )
-    return Finding(NAME, "doubt", signal.name, text, size, unit, (signal.name,))
-
-
-def _notes(found: dict[Signal, float]) -> list[Finding]:
-    sizes: dict[Quantity, list[float]] = {}
-    for signal, size in found.items():
+    doubts, sizes = list[Finding](), dict[Quantity, list[float]]()
+    for signal in evidence.recording.signals:
+        size, stated, unit = (
+            noise(evidence.recording, signal),
+            evidence.claimed.get(signal.name),
+            UNITS[signal.quantity],
+        )
         sizes.setdefault(signal.quantity, []).append(size)
-    return [_note(what, np.array(own)) for what, own in sizes.items() if np.isfinite(own).any()]
-
-
-def _note(what: Quantity, sizes: np.ndarray) -> Finding:
-    low, high, unit = float(np.nanmin(sizes)), float(np.nanmax(sizes)), UNITS[what]
-    text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
-    return Finding(NAME, "note", "", text, float(np.nanmean(sizes)), unit)
+        if stated is not None and np.isfinite(size) and not 1 / OFF < size / max(stated, 1e-300) < OFF:
+            text = (
+                f"The noise of {signal.name} is {size:.3g} {unit} on every sample, where the scene states {stated:.3g} "
+                f"{unit}: correct [noise], or predictions and filter are off."
+            )
+            doubts.append(Finding(NAME, "doubt", signal.name, text, size, unit, (signal.name,)))
+    notes = list[Finding]()
+    for what, own in sizes.items():
+        if np.isfinite(own).any():
+            unit, low, high = UNITS[what], float(np.nanmin(own)), float(np.nanmax(own))
+            text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
+            notes.append(Finding(NAME, "note", "", text, float(np.nanmean(own)), unit))
+    return doubts + notes

@@ -4,11 +4,12 @@ About its design position, by differences of the written-out equations: M q'' = 
 is looked at lies well above the drift of the free vehicle, so that neither its start nor its growth matters.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from models.engines.cut_vehicle import HubModel, build
-from models.measured.checks.place import Place
-from models.measured.signal import Signal
+from models.measured.signal import Place, Signal
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
@@ -22,6 +23,11 @@ PUSH = 100.0
 AXES = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 
 
+def number(signal: Signal, hub: int) -> int:
+    """Number of a force's component among those of all hubs, of which it is at the ``hub``-th."""
+    return WRENCH * hub + 3 * (signal.quantity == "moment") + AXES[signal.component]
+
+
 class Response:
     """The linear vehicle: q'' = stiff q + damped q' + pushed u, u (6 h,) in N and N m, in a frame."""
 
@@ -29,18 +35,13 @@ class Response:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
         model, n = _built(vehicle, frame), vehicle.size
         rest, moved = np.zeros(n), NUDGE * np.eye(n)
-        self.stiff = np.column_stack(
-            [(model.accelerations(0.0, d, rest) - model.accelerations(0.0, -d, rest)) / (2 * NUDGE) for d in moved]
-        )
-        self.damped = np.column_stack(
-            [(model.accelerations(0.0, rest, d) - model.accelerations(0.0, rest, -d)) / (2 * NUDGE) for d in moved]
-        )
-        still, hubs = model.accelerations(0.0, rest, rest), WRENCH * len(vehicle.hubs)
-        self.pushed = np.column_stack(
-            [(model.accelerations((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in range(hubs)]
-        )
+        at = model.accelerations
+        self.stiff = np.column_stack([(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * NUDGE) for d in moved])
+        self.damped = np.column_stack([(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * NUDGE) for d in moved])
+        still, hubs = at(0.0, rest, rest), range(WRENCH * len(vehicle.hubs))
+        self.pushed = np.column_stack([(at((i + 1) * STEP / 2, rest, rest) - still) / PUSH for i in hubs])
 
-    def at(self, frequencies: np.ndarray, signals: tuple[Signal, ...], places: tuple[Place, ...]) -> np.ndarray:
+    def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[Place]) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
         own, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
         q = np.linalg.solve(own**2 * np.eye(n) - own * self.damped - self.stiff, self.pushed[None].astype(complex))

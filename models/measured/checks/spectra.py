@@ -1,6 +1,9 @@
-"""Cross spectra of signals of a recording, segment by segment: an hour costs no more memory than a minute."""
+"""Spectra of signals of a recording: means, noise floors and cross spectra, piece by piece.
 
-from collections.abc import Sequence
+An hour costs no more memory than a minute.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +15,18 @@ SEGMENT = 4.0
 """s: resolves the modes of a car; shorter where the recording is."""
 LEAST = 3
 """Segments in a recording at the least, half overlapping."""
-LINES = 2
+FEWEST = 2
 """Frequencies in the band at the least."""
 MOST = 300
 """Segments looked at, spread evenly: ten minutes."""
 OVERLAPPING = 0.75
 """Independent averages that a half overlapping segment under a Hann window counts for, about."""
+TOP = 0.7, 0.95
+"""Part of the highest frequency: above what vehicles do, below what filters and converters do at the end."""
+LENGTH, PIECES = 1024, 40
+"""Samples of a piece whose noise is looked at, and pieces at the most, spread evenly."""
+BESIDE = range(2, 5)
+"""Spectral lines beside the main lobe of the window, whose power stands for that at 0."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +57,56 @@ def spectra(
     frequencies = np.fft.rfftfreq(length, recording.period)
     own = (frequencies >= band[0]) & (frequencies <= band[1])
     window, names = np.hanning(length + 1)[:length, None], tuple(s.name for s in signals)
-    cross, found = np.zeros((own.sum(), len(signals), len(signals)), complex), 0
+    cross, segments = np.zeros((own.sum(), len(signals), len(signals)), complex), 0
     for first in firsts[:: -(-len(firsts) // MOST)] if length > 1 else ():
         samples = recording.columns.block(names, int(first), length)
         if np.isfinite(samples).all():
             lines = np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)[own]
             cross += lines[:, :, None] * lines[:, None, :].conj()
-            found += 1
-    if found < LEAST or np.count_nonzero(own) < LINES:
+            segments += 1
+    if segments < LEAST or np.count_nonzero(own) < FEWEST:
         return None
-    return Spectra(frequencies[own], cross / found, max(1.0, OVERLAPPING * found), float(np.sum(window**2)))
+    return Spectra(frequencies[own], cross / segments, max(1.0, OVERLAPPING * segments), float(np.sum(window**2)))
+
+
+def noise(recording: Recording, signal: Signal) -> float:
+    """Standard deviation (SI) of white noise on every sample; NaN where no segment is unbroken.
+
+    By the median power of the highest lines, whose mean exponential noise makes 1 / log 2 times as large. Of filtered
+    channels it is too small: what was there is gone.
+    """
+    length = min(LENGTH, recording.count)
+    firsts = np.linspace(0, recording.count - length, min(PIECES, -(-recording.count // length))).astype(int)
+    window = np.hanning(length + 2)[1:-1]
+    pieces = [recording.columns.read(signal.name, int(first), length) for first in firsts]
+    whole = np.array([piece for piece in pieces if np.isfinite(piece).all()])
+    if not len(whole):
+        return float("nan")
+    lines = np.fft.rfft(window * (whole - whole.mean(axis=1, keepdims=True)))
+    low, high = (int(part * lines.shape[1]) for part in TOP)
+    return float(np.sqrt(np.median(np.abs(lines[:, low:high]) ** 2) / np.log(2) / np.sum(window**2)))
+
+
+def mean(columns: Sequence[Callable[[], np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Means (k,) under a Hann window of what each of these reads, (n,), and the covariance (k, k) of their errors.
+
+    Samples that are NaN in any are left out; one column at a time is in memory. The window takes away what a plain mean
+    owes to where the record happens to begin and end. The covariance is the power of the lines just above the window's
+    lobe: that of vehicles falls towards 0 Hz, so that it is rather too large. InputError is not raised: all NaN gives
+    NaN.
+    """
+    good = np.isfinite(columns[0]())
+    for read in columns[1:]:
+        good &= np.isfinite(read())
+    n = len(good)
+    window = np.where(good, np.hanning(n + 2)[1:-1], 0.0)
+    window = window / window.sum() if good.any() else np.full(n, np.nan)
+    waves = [np.exp(-2j * np.pi * k * np.arange(n) / n) * window for k in BESIDE]
+    centre, lines = np.empty(len(columns)), np.empty((len(waves), len(columns)), complex)
+    for i, read in enumerate(columns):
+        values = np.where(good, read(), 0.0)
+        centre[i] = window @ values
+        rest = np.where(good, values - centre[i], 0.0)
+        lines[:, i] = [wave @ rest for wave in waves]
+    power = sum(np.outer(line, line.conj()).real for line in lines) / len(lines)
+    return centre, np.asarray(power)

@@ -48,13 +48,5 @@ def _finding(signal: Signal, values: np.ndarray, period: float) -> Finding | Non
         "vehicle's: repair the file, or leave these times out. So may a sharp edge of the road, which the sampling "
         "then hardly resolves."
     )
-    return Finding(
-        NAME,
-        "doubt",
-        signal.name,
-        text,
-        float(heights[worst]),
-        unit,
-        (signal.name,),
-        (period * (at[worst] - 1), period * (at[worst] + 2)),
-    )
+    times = period * (at[worst] - 1), period * (at[worst] + 2)
+    return Finding(NAME, "doubt", signal.name, text, float(heights[worst]), unit, (signal.name,), times)

@@ -27,7 +27,7 @@ def _finding(fault: Fault) -> Finding:
         f"measured motion unexplained, exchanged {100 * fault.error:.0f} %; exchange their names in the channel "
         "map."
     )
-    return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
+    return Finding(NAME, "error", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
 def _pair(fault: Fault) -> Finding:
@@ -35,7 +35,7 @@ def _pair(fault: Fault) -> Finding:
         f"{fault.name} are exchanged: as mapped, {100 * fault.size:.0f} % of the measured motion stays unexplained, "
         f"exchanged {100 * fault.error:.0f} %; exchange their names in the channel map."
     )
-    return Finding(PAIR, "doubt", fault.name, text, 100 * fault.size, "%", tuple(s.name for s in fault.signals))
+    return Finding(PAIR, "doubt", fault.name, text, 100 * fault.size, "%", fault.names)
 
 
 def _blind(evidence: Evidence) -> Finding:

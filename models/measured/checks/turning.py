@@ -4,7 +4,7 @@ import numpy as np
 
 from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.spectra import Spectra, spectra
+from models.measured.checks.spectra import spectra
 from models.measured.ratios import sentence
 from models.measured.signal import Signal
 
@@ -22,15 +22,15 @@ LATE, LINES = 1e-3, 8
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are the rate by the derivative of the angle, or s by which the rate is late."""
     own = evidence.recording
-    both = [(angle, rate) for angle in own.find("angle") for rate in own.find("angular rate")]
     pairs = [
         (angle, rate)
-        for angle, rate in both
+        for angle in own.find("angle")
+        for rate in own.find("angular rate")
         if rate.component == angle.component != "yaw" and _body(evidence, rate) == _body(evidence, angle)
     ]
     if not pairs:
         return [Finding(NAME, "note", "", "Angles were not compared with rates: no body has both of one axis.")]
-    return [finding for pair in pairs for finding in _pair(evidence, *pair)]
+    return [_pair(evidence, *pair) for pair in pairs]
 
 
 def _body(evidence: Evidence, signal: Signal) -> str:
@@ -38,68 +38,47 @@ def _body(evidence: Evidence, signal: Signal) -> str:
     return place.body if place else signal.at
 
 
-def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> list[Finding]:
-    recording = evidence.recording
-    found = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
-    names = f"{rate.name} and {angle.name}"
-    own = _coherent(found) if found else np.zeros(0, bool)
-    if found is None or np.count_nonzero(own) < 2:
-        return [Finding(NAME, "note", names, f"{names} could not be compared: too little turning above their noise.")]
-    omega, cross = 2 * np.pi * found.frequencies[own], found.cross[own]
+def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
+    recording, names, both = evidence.recording, f"{rate.name} and {angle.name}", (rate.name, angle.name)
+    own = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
+    squared = np.zeros(0)
+    if own is not None:
+        squared = np.abs(own.cross[:, 0, 1]) ** 2 / (own.cross[:, 0, 0] * own.cross[:, 1, 1]).real
+    used = squared > COHERENT
+    if own is None or np.count_nonzero(used) < 2:
+        return Finding(NAME, "note", names, f"{names} could not be compared: too little turning above their noise.")
+    omega, cross, squared = 2 * np.pi * own.frequencies[used], own.cross[used], squared[used]
     transfer = cross[:, 1, 0] / (1j * omega * cross[:, 0, 0].real)
-    weight = _weights(cross)
+    weight = squared / np.maximum(1 - squared, 1e-6)
     ratio = float((weight @ transfer).real / weight.sum())
-    late, error = _late(transfer, omega, weight * found.averages, ratio)
+    late, error = _late(transfer, omega, weight * own.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
     if wrong in ("sign", "unit") and _alike(transfer, weight) < ALIKE:
         text = (
             f"{rate.name} is not the derivative of {angle.name}, whatever its sign and unit: one of them belongs to "
             "another axis or body; check their names."
         )
-        return [Finding(NAME, "doubt", names, text, ratio, "1", (rate.name, angle.name))]
+        return Finding(NAME, "doubt", names, text, ratio, "1", both)
     if wrong in ("sign", "unit"):
-        return [
-            Finding(
-                wrong,
-                "error",
-                names,
-                f"{text} Or {angle.name} is the one that is wrong.",
-                ratio,
-                "1",
-                (rate.name, angle.name),
-            )
-        ]
-    if evidence.agreement is None and np.count_nonzero(own) >= LINES and abs(late) > max(LATE, 5 * error):
+        return Finding(wrong, "error", names, f"{text} Or {angle.name} is the one that is wrong.", ratio, "1", both)
+    if evidence.agreement is None and np.count_nonzero(used) >= LINES and abs(late) > max(LATE, 5 * error):
         way = "late" if late > 0 else "early"
         text = (
             f"{rate.name} is {1e3 * abs(late):.2f} ms {way} (+-{2e3 * error:.2g} ms at 95 %) against the "
             f"derivative of {angle.name}: take the delay of one of them off."
         )
-        return [Finding("shift", "doubt", names, text, late, "s", (rate.name, angle.name))]
+        return Finding("shift", "doubt", names, text, late, "s", both)
     text = (
         f"{rate.name} is {ratio:.3g} times the derivative of {angle.name}, and not shifted by more than "
         f"{5e3 * error:.2g} ms."
     )
-    return [Finding(NAME, "note", names, text, ratio, "1", (rate.name, angle.name))]
+    return Finding(NAME, "note", names, text, ratio, "1", both)
 
 
 def _alike(transfer: np.ndarray, weight: np.ndarray) -> float:
     """Part of what a rate has at coherent lines that is in phase with the derivative of the angle, by one factor."""
     whole = float(weight.sum() * (weight @ np.abs(transfer) ** 2))
     return float((weight @ transfer).real ** 2) / whole if whole > 0 else 0.0
-
-
-def _coherence(cross: np.ndarray) -> np.ndarray:
-    return np.abs(cross[:, 0, 1]) ** 2 / (cross[:, 0, 0] * cross[:, 1, 1]).real
-
-
-def _coherent(found: Spectra) -> np.ndarray:
-    return _coherence(found.cross) > COHERENT
-
-
-def _weights(cross: np.ndarray) -> np.ndarray:
-    squared = _coherence(cross)
-    return squared / np.maximum(1 - squared, 1e-6)
 
 
 def _late(transfer: np.ndarray, omega: np.ndarray, weight: np.ndarray, ratio: float) -> tuple[float, float]:

@@ -9,11 +9,11 @@ from scipy.linalg import null_space
 
 from models.core.finding import Finding
 from models.measured import axle_forces
+from models.measured.axle_balance import axles
 from models.measured.checks.evidence import Evidence
-from models.measured.checks.means import mean
-from models.measured.checks.response import AXES
+from models.measured.checks.response import number
+from models.measured.checks.spectra import mean
 from models.measured.ratios import EMPTY, counted_from_load, sentence
-from models.measured.recording import Recording
 from models.measured.signal import Signal
 from models.multibody.cut_kernel import WRENCH
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle, rigid
@@ -52,20 +52,19 @@ class Balance:
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are shares of the load, in %, or recorded by true value where sign or unit is wrong."""
     if evidence.plane is not None:
-        axles = axle_forces.axles(evidence.recording, evidence.plane)
-        return axle_forces.check(axles) if axles else []
+        forces = axles(evidence.recording, evidence.plane)
+        return axle_forces.check(forces) if forces else []
     vehicle, own = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
     if vehicle is None or set(own) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
     signals = tuple(own[hub] for hub in vehicle.hubs)
-    numbers = _numbers(evidence, vehicle)
-    means = mean(_columns(evidence, vehicle))
+    numbers, means = _numbers(evidence, vehicle), mean(_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_coarse(evidence, *each) for each in zip(signals, loads, at, strict=True)]
     if any(coarse):
         return [finding for finding in coarse if finding]
-    return _fine(evidence, _balance(vehicle, numbers, *means), signals, at)
+    return [_fine(evidence, _balance(vehicle, numbers, *means), signals, at)]
 
 
 def moments(evidence: Evidence) -> np.ndarray:
@@ -88,29 +87,25 @@ def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.nd
 def _turns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
     """Readers of the angular accelerations of roll and pitch by the chassis' gyros; none where one is missing."""
     own = evidence.recording
-    found = [own.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
-    return [partial(_slope, own, one[0]) for one in found] if all(found) else []
 
+    def slope(gyro: Signal) -> np.ndarray:
+        return np.gradient(own.samples(gyro), own.period)
 
-def _slope(own: Recording, signal: Signal) -> np.ndarray:
-    """Derivative (n,) of a signal, 1/s."""
-    return np.gradient(own.samples(signal), own.period)
+    gyros = [own.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
+    return [partial(slope, gyro) for (gyro,) in gyros] if all(gyros) else []
 
 
 def _numbers(evidence: Evidence, vehicle: CutVehicle) -> list[int]:
     """Numbers (k,) of the components among all hubs'."""
-    return [
-        WRENCH * vehicle.hubs.index(evidence.hub(s)) + 3 * (s.quantity == "moment") + AXES[s.component]
-        for s in evidence.forces
-    ]
+    return [number(s, vehicle.hubs.index(evidence.hub(s))) for s in evidence.forces]
 
 
 def _coarse(evidence: Evidence, signal: Signal, load: float, static: float) -> Finding | None:
-    if abs(load) < EMPTY * static and evidence.empty(signal):
-        return Finding(
-            NAME, "error", signal.name, counted_from_load(signal.name, load, static), load / static, "1", (signal.name,)
-        )
-    kind, text = sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
+    kind, text = (
+        ("size", counted_from_load(signal.name, load, static))
+        if abs(load) < EMPTY * static and evidence.empty(signal)
+        else sentence(load / static, signal, f"the {static:.0f} N that rest on {signal.at} on average")
+    )
     if kind == "gain":
         return None
     return Finding(NAME if kind == "size" else kind, "error", signal.name, text, load / static, "1", (signal.name,))
@@ -135,31 +130,37 @@ def _balance(vehicle: CutVehicle, numbers: list[int], centre: np.ndarray, spread
     return Balance(rows @ centre - rest, columns, np.linalg.inv(covariance))
 
 
-def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> list[Finding]:
+def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loads: np.ndarray) -> Finding:
     """Offset or calibration of single channels, or another weight than the file's."""
     names, weight = tuple(s.name for s in signals), float(loads.sum())
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
     force, error, fall = balance.fit(np.eye(len(balance.left))[:, :3])
-    share, own = float(single[worst][0][0]), float(single[worst][1][0, 0]) ** 0.5
-    excess, sure = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
+    sure = [float(own[0, 0]) ** 0.5 for _, own, _ in single]
+    share, own = float(single[worst][0][0]), sure[worst]
+    excess, known = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
     if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * own) and single[worst][2] > fall - CERTAIN:
-        signal = signals[worst]
+        signal, size = signals[worst], share * loads[worst]
         if _moves_rightly(evidence, signal, share):
-            return [_offset(signal, share * loads[worst], own * loads[worst])]
+            return _offset(signal, size, own * loads[worst])
         _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
-        sure_text = (
+        text += (
             f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone; an "
-            f"offset of {share * loads[worst]:+.3g} N would do the same."
+            f"offset of {size:+.3g} N would do the same."
         )
-        return [Finding("gain", "doubt", signal.name, text + sure_text, 100 * share, "%", (signal.name,))]
-    if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * sure):
-        return [_other_weight(force, weight, sure, names)]
+        return Finding("gain", "doubt", signal.name, text, 100 * share, "%", (signal.name,))
+    if fall > CERTAIN and max(abs(excess), float(np.abs(force[1:]).max()) / weight) > max(SMALL, 4 * known):
+        text = (
+            f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * known:.2%} at 95 %) more than "
+            f"the vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: "
+            "enter the load that was on board into the vehicle file, or check the calibration of all wheels."
+        )
+        return Finding(NAME, "doubt", "", text, 100 * excess, "%", names)
     text = (
-        f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * sure:.2%} "
-        f"at 95 %); a channel that is wrong by {max(100 * SMALL, 5 * _coarsest(single)):.2g} % would be seen."
+        f"The mean vertical forces carry the vehicle's weight of {weight:.0f} N to {excess:+.2%} (+-{2 * known:.2%} "
+        f"at 95 %); a channel that is wrong by {max(100 * SMALL, 500 * max(sure)):.2g} % would be seen."
     )
-    return [Finding(NAME, "note", "", text, 100 * excess, "%", names)]
+    return Finding(NAME, "note", "", text, 100 * excess, "%", names)
 
 
 def _moves_rightly(evidence: Evidence, signal: Signal, share: float) -> bool:
@@ -180,19 +181,3 @@ def _offset(signal: Signal, size: float, sure: float) -> Finding:
         "channel map."
     )
     return Finding("offset", "doubt", signal.name, text, size, "N", (signal.name,))
-
-
-def _coarsest(single: list[tuple[np.ndarray, np.ndarray, float]]) -> float:
-    """Largest standard error of a channel's factor, in %."""
-    return 100 * max(float(error[0, 0]) ** 0.5 for _, error, _ in single)
-
-
-def _other_weight(force: np.ndarray, weight: float, sure: float, names: tuple[str, ...]) -> Finding:
-    """Force (3,) in N and N m that is too much."""
-    excess = float(force[0]) / weight
-    text = (
-        f"The mean vertical forces carry {force[0]:+.0f} N ({excess:+.2%}, +-{2 * sure:.2%} at 95 %) more than the "
-        f"vehicle file weighs, with moments of {force[1]:+.0f} N m in roll and {force[2]:+.0f} N m in pitch: enter "
-        "the load that was on board into the vehicle file, or check the calibration of all wheels."
-    )
-    return Finding(NAME, "doubt", "", text, 100 * excess, "%", names)

@@ -3,22 +3,25 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
-from importlib import import_module
 from pathlib import Path
 
 from models.core.errors import InputError, similar_file
+from models.core.finding import Finding
 from models.measured.channel import Source
 from models.measured.file_kinds import KNOWN, by_extension, format_of, usual_of
+from models.measured.formats.csv import open_csv
+from models.measured.formats.mdf4 import open_mdf
 from models.measured.formats.opened import Opened, notice
-from models.measured.formats.writing import Group, check_names, check_start, new_file
+from models.measured.formats.rpc3 import open_rpc
+from models.measured.formats.tdms import open_tdms
+from models.measured.formats.writing import WRITERS, Group, check, new_file
 
-READERS = {
-    "CSV": ("csv", "open_csv"),
-    "ASAM MDF": ("mdf4", "open_mdf"),
-    "RPC III": ("rpc3", "open_rpc"),
-    "TDMS": ("tdms", "open_tdms"),
+READERS: dict[str, Callable[[Path], Opened]] = {
+    "CSV": open_csv,
+    "ASAM MDF": open_mdf,
+    "RPC III": open_rpc,
+    "TDMS": open_tdms,
 }
-"""Format -> module and function; imported when such a file is opened."""
 DRIVE = (
     "a .drv file usually holds what drives the actuators of a rig, not what was measured: name the response "
     "(.rsp) of the same run"
@@ -38,33 +41,19 @@ def open_source(path: str | Path) -> Source:
     """
     path = Path(path)
     form = format_of(path, _head(path))
-    source = _read(path, form)
-    usual = usual_of(path.suffix.lower(), form)
-    said = [
-        notice(path, "doubt", text)
-        for text in (
-            f"the extension {path.suffix} is that of {usual}, but the file is read as {form}" if usual != form else "",
-            DRIVE if form == "RPC III" and path.suffix.lower() == ".drv" else "",
-        )
-        if text
-    ]
-    return replace(source, noticed=(*said, *source.noticed))
-
-
-def _read(path: Path, form: str) -> Opened:
-    """Open a file by the reader of its format; what is said of text that is no CSV knows the extension."""
-    module, name = READERS[form]
-    reader: Callable[[Path], Opened] = getattr(import_module(f"models.measured.formats.{module}"), name)
     try:
-        return reader(path)
-    except InputError as error:
+        source = READERS[form](path)
+    except InputError as error:  # what is said of text that is no CSV knows the extension
         if form != "CSV" or not by_extension(path):
             raise
         raise InputError(path, error.place, error.value, error.allowed + by_extension(path)) from None
-
-
-WRITERS = {".csv": "write_csv", ".mf4": "write_mdf4:write_mdf", ".rsp": "write_rpc3:write_rpc", ".tdms": "write_tdms"}
-"""Extension -> module and function."""
+    usual, said = usual_of(path.suffix.lower(), form), list[Finding]()
+    if usual != form:
+        text = f"the extension {path.suffix} is that of {usual}, but the file is read as {form}"
+        said.append(notice(path, "doubt", text))
+    if form == "RPC III" and path.suffix.lower() == ".drv":
+        said.append(notice(path, "doubt", DRIVE))
+    return replace(source, noticed=(*said, *source.noticed))
 
 
 def write(path: str | Path, groups: Sequence[Group], start: datetime | None = None, comment: str = "") -> Path:
@@ -87,12 +76,9 @@ def write(path: str | Path, groups: Sequence[Group], start: datetime | None = No
     path = Path(path)
     if path.suffix.lower() not in WRITERS:
         raise InputError(path, "extension", path.suffix, "a format that can be written is needed", tuple(WRITERS))
-    check_names(path, groups)
-    check_start(path, start)
-    module, _, name = WRITERS[path.suffix.lower()].partition(":")
-    writer = getattr(import_module(f"models.measured.formats.{module}"), name or module)
+    check(path, groups, start)
     with new_file(path) as part:
-        writer(path, part, groups, start, comment)
+        WRITERS[path.suffix.lower()](path, part, groups, start, comment)
     return path
 
 

@@ -132,45 +132,28 @@ def unit_of(text: str) -> str:
 
 def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
     """What the end of the file says of its being whole."""
-    found = []
     if count == 0:
         raise InputError(path, f"line {layout.line + 1}", None, "rows of numbers are needed, and there is none")
+    said, samples = list[Finding](), remarks.samples
     if left:
-        whole = _cells_of_end(path, layout, left) == layout.width
-        found.append(
-            notice(
-                path,
-                "note" if whole else "doubt",
-                f"the last line has no line end and "
-                f"{'may be' if whole else 'is'} cut off: it is left out, and {count} rows are used",
-            )
-        )
-    samples = remarks.samples
+        with path.open("rb") as file:
+            file.seek(-left, io.SEEK_END)
+            whole = narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1 == layout.width
+        ends = "may be" if whole else "is"
+        text = f"the last line has no line end and {ends} cut off: it is left out, and {count} rows are used"
+        said.append(notice(path, "note" if whole else "doubt", text))
     if samples is not None and samples > count:
-        found.append(
-            notice(path, "doubt", f"the header announces {samples} rows, but {count} are there: the file is cut off")
-        )
+        text = f"the header announces {samples} rows, but {count} are there: the file is cut off"
+        said.append(notice(path, "doubt", text))
     if samples is not None and samples < count:
         raise InputError(path, "samples", samples, f"the header announces fewer rows than there are ({count})")
-    return found
-
-
-def _cells_of_end(path: Path, layout: Layout, left: int) -> int:
-    """Cells of what follows the last line end, its last ``left`` bytes."""
-    with path.open("rb") as file:
-        file.seek(-left, io.SEEK_END)
-        return narrow(file.read(), layout.unit).count(layout.separator.encode()) + 1
+    return said
 
 
 def _factor(path: Path, head: Head, clock: int, unit: str) -> float:
     """Factor of times to seconds."""
     name, own = clock_heading(head.names[clock])
     if (own or unit).casefold() not in TIME_UNITS:
-        raise InputError(
-            path,
-            f"line {head.header.number} (header), column {name!r}, unit",
-            own or unit,
-            f"write {name} [s]",
-            tuple(SECONDS),
-        )
+        place = f"line {head.header.number} (header), column {name!r}, unit"
+        raise InputError(path, place, own or unit, f"write {name} [s]", tuple(SECONDS))
     return TIME_UNITS[(own or unit).casefold()]

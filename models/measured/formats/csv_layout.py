@@ -23,7 +23,7 @@ from models.core.csv_header import (
     split,
 )
 from models.core.errors import InputError
-from models.core.finding import Finding
+from models.core.finding import Finding, Weight
 from models.measured.formats.csv_rows import Layout
 from models.measured.formats.csv_times import find_stamps
 from models.measured.formats.opened import notice
@@ -77,6 +77,8 @@ TIME_UNITS = {
 _RATE = re.compile(r"\d\s*k?hz\b|(rate|freq|abtast|sampl|interval|period|increment|delta[ _]?t)\D*\d", re.IGNORECASE)
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _BEGUN = re.compile(r"[+-]?[.,]?\d")
+MARKED = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be", b"\xef\xbb\xbf": "utf-8"}
+"""Marks that text begins with, and how it is then written."""
 NEEDED = "a CSV file needs a header line name [unit], ... and rows of numbers, as text"
 
 
@@ -133,16 +135,9 @@ def read_top(path: Path) -> Top:
     """First lines of a file; InputError where it has none that are text."""
     with path.open("rb") as file:
         data = file.read(LONGEST)
-    codec, begin = next(
-        (
-            (codec, len(mark))
-            for mark, codec in ((b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"), (b"\xef\xbb\xbf", "utf-8"))
-            if data.startswith(mark)
-        ),
-        ("utf-8", 0),
-    )
+    codec, mark = next(((codec, mark) for mark, codec in MARKED.items() if data.startswith(mark)), ("utf-8", b""))
     top = Top(np.dtype({"utf-16-le": "<u2", "utf-16-be": ">u2"}.get(codec, "u1")))
-    for line in _lines(data, begin, codec, top):
+    for line in _lines(data, len(mark), codec, top):
         shown = line.text.strip()
         if line.number == 1 and separator_line(line.text):
             top.separator = separator_line(line.text)
@@ -197,23 +192,14 @@ def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Fin
             remarks.add(path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
-    said = [
-        notice(
-            path, "doubt", f"line {line.number} is not UTF-8 and is read as Windows-1252: {line.text.strip()[:60]!r}"
-        )
-        for line in top.foreign
-        if line.number <= head.line
-    ]
+    foreign = {own.number: own.text.strip()[:60] for own in top.foreign if own.number <= head.line}
+    odd = "is not UTF-8 and is read as Windows-1252"
+    said = [notice(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
     if top.unit.itemsize > 1:
         said.append(notice(path, "note", "the text is UTF-16"))
     if head.titles:
-        said.append(
-            notice(
-                path,
-                "note",
-                f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment",
-            )
-        )
+        text = f"{len(head.titles)} line(s) above the headings in line {head.header.number} are kept as the comment"
+        said.append(notice(path, "note", text))
     return head, clocks[0], remarks, said
 
 
@@ -246,25 +232,17 @@ def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
     place, text = f"line {first.number} (header)", first.text.strip()
     rate = next((line for line in (*top.lines, *top.hashed) if _RATE.search(line.text)), None)
     if rate is not None:
-        return InputError(
-            path,
-            place,
-            text,
-            f"one column time [s] is needed, found 0: line {rate.number} "
-            f"({rate.text.strip()[:40]!r}) speaks of the sampling; write the time of every row",
+        needed = (
+            f"one column time [s] is needed, found 0: line {rate.number} ({rate.text.strip()[:40]!r}) speaks of the "
+            "sampling; write the time of every row"
         )
-    if not any(sign in first.text for sign in signs):
-        return InputError(
-            path,
-            place,
-            text,
-            f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED}",
-        )
-    if any(all(map(is_number, cells)) for sign in signs if len(cells := split(text, sign)) > 1):
-        return InputError(
-            path, place, text, "the file begins with numbers: write a header line time [s], name [unit], ... above them"
-        )
-    return InputError(path, place, text, "one column time [s] is needed, found 0: call it so in the header line")
+    elif not any(sign in first.text for sign in signs):
+        needed = f"commas alone (or semicolons, or tabs) must part the columns, found no separator; {NEEDED}"
+    elif any(all(map(is_number, cells)) for sign in signs if len(cells := split(text, sign)) > 1):
+        needed = "the file begins with numbers: write a header line time [s], name [unit], ... above them"
+    else:
+        needed = "one column time [s] is needed, found 0: call it so in the header line"
+    return InputError(path, place, text, needed)
 
 
 def clock_heading(text: str) -> tuple[str, str]:
@@ -284,9 +262,8 @@ def is_clock(text: str) -> bool:
 def is_other_clock(text: str) -> bool:
     """Whether a heading can be that of the column of time where none is called so."""
     name = clock_heading(text)[0]
-    return " ".join(re.findall(r"[^\W_]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).casefold())) in OTHER_CLOCKS or (
-        " ".join(re.findall(r"[^\W_]+", name.casefold())) in OTHER_CLOCKS
-    )
+    parted = (name, re.sub(r"([a-z])([A-Z])", r"\1 \2", name))
+    return any(" ".join(re.findall(r"[^\W_]+", words.casefold())) in OTHER_CLOCKS for words in parted)
 
 
 def first_rows(top: Top, head: Head) -> list[list[str]]:
@@ -309,18 +286,15 @@ def find_layout(path: Path, top: Top, head: Head, clock: int, units: tuple[str, 
     layout = Layout(
         head.separator, decimal, head.begin, head.line, head.names, head.width, taken, clock, stamps, top.unit
     )
-    said = [
-        notice(
-            path,
-            "doubt" if units[i] or heading(head.names[i])[1] else "note",
-            f"left out, no numbers: {head.names[i]!r}",
-        )
-        for i in texts
-    ]
-    said += [
-        notice(path, "note" if _counts(columns[i]) else "doubt", f"column {i + 1} has no name and is left out")
-        for i in nameless
-    ]
+    said = list[Finding]()
+    for i in texts:
+        weight: Weight = "doubt" if units[i] or heading(head.names[i])[1] else "note"
+        said.append(notice(path, weight, f"left out, no numbers: {head.names[i]!r}"))
+    for i in nameless:
+        cells = columns[i]
+        counts = cells[:1] in (["0"], ["1"]) and cells == [str(k + int(cells[0])) for k in range(len(cells))]
+        weight = "note" if counts else "doubt"
+        said.append(notice(path, weight, f"column {i + 1} has no name and is left out"))
     return layout, said + [notice(path, "note", text) for text in _how(layout, list(numbers))]
 
 
@@ -344,11 +318,6 @@ def _how(layout: Layout, cells: list[str]) -> Iterator[str]:
 def is_stamp(cell: str) -> bool:
     """Whether a cell is a time of the clock."""
     return not is_number(cell) and TIMED.fullmatch(cell) is not None
-
-
-def _counts(cells: list[str]) -> bool:
-    """Whether a column counts the rows."""
-    return bool(cells) and cells[0] in ("0", "1") and cells == [str(i + int(cells[0])) for i in range(len(cells))]
 
 
 def _is_text(cells: list[str]) -> bool:

@@ -1,14 +1,16 @@
 """Rows of a CSV file: where they begin, and the numbers in some of them, by pandas.
 
-Every byte is looked at before a row is parsed: what is no number, no mark for nothing measured and no cell of a column
-of text is refused with its line, its column and what to write.
+What is no number, no mark for nothing measured and no cell of a column of text is refused with its line, its column and
+what to write.
 """
 
+import csv
 import io
 import re
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +25,11 @@ CHUNK = 1 << 22
 """Bytes read at once while rows are counted."""
 TAIL = 1000
 """Characters at the end of a file among which empty lines are looked for."""
-_ALLOWED = b"0123456789+-.eEnaNAinfIF, \n"
-"""Bytes of a row of numbers, after the decimal sign and the separator are a point and a comma."""
 _GAPS = ["", "nan", "NaN", "NAN", "NA", "na", "-", "--", "---"]
-"""Cells of these bytes that say that nothing was measured."""
-_WRONG = b"\x1a"
+"""Usual cells that say that nothing was measured; others are looked for where these do not do."""
+_PLAIN = bytes(range(32, 127)) + b"\n"
+"""Bytes of which numbers and marks are made; where there are others, every cell is looked at."""
+_WRONG = "\x1a"
 """What stands for a separator within quotes: never a part of a number."""
 _THOUSANDS = re.compile(r"\s*[+-]?\d{1,3}([., '’\u00a0\u202f]\d{3})+([.,]\d+)?\s*")
 
@@ -69,7 +71,7 @@ def narrow(data: bytes, unit: np.dtype) -> bytes:
     if unit.itemsize == 1:
         return data
     codes = np.frombuffer(data[: len(data) // unit.itemsize * unit.itemsize], unit)
-    return np.where(codes > 127, _WRONG[0], codes).astype(np.uint8).tobytes()
+    return np.where(codes > 127, ord(_WRONG), codes).astype(np.uint8).tobytes()
 
 
 def find_rows(path: Path, layout: Layout) -> tuple[np.ndarray, int, int]:
@@ -111,25 +113,50 @@ def numbers(path: Path, layout: Layout, data: bytes, first: int) -> tuple[np.nda
     text = _unquoted(path, layout, narrow(data, layout.unit).replace(b"\r\n", b"\n"), line)
     _even(path, layout, text, line)
     times = None
-    if layout.texts:
-        text, cells = _parted(layout, text)
-        if layout.stamps is not None:
-            times = layout.stamps.seconds(path, cells, line, layout.names[layout.clock])
-    table = _parsed(layout, text)
-    if table is None:
-        table = _parsed(layout, _blanked(layout, text))
-    if table is None:
-        raise _culprit(path, layout, text, line)
-    beyond = np.isfinite(table[:, len(layout.numbers) :])
+    if layout.stamps is not None:
+        stamps = [cell.replace(_WRONG, layout.separator) for cell in _read(layout, text, [layout.clock], str)[:, 0]]
+        times = layout.stamps.seconds(path, stamps, line, layout.names[layout.clock])
+    table, used = _table(path, layout, text, line), len(layout.numbers)
+    beyond = np.isfinite(table[:, used:]).any(axis=1)
     if beyond.any():
-        row = int(np.argmax(beyond.any(axis=1)))
-        raise InputError(
-            path,
-            f"line {line + row}",
-            None,
-            f"a value stands beyond the last heading: {len(layout.names)} values are needed",
-        )
-    return table[:, : len(layout.numbers)], times
+        wrong = f"a value stands beyond the last heading: {len(layout.names)} values are needed"
+        raise InputError(path, f"line {line + int(np.argmax(beyond))}", None, wrong)
+    return table[:, :used], times
+
+
+def _table(path: Path, layout: Layout, text: bytes, line: int) -> np.ndarray:
+    """Numbers (rows, columns) of the columns of numbers and of those beyond the last heading, NaN for marks."""
+    columns, wrong = [*layout.numbers, *range(len(layout.names), layout.width)], None
+    if text.translate(None, _PLAIN + layout.separator.encode()):
+        wrong = _culprit(path, layout, text, line)
+    if wrong is None:
+        with suppress(ValueError, OverflowError):
+            return _read(layout, text, columns, np.float64)
+        cells = np.unique(_read(layout, text, columns, str).astype(str))
+        with suppress(ValueError, OverflowError):
+            return _read(layout, text, columns, np.float64, [cell for cell in cells if MARKS.fullmatch(cell)])
+        wrong = _culprit(path, layout, text, line)
+    raise wrong or InputError(path, f"line {line} and after", None, "rows of numbers are needed")
+
+
+def _read(layout: Layout, text: bytes, columns: list[int], kind: type, marks: Sequence[str] = ()) -> np.ndarray:
+    """Some columns of rows without quotes, as numbers or as text; ValueError for what is no number and no mark."""
+    import pandas
+
+    return pandas.read_csv(
+        io.BytesIO(text),
+        sep=layout.separator,
+        decimal=layout.decimal if layout.decimal != layout.separator else ".",
+        header=None,
+        usecols=columns,
+        dtype=kind,
+        keep_default_na=False,
+        na_values=[*_GAPS, *marks] if kind is np.float64 else [],
+        skip_blank_lines=False,
+        skipinitialspace=True,
+        quoting=csv.QUOTE_NONE,
+        encoding="latin-1",
+    ).to_numpy()
 
 
 def _unquoted(path: Path, layout: Layout, text: bytes, line: int) -> bytes:
@@ -144,7 +171,7 @@ def _unquoted(path: Path, layout: Layout, text: bytes, line: int) -> bytes:
         row = int(np.argmax(inside[ends]))
         raise _at(path, line, text, int(ends[row]), "a quote is opened and not closed in this line")
     decimal = layout.separator == layout.decimal == ","
-    codes[inside & (codes == ord(layout.separator))] = ord(".") if decimal else _WRONG[0]
+    codes[inside & (codes == ord(layout.separator))] = ord("." if decimal else _WRONG)
     return codes[~quotes].tobytes()
 
 
@@ -162,95 +189,25 @@ def _even(path: Path, layout: Layout, text: bytes, line: int) -> None:
         raise _at(path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {found}{hint}")
 
 
-def _bounds(layout: Layout, text: bytes) -> np.ndarray:
-    """Byte before every cell and the one after the last (rows, width + 1): separators and line ends."""
-    data = np.frombuffer(text, np.uint8)
-    signs = np.flatnonzero((data == ord(layout.separator)) | (data == ord("\n"))).reshape(-1, layout.width)
-    return np.column_stack([np.append(-1, signs[:-1, -1]), signs])
-
-
-def _without(text: bytes, begins: np.ndarray, ends: np.ndarray) -> bytes:
-    """Text without the bytes from ``begins`` to before ``ends``, which may overlap."""
-    change = np.zeros(len(text) + 1, np.int8)
-    np.add.at(change, begins, 1)
-    np.add.at(change, ends, -1)
-    return np.frombuffer(text, np.uint8)[np.cumsum(change[:-1], dtype=np.int8) == 0].tobytes()
-
-
-def _parted(layout: Layout, text: bytes) -> tuple[bytes, list[str]]:
-    """Rows without the columns of text, and the cells of the clock."""
-    bounds, kept = _bounds(layout, text), [i for i in range(layout.width) if i not in layout.texts]
-    cells = [
-        text[a + 1 : b].replace(_WRONG, layout.separator.encode()).decode("latin-1")
-        for a, b in bounds[:, layout.clock : layout.clock + 2].tolist()
-    ]
-    inner = [i for i in layout.texts if i < kept[-1]]
-    begins, ends = bounds[:, inner].ravel() + 1, bounds[:, [i + 1 for i in inner]].ravel() + 1
-    if kept[-1] + 1 < layout.width:  # the last ones go with the separator before them
-        begins, ends = np.append(begins, bounds[:, kept[-1] + 1]), np.append(ends, bounds[:, -1])
-    return _without(text, begins, ends), cells
-
-
-def _parsed(layout: Layout, text: bytes) -> np.ndarray | None:
-    """Table of rows of numbers; None where a cell is something else."""
-    import pandas
-
-    if layout.separator != ",":
-        if (b"." if layout.decimal == "," else b",") in text:
-            return None
-        text = text.replace(b",", b".").replace(layout.separator.encode(), b",")
-    if text.translate(None, _ALLOWED):
-        return None
-    try:
-        table = pandas.read_csv(
-            io.BytesIO(text),
-            header=None,
-            dtype=np.float64,
-            keep_default_na=False,
-            na_values=_GAPS,
-            skip_blank_lines=False,
-            skipinitialspace=True,
-        )
-    except (ValueError, OverflowError):
-        return None
-    return table.to_numpy()
-
-
-def _blanked(layout: Layout, text: bytes) -> bytes:
-    """Rows with empty cells where a mark says that nothing was measured."""
-    plain = np.zeros(256, bool)
-    plain[np.frombuffer(b"0123456789+-.,eE \n" + layout.separator.encode(), np.uint8)] = True
-    odd = np.flatnonzero(~plain[np.frombuffer(text, np.uint8)])
-    bounds = np.append(-1, np.flatnonzero(np.isin(np.frombuffer(text, np.uint8), (ord(layout.separator), ord("\n")))))
-    cells = np.unique(np.searchsorted(bounds, odd))
-    spans = np.column_stack([bounds[cells - 1] + 1, bounds[cells]])
-    marks = np.array([_is_mark(text[a:b]) for a, b in spans.tolist()], bool)
-    return _without(text, *spans[marks].T) if marks.any() else text
-
-
-@lru_cache(1000)
-def _is_mark(cell: bytes) -> bool:
-    """Whether a cell says that nothing was measured."""
-    return MARKS.fullmatch(cell.decode("latin-1")) is not None
-
-
-def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError:
-    """Error at the first cell that is not a number."""
-    names = [layout.names[i] for i in layout.numbers]
-    other = "." if layout.decimal == "," else ","
+def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError | None:
+    """Error at the first cell that is not a number; None where there is none such."""
+    comma = layout.decimal == ","
     for i, row in enumerate(text.split(b"\n")):
         cells = row.decode("utf-8", errors="backslashreplace").split(layout.separator)
-        for name, cell in zip(names, cells, strict=False):
-            plain = cell.replace(",", ".") if layout.decimal == "," else cell
+        for column in (column for column in layout.numbers if column < len(cells)):
+            cell = cells[column]
             try:
-                wrong = other in cell or not (
-                    MARKS.fullmatch(cell) or (cell.isascii() and "_" not in cell and float(plain) is not None)
+                mark = MARKS.fullmatch(cell) is not None
+                mark or float(cell.replace(",", ".") if comma else cell)
+                number = (
+                    cell.isascii() and cell.isprintable() and "_" not in cell and ("." if comma else ",") not in cell
                 )
             except ValueError:
-                wrong = True
-            if wrong:
-                return InputError(path, f"line {line + i}, column {name!r}", cell.strip(), _remedy(layout, cell))
-    return InputError(path, f"line {line} and after", None, "rows of numbers are needed")
+                mark = number = False
+            if not mark and not number:
+                place = f"line {line + i}, column {layout.names[column]!r}"
+                return InputError(path, place, cell.strip(), _remedy(layout, cell))
+    return None
 
 
 def _remedy(layout: Layout, cell: str) -> str:

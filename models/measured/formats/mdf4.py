@@ -25,9 +25,8 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.left_out import LeftOut
 from models.measured.formats.mdf4_blocks import VLSD, check_blocks
-from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
+from models.measured.formats.opened import LeftOut, Opened, Span, notice, readable, told_apart, without_numbers
 
 SECONDS = 1
 """Synchronisation type of a master channel that counts seconds (MDF 4; that of MDF 3 always does)."""
@@ -120,19 +119,14 @@ def _values(mdf: Any, group: int, index: int, part: Any) -> np.ndarray:
 def open_mdf(path: Path) -> MdfFile:
     """List the channels of a file; raises InputError where it is damaged."""
     with readable(path):
-        version = _version(path)
+        with path.open("rb") as file:
+            identification = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
+        if identification is None:
+            raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
+        version = int(identification[1])
         found = check_blocks(path) if version == 4 else []
         with opened(path) as mdf:
             return _listed(path, mdf, version, found)
-
-
-def _version(path: Path) -> int:
-    """Version of MDF, from the first 64 bytes of the file."""
-    with path.open("rb") as file:
-        found = re.match(rb"(?:MDF|UnFinMF) +([34])\.\d\d", file.read(64))
-    if found is None:
-        raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
-    return int(found[1])
 
 
 def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile:
@@ -157,12 +151,7 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
                 channels.append(channel)
     found = found + left.findings(path)
     if not places:
-        raise InputError(
-            path,
-            "channels",
-            None,
-            "; ".join(["no channel of numbers over time is in the file", *(one.text for one in found)]),
-        )
+        raise without_numbers(path, found)
     groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
     names, repeated = told_apart(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
@@ -212,13 +201,8 @@ def _unusable(group: Any, i: int, version: int) -> str:
     conversion = 0 if channel.conversion is None else channel.conversion.conversion_type
     if version == 4 and channel.flags & ALL_INVALID:
         return "marked as invalid by the recorder"
-    numbers = (
-        channel.channel_type == 0
-        and channel.data_type in PLAIN[version]
-        and conversion in CONVERSIONS[version]
-        and not group.channel_dependencies[i]
-    )
-    if not numbers:
+    numbers = channel.channel_type == 0 and channel.data_type in PLAIN[version] and conversion in CONVERSIONS[version]
+    if not numbers or group.channel_dependencies[i]:
         return "no numbers"
     return "" if _inside(group, channel, version) else "bits outside the records (a damaged file has such)"
 
@@ -228,11 +212,8 @@ def _inside(group: Any, channel: Any, version: int) -> bool:
     own, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
-    begin = (
-        8 * channel.byte_offset + channel.bit_offset
-        if version == 4
-        else (channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0))
-    )
+    begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else channel.start_offset
+    begin += 8 * getattr(channel, "additional_byte_offset", 0) if version == 3 else 0
     marked = version == 4 and channel.flags & INVALIDATION
     return (
         0 <= begin <= begin + channel.bit_count <= 8 * own.samples_byte_nr
@@ -268,14 +249,8 @@ def _start(path: Path, header: Any, version: int) -> tuple[datetime | None, list
         return None, [notice(path, "note", "the file does not say when it was measured")]
     if version == 4 and header.time_flags & LOCAL:
         clock = datetime.fromtimestamp(header.abs_time / 1e9, UTC)
-        return None, [
-            notice(
-                path,
-                "doubt",
-                f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the "
-                "file does not name, and is not used",
-            )
-        ]
+        text = f"the start ({clock:%Y-%m-%d %H:%M:%S}) is local in a zone that the file does not name, and is not used"
+        return None, [notice(path, "doubt", text)]
     minutes = 60 * header.tz_offset if version == 3 else 0
     if version == 4 and header.time_flags & OFFSET:
         minutes = header.tz_offset + header.daylight_save_time

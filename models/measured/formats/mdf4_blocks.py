@@ -41,12 +41,8 @@ def check_blocks(path: Path) -> list[Finding]:
         raise InputError(path, f"byte {size}", None, "the file ends in its header")
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         if data[:8] == b"UnFinMF " or struct.unpack_from("<H", data, 60)[0]:
-            raise InputError(
-                path,
-                "byte 0",
-                data[:8].decode("latin-1").strip(),
-                "the recorder did not finish this file: let its software finalise it, or asammdf save it anew",
-            )
+            text = "the recorder did not finish this file: let its software finalise it, or asammdf save it anew"
+            raise InputError(path, "byte 0", data[:8].decode("latin-1").strip(), text)
         blocks = dict(_walk(path, data, size))
         if blocks[FIRST].kind != b"##HD":
             raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
@@ -57,25 +53,15 @@ def check_blocks(path: Path) -> list[Finding]:
 
 def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
     """Every block that a link leads to, with its place."""
-    seen, ahead = {FIRST}, [FIRST]
+    seen, ahead, cut = {FIRST}, [FIRST], f"; the file has {size} bytes: it is cut off or damaged"
     while ahead:
         place = ahead.pop()
         if not FIRST <= place <= size - HEAD or data[place : place + 2] != b"##":
-            raise InputError(
-                path,
-                f"byte {place}",
-                None,
-                f"a block must begin here; the file has {size} bytes: it is cut off or damaged",
-            )
+            raise InputError(path, f"byte {place}", None, f"a block must begin here{cut}")
         length, count = struct.unpack_from("<QQ", data, place + 8)
         if place + length > size or HEAD + 8 * count > length:
-            raise InputError(
-                path,
-                f"byte {place}",
-                None,
-                f"a block of {length} bytes with {count} links begins here; "
-                f"the file has {size} bytes: it is cut off or damaged",
-            )
+            text = f"a block of {length} bytes with {count} links begins here{cut}"
+            raise InputError(path, f"byte {place}", None, text)
         links = struct.unpack_from(f"<{count}Q", data, place + HEAD)
         rest = place + HEAD + 8 * count
         yield place, Block(data[place : place + 4], length, links, data[rest : min(rest + 100, place + length)])
@@ -113,31 +99,23 @@ def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> 
         allowed = f"the records of this data group need {needed} bytes, and {there} are there"
         raise InputError(path, f"byte {place}", None, allowed)
     if needed < there and not loose:
-        return [
-            notice(
-                path,
-                "doubt",
-                f"the data group at byte {place} has {there} bytes of records; {needed} are announced and read",
-            )
-        ]
+        text = f"the data group at byte {place} has {there} bytes of records; {needed} are announced and read"
+        return [notice(path, "doubt", text)]
     return []
 
 
 def _data(path: Path, place: int, blocks: dict[int, Block]) -> list[int]:
     """Places of the data blocks behind a link to them or to a list of them."""
-    found: list[int] = []
-    ahead = [place]
+    places, ahead = list[int](), [place]
     while ahead:
         at = ahead.pop()
-        if not at:
-            continue
-        if len(found) > len(blocks):
+        if len(places) > len(blocks):
             raise InputError(path, f"byte {place}", None, "a list of data blocks names more of them than there are")
-        if blocks[at].kind in (b"##DL", b"##HL", b"##LD"):
+        if at and blocks[at].kind in (b"##DL", b"##HL", b"##LD"):
             ahead += blocks[at].links
-        else:
-            found.append(at)
-    return found
+        elif at:
+            places.append(at)
+    return places
 
 
 def _length(path: Path, place: int, blocks: dict[int, Block]) -> int:

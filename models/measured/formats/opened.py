@@ -1,11 +1,12 @@
 """What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
 
 from abc import ABC, abstractmethod
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import tee
 from pathlib import Path
 
 import numpy as np
@@ -16,19 +17,10 @@ from models.measured.channel import BLOCK, Block, Channel
 
 Span = tuple[int, int]
 """First sample and number of samples."""
-
-
-@dataclass(frozen=True)
-class Spans:
-    """Blocks from sample ``first`` to ``count``, made as they are asked for: a damaged file may claim billions."""
-
-    first: int
-    count: int
-    length: int
-
-    def __iter__(self) -> Iterator[Span]:
-        """Every block in turn, from the beginning each time."""
-        return ((i, min(self.length, self.count - i)) for i in range(self.first, self.count, self.length))
+SHOWN = 5
+"""Names of what is left out that are told."""
+DATED = "2026-11-21T08:00:00+00:00"
+"""How a start is to be written."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +37,8 @@ class Opened(ABC):
         """Blocks of channels of one group, as ``models.measured.channel.Source`` says."""
         chosen = self._chosen(names)
         count = self.channels[chosen[0]].count
-        return self._checked(chosen, Spans(first, count, length))
+        spans = ((i, min(length, count - i)) for i in range(first, count, length))  # a damaged file may claim billions
+        return self._checked(chosen, spans)
 
     @abstractmethod
     def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -64,29 +57,23 @@ class Opened(ABC):
 
     def _checked(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[Block]:
         """Blocks that are complete, with times and values that are numbers or NaN."""
+        names, (mine, theirs) = [self.channels[i].name for i in chosen], tee(spans)
         with readable(self.path):
-            for (first, count), (times, values) in zip(spans, self.pieces(chosen, spans), strict=True):
+            for (first, count), (times, values) in zip(mine, self.pieces(chosen, theirs), strict=True):
                 if len(times) != count:
-                    raise InputError(
-                        self.path,
-                        f"sample {first + len(times)}",
-                        None,
-                        f"the data end here, although {first + count} samples or more are announced",
-                    )
+                    ends = f"the data end here, although {first + count} samples or more are announced"
+                    raise InputError(self.path, f"sample {first + len(times)}", None, ends)
                 self._finite(first, ["time"], times[:, None], np.isfinite(times[:, None]))
-                self._finite(first, [self.channels[i].name for i in chosen], values, ~np.isinf(values))
+                self._finite(first, names, values, ~np.isinf(values))
                 yield Block(first, times, values)
 
     def _finite(self, first: int, names: list[str], values: np.ndarray, good: np.ndarray) -> None:
         """Refuse the first value that is not a measured one."""
         if not good.all():
             row, column = (int(i[0]) for i in np.nonzero(~good))
-            raise InputError(
-                self.path,
-                f"channel {names[column]!r}, sample {first + row}",
-                float(values[row, column]),
-                "a finite value is needed (NaN in a channel says that nothing was measured)",
-            )
+            place = f"channel {names[column]!r}, sample {first + row}"
+            needed = "a finite value is needed (NaN in a channel says that nothing was measured)"
+            raise InputError(self.path, place, float(values[row, column]), needed)
 
 
 @contextmanager
@@ -108,38 +95,49 @@ def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
     return Finding("file", weight, place or path.name, text)
 
 
+@dataclass
+class LeftOut:
+    """Names of what a reader leaves out of a file, by reason: one sentence each, however many channels it concerns."""
+
+    names: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+
+    def add(self, why: str, name: str) -> None:
+        """One more."""
+        self.names[why].append(name)
+
+    def findings(self, path: Path) -> list[Finding]:
+        """One sentence per reason."""
+        more = {why: f" and {len(names) - SHOWN} more" for why, names in self.names.items() if len(names) > SHOWN}
+        texts = {why: f"{', '.join(names[:SHOWN])}{more.get(why, '')}" for why, names in self.names.items()}
+        return [notice(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
+
+
+def without_numbers(path: Path, said: Sequence[Finding]) -> InputError:
+    """Error for a file that has no channel to read, with what was said of it."""
+    reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in said)]
+    return InputError(path, "channels", None, "; ".join(reasons))
+
+
 def told_apart(path: Path, names: Sequence[str], *groups: Sequence[str]) -> tuple[list[str], list[Finding]]:
     """Names of which each occurs once, and what is to be said of repeated ones.
 
     A repeated ``Fz`` becomes ``WFT VL/Fz``, ``WFT VR/Fz`` by the first of ``groups`` (one text per name each) that
     tells all its channels apart, and ``Fz (1)``, ``Fz (2)`` where none does.
     """
-    by_group = _with_groups(names, groups)
+    by_group, said = list(names), list[Finding]()
+    repeated = {
+        name: [i for i, each in enumerate(names) if each == name] for name, n in Counter(names).items() if n > 1
+    }
+    for name, places in repeated.items():
+        for group in [texts for texts in groups if len({texts[i] for i in places}) == len(places)][:1]:
+            for i in places:
+                by_group[i] = f"{group[i]}/{name}" if group[i] else name
     unique = _numbered(by_group)
-    said = []
-    for name in (name for name, uses in Counter(names).items() if uses > 1):
-        new = [i for i, each in enumerate(names) if each == name]
-        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in new) else "note"
-        said.append(
-            notice(
-                path,
-                weight,
-                f"{len(new)} channels are called {name!r}: they are read as " + ", ".join(repr(unique[i]) for i in new),
-                name,
-            )
-        )
+    for name, places in repeated.items():
+        weight: Weight = "doubt" if any(unique[i] != by_group[i] for i in places) else "note"
+        text = f"{len(places)} channels are called {name!r}: they are read as "
+        said.append(notice(path, weight, text + ", ".join(repr(unique[i]) for i in places), name))
     return unique, said
-
-
-def _with_groups(names: Sequence[str], groups: Sequence[Sequence[str]]) -> list[str]:
-    """Names with their group before those that are repeated, where groups tell all of these apart."""
-    new = list(names)
-    for name in (name for name, uses in Counter(names).items() if uses > 1):
-        places = [i for i, each in enumerate(names) if each == name]
-        telling = next((texts for texts in groups if len({texts[i] for i in places}) == len(places)), [])
-        for i, group in enumerate(telling):
-            new[i] = f"{group}/{name}" if group and i in places else new[i]
-    return new
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
@@ -159,20 +157,9 @@ def zoned(path: Path, text: str) -> tuple[datetime | None, list[Finding]]:
     try:
         start = datetime.fromisoformat(text.strip())
     except ValueError:
-        return None, [
-            notice(
-                path,
-                "doubt",
-                f"the start {text.strip()!r} is not a date such as 2026-11-21T08:00:00+00:00, and is not used",
-            )
-        ]
-    if start.tzinfo is None:
-        return None, [
-            notice(
-                path,
-                "doubt",
-                f"the start {text.strip()!r} names no time zone, and is not used: "
-                "write it as 2026-11-21T08:00:00+00:00",
-            )
-        ]
-    return start, []
+        wrong = f"is not a date such as {DATED}, and is not used"
+    else:
+        if start.tzinfo is not None:
+            return start, []
+        wrong = f"names no time zone, and is not used: write it as {DATED}"
+    return None, [notice(path, "doubt", f"the start {text.strip()!r} {wrong}")]

@@ -24,6 +24,7 @@ MOST_BLOCKS = 1024
 """Header blocks: four times what the format allows, as there are files that need them."""
 TYPES: dict[str, np.dtype] = {"SHORT_INTEGER": np.dtype("<i2"), "FLOATING_POINT": np.dtype("<f4")}
 LITTLE = ("BINARY", "BINARY_IEEE_LITTLE_END")
+BEGINS = ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]
 HISTORIES = ("DRIVE", "RESPONSE", "MULT_DRIVE", "MULT_RESP", "1", "2", "3", "4")
 
 
@@ -66,11 +67,12 @@ def open_rpc(path: Path) -> RpcFile:
     with readable(path):
         parameters = read_parameters(path)
         layout = _layout(path, parameters)
-        count, found = _count(path, parameters, layout)
-        indices = range(1, layout.width + 1)
-        found += _numbers_of_names(path, parameters, layout.width)
-        names, repeated = told_apart(path, [_name(parameters, i) for i in indices])
-        steps = layout.scales if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
+        count, said = _count(path, parameters, layout)
+        said += _numbers_of_names(path, parameters, layout.width)
+        numbers = range(1, layout.width + 1)
+        names = [parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}" for i in numbers]
+        names, repeated = told_apart(path, names)
+        steps = np.abs(layout.scales) if layout.dtype == TYPES["SHORT_INTEGER"] else np.zeros(layout.width)
         channels = tuple(
             Channel(
                 name,
@@ -79,12 +81,12 @@ def open_rpc(path: Path) -> RpcFile:
                 0,
                 count,
                 layout.period,
-                abs(float(steps[i - 1])),
+                float(step),
             )
-            for name, i in zip(names, indices, strict=True)
+            for name, i, step in zip(names, numbers, steps, strict=True)
         )
         start, notes = zoned(path, parameters["DATE"]) if parameters.get("DATE", "").strip() else (None, [])
-        return RpcFile(path, channels, start, _long(parameters, "COMMENT"), tuple(found + repeated + notes), layout)
+        return RpcFile(path, channels, start, _long(parameters, "COMMENT"), (*said, *repeated, *notes), layout)
 
 
 def read_parameters(path: Path) -> dict[str, str]:
@@ -93,18 +95,14 @@ def read_parameters(path: Path) -> dict[str, str]:
         head = file.read(BLOCK)
         if len(head) < BLOCK:
             raise InputError(path, f"byte {len(head)}", None, "the file ends in its header")
-        first = [_record(head, i) for i in range(3)]
-        if [key for key, _ in first] != ["FORMAT", "NUM_HEADER_BLOCKS", "NUM_PARAMS"]:
-            raise InputError(
-                path,
-                "header",
-                [key for key, _ in first],
-                "RPC III begins with FORMAT, NUM_HEADER_BLOCKS and NUM_PARAMS",
-            )
-        if first[0][1] not in LITTLE:
-            raise InputError(path, "header, FORMAT", first[0][1], f"one of {', '.join(LITTLE)} can be read")
-        blocks = whole(path, dict(first), "NUM_HEADER_BLOCKS", MOST_BLOCKS)
-        count = whole(path, dict(first), "NUM_PARAMS", 4 * blocks)
+        first = dict(_record(head, i) for i in range(3))
+        if list(first) != BEGINS:
+            text = f"RPC III begins with {', '.join(BEGINS[:2])} and {BEGINS[2]}"
+            raise InputError(path, "header", list(first), text)
+        if first["FORMAT"] not in LITTLE:
+            raise InputError(path, "header, FORMAT", first["FORMAT"], f"one of {', '.join(LITTLE)} can be read")
+        blocks = whole(path, first, "NUM_HEADER_BLOCKS", MOST_BLOCKS)
+        count = whole(path, first, "NUM_PARAMS", 4 * blocks)
         head += file.read(BLOCK * (blocks - 1))
     if len(head) < BLOCK * blocks:
         raise InputError(path, f"byte {len(head)}", None, f"the file ends in its header of {blocks} blocks")
@@ -136,12 +134,8 @@ def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> 
     except ValueError:
         value = np.nan
     if not np.isfinite(value) or (positive and value <= 0.0):
-        raise InputError(
-            path,
-            f"header, {name}",
-            parameters.get(name, ""),
-            "a finite number is needed" + (" above 0" if positive else ""),
-        )
+        needed = "a finite number is needed" + (" above 0" if positive else "")
+        raise InputError(path, f"header, {name}", parameters.get(name, ""), needed)
     return value
 
 
@@ -170,33 +164,24 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
     size = layout.points * layout.width * layout.dtype.itemsize
     data = path.stat().st_size - layout.begin
     there = layout.points * (data // size)
-    found = []
+    texts = list[str]()
     if "SAMPLES" in parameters:
         announced = whole(path, parameters, "SAMPLES", announced)
     else:
-        found.append(
-            notice(
-                path,
-                "doubt",
-                f"the header does not say how many of the {announced} samples are measured: "
-                f"up to {layout.points - 1} at the end may be padding of the last group",
-            )
+        texts.append(
+            f"the header does not say how many of the {announced} samples are measured: up to {layout.points - 1} at "
+            "the end may be padding of the last group"
         )
-    count = min(announced, there)
+    count, extra = min(announced, there), data - size * -(-announced // layout.points)
     if count == 0:
         raise InputError(path, f"byte {layout.begin}", None, "the file ends before its first group of samples does")
     if count < announced:
-        found.append(
-            notice(
-                path,
-                "doubt",
-                f"the header announces {announced} samples, but {count} are there in whole groups: the file is cut off",
-            )
+        texts.append(
+            f"the header announces {announced} samples, but {count} are there in whole groups: the file is cut off"
         )
-    extra = data - size * -(-announced // layout.points)
     if extra > 0:
-        found.append(notice(path, "doubt", f"{extra} bytes follow the samples that the header announces, unread"))
-    return count, found
+        texts.append(f"{extra} bytes follow the samples that the header announces, unread")
+    return count, [notice(path, "doubt", text) for text in texts]
 
 
 def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
@@ -206,11 +191,6 @@ def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> lis
         raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
     unnamed = [str(i) for i in range(1, width + 1) if i not in numbers]
     return [notice(path, "doubt", f"the header names no channel {', '.join(unnamed)}")] if unnamed else []
-
-
-def _name(parameters: dict[str, str], i: int) -> str:
-    """Name of a channel, by its number where it has none."""
-    return parameters.get(f"DESC.CHAN_{i}", "").strip() or f"channel {i}"
 
 
 def _long(parameters: dict[str, str], name: str) -> str:

@@ -19,8 +19,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.measured.channel import Channel
-from models.measured.formats.left_out import LeftOut
-from models.measured.formats.opened import Opened, Span, notice, readable, told_apart
+from models.measured.formats.opened import LeftOut, Opened, Span, notice, readable, told_apart, without_numbers
 
 UNITS = ("unit_string", "NI_UnitDescription")
 CLOCKS = ("time", "zeit", "t")
@@ -56,7 +55,11 @@ class TdmsData(Opened):
             for first, count in spans:
                 values = [np.asarray(data[one.group][one.name].read_data(first, count), float) for one in places]
                 least = min(len(column) for column in values)
-                yield _times(data, places[0], first, least), np.column_stack([column[:least] for column in values])
+                place = places[0]
+                times = place.increment * np.arange(first, first + least)
+                if place.clock:
+                    times = np.asarray(data[place.group][place.clock].read_data(first, least), float)
+                yield place.first + times, np.column_stack([column[:least] for column in values])
 
 
 class Bounded(io.BufferedReader):
@@ -80,13 +83,6 @@ def opened(path: Path, file: Bounded) -> Any:
         raise InputError(path, "", None, "TDMS files need npTDMS: pip install 'twinrig[measured]'") from None
     log_manager.set_level(logging.CRITICAL)
     return TdmsFile.open(file, raw_timestamps=True)
-
-
-def _times(data: Any, place: Place, first: int, count: int) -> np.ndarray:
-    """Times (n,) in s since the start of the file."""
-    if place.clock:
-        return place.first + np.asarray(data[place.group][place.clock].read_data(first, count), float)
-    return place.first + place.increment * np.arange(first, first + count)
 
 
 def open_tdms(path: Path) -> TdmsData:
@@ -132,21 +128,15 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     usable = [(group, channel) for group in data.groups() for channel in group.channels() if _numeric(channel, left)]
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
-    started = [start for _, channel in usable if (start := _started(channel)) is not None]
-    zero = min(started, default=None)
+    zero = min((start for _, channel in usable if (start := _started(channel)) is not None), default=None)
     own = [(channel, place) for group, channel in usable if (place := _place(group, channel, zero, left)) is not None]
-    found = [*cut, *left.findings(path)]
+    said = [*cut, *left.findings(path)]
     if not own:
-        raise InputError(
-            path,
-            "channels",
-            None,
-            "; ".join(["no channel of numbers over time is in the file", *(one.text for one in found)]),
-        )
+        raise without_numbers(path, said)
     clocks = [(place.group, place.clock, place.first, place.increment) for _, place in own]
     counts = [len(channel) for channel, _ in own]
     if cut:
-        counts = [min(n for n, one in zip(counts, clocks, strict=True) if one == clock) for clock in clocks]
+        counts = [min(n for n, other in zip(counts, clocks, strict=True) if other == clock) for clock in clocks]
     keys = list(zip(clocks, counts, strict=True))
     names, repeated = told_apart(path, [place.name for _, place in own], [place.group for _, place in own])
     channels = tuple(
@@ -163,16 +153,15 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
         for name, key, (channel, place) in zip(names, keys, own, strict=True)
     )
     comment = str(data.properties.get("description", "")).strip()
-    return TdmsData(path, channels, zero, comment, (*found, *repeated), tuple(place for _, place in own))
+    return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in own))
 
 
 def _numeric(channel: Any, left: LeftOut) -> bool:
     """Whether a channel holds real numbers, one or more."""
-    kind = "" if channel.data_type is None else channel.dtype.kind
-    if len(channel) == 0 or kind not in "iuf" or kind == "":
-        left.add("no samples" if len(channel) == 0 else "no numbers", repr(channel.name))
-        return False
-    return True
+    if len(channel) and channel.data_type is not None and channel.dtype.kind in "iuf":
+        return True
+    left.add("no numbers" if len(channel) else "no samples", repr(channel.name))
+    return False
 
 
 def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Place | None:

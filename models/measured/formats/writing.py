@@ -1,16 +1,41 @@
-"""What the writers of all formats share: groups of channels, checked beforehand; files whole or not at all."""
+"""Measurement files written: groups of channels, checked beforehand, block by block; whole or not at all.
 
+CSV is read back to the last bit by ``models.measured.formats.csv``. ASAM MDF 4.10 is written by asammdf: one channel
+group per clock; it takes spaces away from the ends of the lines of a file's comment, all else comes back as it was
+given. TDMS is written by npTDMS: a segment per block, the clock as waveform properties of every channel.
+
+MTS RPC III is written with floating-point samples: 2^-24 of each value is kept, where 16 bits keep 2^-16 of the
+largest. The last group is filled up with the last values; SAMPLES, which is no part of the format but known to
+rpc3-file, says how many count. Comments are parameters of our own, COMMENT_1 ... and COMMENT.CHAN_1_1 ...; NaN is
+written as NaN. A name, a unit or a comment that the format cannot hold is refused, never cut.
+"""
+
+import csv
+import io
+import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
+from models.core.csv_header import heading
 from models.core.errors import InputError
 from models.core.whole_files import FULL
+from models.measured.formats.csv_layout import is_clock
+from models.measured.formats.mdf4 import unheard
+from models.measured.formats.rpc3 import BLOCK, KEY, RECORD
+
+POINTS = 2048
+"""Samples of a group of RPC III, which is also a frame."""
+LONGEST = RECORD - KEY - 1
+"""Bytes of a value of RPC III before the zero that ends it."""
+MOST = 1024
+"""Parameters of a header of RPC III."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +62,16 @@ class Group:
                 raise ValueError(f"a block of shape {values.shape} at sample {first} of {self.count}")
             if np.isinf(values).any():
                 row, column = (int(i[0]) for i in np.nonzero(np.isinf(values)))
-                raise InputError(
-                    path,
-                    f"channel {self.names[column]!r}, sample {first + row}",
-                    None,
-                    "an infinite value cannot be written",
-                )
+                place = f"channel {self.names[column]!r}, sample {first + row}"
+                raise InputError(path, place, None, "an infinite value cannot be written")
             yield first, values
             first += len(values)
         if first != self.count:
             raise ValueError(f"{first} samples instead of {self.count}")
 
 
-def check_names(path: Path, groups: Sequence[Group]) -> None:
-    """Refuse channels that a reader could not tell apart or a header could not hold."""
+def check(path: Path, groups: Sequence[Group], start: datetime | None) -> None:
+    """Refuse channels that a reader could not tell apart or a header could not hold, and a start without its zone."""
     names = [name for group in groups for name in group.names]
     for name in names:
         if not name.strip() or name != name.strip() or not name.isprintable():
@@ -59,19 +80,20 @@ def check_names(path: Path, groups: Sequence[Group]) -> None:
             raise InputError(path, "channel", name, "every name may occur once in a file")
     if not names or any(group.count < 1 or not group.period > 0.0 for group in groups):
         raise InputError(path, "groups", len(groups), "channels with samples and a period above 0 are needed")
+    if start is not None and start.tzinfo is None:
+        raise InputError(path, "start", str(start), "a start with its time zone is needed")
 
 
-def one_group(path: Path, groups: Sequence[Group], form: str) -> Group:
-    """Return the only group of a format with one clock."""
+def _single(path: Path, groups: Sequence[Group], form: str) -> Group:
+    """The only group of a format with one clock."""
     if len(groups) != 1:
         raise InputError(path, "groups", len(groups), f"{form} has one sampling rate: write a file for each, or MDF 4")
     return groups[0]
 
 
-def check_start(path: Path, start: datetime | None) -> None:
-    """Refuse a start that does not name its zone."""
-    if start is not None and start.tzinfo is None:
-        raise InputError(path, "start", str(start), "a start with its time zone is needed")
+def missing(path: Path, form: str, package: str) -> InputError:
+    """Error for a package that is not installed."""
+    return InputError(path, "", None, f"{form} files need {package}: pip install 'twinrig[measured]'")
 
 
 @contextmanager
@@ -81,8 +103,9 @@ def new_file(path: Path) -> Iterator[Path]:
     Raises InputError where ``path`` exists, before or after, or nothing can be written; then nothing is left behind.
     """
     part = path.with_name(f".{path.stem}.part{path.suffix}")
+    exists = InputError(path, "", None, "the file exists already: name another one, as nothing is overwritten")
     if path.exists():
-        raise _exists(path)
+        raise exists
     if not path.parent.is_dir():
         raise InputError(path, "", None, "the file cannot be written: its folder does not exist")
     try:
@@ -90,7 +113,7 @@ def new_file(path: Path) -> Iterator[Path]:
         yield part
         os.link(part, path)  # unlike a rename, it never replaces what came into being meanwhile
     except FileExistsError:
-        raise _exists(path) from None
+        raise exists from None
     except OSError as error:
         if error.errno in FULL:
             raise
@@ -99,5 +122,186 @@ def new_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def _exists(path: Path) -> InputError:
-    return InputError(path, "", None, "the file exists already: name another one, as nothing is overwritten")
+def write_csv(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Write the header to the file ``part``, then rows of shortest numbers, block by block."""
+    group = _single(path, groups, "CSV")
+    for name, unit in zip(group.names, group.units, strict=True):
+        if is_clock(name):
+            raise InputError(path, "channel", name, "a CSV file has one column of times: give the channel another name")
+        if heading(f"{name} [{unit}]") != (name, unit) or not unit.isprintable():
+            raise InputError(path, f"channel {name!r}, unit", unit, "a unit in CSV has no brackets and no line ends")
+    with part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(_csv_header(group, start, comment))
+        for first, values in group.rows(path):
+            times = [f"{t:.15g}" for t in (group.period * np.arange(first, first + len(values))).tolist()]
+            file.writelines(f"{t},{','.join(map(repr, row))}\n" for t, row in zip(times, values.tolist(), strict=True))
+
+
+def _csv_header(group: Group, start: datetime | None, comment: str) -> str:
+    """Comment lines and headings; ``# samples:`` lets a reader see that the file was cut off."""
+    lines = [f"comment: {line}" for line in comment.splitlines()]
+    lines += [] if start is None else [f"start: {start.isoformat()}"]
+    lines += [f"samples: {group.count}"]
+    for name, text in zip(group.names, group.comments, strict=True):
+        lines += [f"channel {json.dumps(name, ensure_ascii=False)}: {line}" for line in text.splitlines()]
+    headings, names = io.StringIO(), [f"{name} [{unit}]" for name, unit in zip(group.names, group.units, strict=True)]
+    quoting: Literal[0, 1] = 1 if ";" in "".join(names) else 0  # of all: it would look like a separator
+    csv.writer(headings, lineterminator="\n", quoting=quoting).writerow(["time [s]", *names])
+    return "".join(f"# {line}\n" for line in lines) + headings.getvalue()
+
+
+def write_mdf(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Append the blocks to a temporary file beside ``part``, then save it as a whole."""
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise missing(path, "MDF", "asammdf") from None
+    mdf = MDF(version="4.10", temporary_folder=str(part.parent))
+    try:
+        if start is None:
+            mdf.header.abs_time = 0
+        else:
+            mdf.header.start_time = start
+        mdf.header.comment = comment
+        for index, group in enumerate(groups):
+            for first, values in group.rows(path):
+                _append(mdf, index, group, group.period * np.arange(first, first + len(values)), values)
+        with unheard():
+            mdf.save(part)
+    finally:
+        mdf.close()
+
+
+def _append(mdf: Any, index: int, group: Group, times: np.ndarray, values: np.ndarray) -> None:
+    """Add a block to a group that the first one begins."""
+    from asammdf import Signal
+
+    columns = np.ascontiguousarray(values.T)
+    if times[0] > 0.0:
+        mdf.extend(index, [(times, None), *((column, None) for column in columns)])
+        return
+    texts = zip(columns, group.names, group.units, group.comments, strict=True)
+    mdf.append(
+        [Signal(column, times, name=name, unit=unit, comment=text) for column, name, unit, text in texts],
+        common_timebase=True,
+    )
+
+
+def write_tdms(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Write the groups one after the other, each block as one segment."""
+    try:
+        from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+    except ImportError:
+        raise missing(path, "TDMS", "npTDMS") from None
+    with TdmsWriter(str(part)) as file:
+        file.write_segment([RootObject({"description": comment} if comment else {})])
+        for number, group in enumerate(groups, start=1):
+            clock: dict[str, Any] = {
+                "wf_increment": float(group.period),
+                "wf_start_offset": 0.0,
+                "wf_xunit_string": "s",
+            }
+            if start is not None:
+                clock["wf_start_time"] = np.datetime64(start.astimezone(UTC).replace(tzinfo=None), "us")
+            texts = zip(group.units, group.comments, strict=True)
+            properties = [
+                clock | {key: text for key, text in (("unit_string", unit), ("description", note)) if text}
+                for unit, note in texts
+            ]
+            file.write_segment([GroupObject(f"group {number}", {})])
+            for first, values in group.rows(path):
+                columns = zip(group.names, np.ascontiguousarray(values.T), properties, strict=True)
+                file.write_segment(
+                    [ChannelObject(f"group {number}", name, own, {} if first else more) for name, own, more in columns]
+                )
+
+
+def write_rpc(path: Path, part: Path, groups: Sequence[Group], start: datetime | None, comment: str) -> None:
+    """Write the header, groups of samples, and the header again with the limits of every channel."""
+    group = _single(path, groups, "RPC III")
+    limits = np.tile([[np.inf], [-np.inf]], len(group.names))
+    with part.open("wb") as file:
+        file.write(_rpc_header(path, group, limits, start, comment))
+        for values in _frames(path, group):
+            limits = np.array([np.fmin(limits[0], np.fmin.reduce(values)), np.fmax(limits[1], np.fmax.reduce(values))])
+            file.write(np.ascontiguousarray(values.T).astype("<f4").tobytes())
+        file.seek(0)
+        file.write(_rpc_header(path, group, np.where(np.isfinite(limits), limits, 0.0), start, comment))
+
+
+def _frames(path: Path, group: Group) -> Iterator[np.ndarray]:
+    """Values in frames of equal length, the last one filled up with the last values."""
+    kept = np.empty((0, len(group.names)))
+    for first, values in group.rows(path):
+        if (np.abs(values) > np.finfo("<f4").max).any():
+            raise InputError(path, f"sample {first} and after", None, "values above 3.4e38 have no room in RPC III")
+        kept = np.concatenate((kept, values))
+        used = len(kept) // POINTS * POINTS
+        yield from kept[:used].reshape(-1, POINTS, len(group.names))
+        kept = kept[used:]
+    if len(kept):
+        yield np.concatenate((kept, np.repeat(kept[-1:], POINTS - len(kept), axis=0)))
+
+
+def _rpc_header(path: Path, group: Group, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
+    """Header blocks; of the same length whatever the limits are."""
+    own: dict[str, object] = {
+        "FILE_TYPE": "TIME_HISTORY",
+        "TIME_TYPE": "RESPONSE",
+        "DATA_TYPE": "FLOATING_POINT",
+        "DATE": "" if start is None else start.isoformat(),
+        "OPERATION": "twinrig",
+        "CHANNELS": len(group.names),
+        "DELTA_T": repr(group.period),
+        "PTS_PER_FRAME": POINTS,
+        "PTS_PER_GROUP": POINTS,
+        "FRAMES": -(-group.count // POINTS),
+        "SAMPLES": group.count,
+        "BYPASS_FILTER": 0,
+        "HALF_FRAMES": 0,
+        "INT_FULL_SCALE": 32752,
+        "REPEATS": 1,
+        "PARTITIONS": 1,
+        "PART.CHAN_1": 1,
+        "PART.NCHAN_1": len(group.names),
+        **_long("COMMENT", comment),
+    }
+    texts = zip(group.names, group.units, limits.T, group.comments, strict=True)
+    for i, (name, unit, (low, high), text) in enumerate(texts, start=1):
+        told = {"DESC": name, "UNITS": unit, "SCALE": "1.0", "LOWER_LIMIT": f"{low:.9g}", "UPPER_LIMIT": f"{high:.9g}"}
+        own |= {f"{key}.CHAN_{i}": value for key, value in (told | {"MAP": str(i)}).items()}
+        own |= _long(f"COMMENT.CHAN_{i}", text)
+    count = len(own) + 3
+    if count > MOST:
+        text = f"the header has {MOST} parameters, {count} are needed: write fewer channels or comments, or MDF 4"
+        raise InputError(path, "channels", len(group.names), text)
+    blocks = -(-count // (BLOCK // RECORD))
+    own = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **own}
+    return b"".join(_record(path, key, str(value)) for key, value in own.items()).ljust(blocks * BLOCK, b"\0")
+
+
+def _record(path: Path, key: str, value: str) -> bytes:
+    """One parameter."""
+    try:
+        text = value.encode("latin-1")
+    except UnicodeEncodeError as error:
+        letter = value[error.start]
+        raise InputError(path, key, value, f"RPC III has no {letter!r}: write it otherwise, or MDF 4") from None
+    if len(text) > LONGEST or "\0" in value:
+        raise InputError(path, key, value, f"RPC III has room for {LONGEST} characters, and this has {len(text)}")
+    return key.encode("ascii").ljust(KEY, b"\0") + text.ljust(RECORD - KEY, b"\0")
+
+
+def _long(name: str, text: str) -> dict[str, object]:
+    """Spread a text over several parameters, with line ends written as ``\\n``."""
+    plain = text.replace("\\", "\\\\").replace("\n", "\\n")
+    return {f"{name}_{i // LONGEST + 1}": plain[i : i + LONGEST] for i in range(0, len(plain), LONGEST)}
+
+
+WRITERS: dict[str, Callable[[Path, Path, Sequence[Group], datetime | None, str], None]] = {
+    ".csv": write_csv,
+    ".mf4": write_mdf,
+    ".rsp": write_rpc,
+    ".tdms": write_tdms,
+}
+"""By extension: write groups to a part file, whose name the path will be, with the start and the file's comment."""

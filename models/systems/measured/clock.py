@@ -8,7 +8,7 @@ gap of more than 1.5 of its own periods, or outside its file, is NaN.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -21,14 +21,13 @@ from models.core.scene_effects import extended
 from models.core.whole_files import write_whole
 from models.measured.channel import BLOCK, Source
 from models.measured.columns import Columns
-from models.measured.no_value import without_absurd
-from models.measured.recording import Recording
+from models.measured.gaps import without_absurd
+from models.measured.recording import Progress, Recording, silent
 from models.measured.resampling import SAME, onto
 from models.measured.signal import Signal
 from models.measured.timing import EVEN, Timing, timing
 from models.systems.measured.scene import MeasuredScene
 
-Progress = Callable[[str, float], None]
 COLUMNS, RAW, SOURCES, ABSURD = "recording.columns", "raw.columns", "sources.json", "no_value.json"
 LEAST = 100
 """Samples of the shortest recording."""
@@ -42,28 +41,22 @@ FAST = 60e3
 class Group:
     """Mapped signals of one group of one file, with their timing on the common time.
 
-    The file's clock was slowed down by its ``drift``, and ``shift`` (s) added.
+    The file's clock was slowed down by its drift, and its shift added.
     """
 
     source: Source
     signals: tuple[Signal, ...]
     timing: Timing
-    shift: float
-    drift: float
 
     @property
     def names(self) -> tuple[str, ...]:
         """Channels, in the file's words."""
         return tuple(signal.channel for signal in self.signals)
 
-    @property
-    def factors(self) -> np.ndarray:
-        """To SI, with sign."""
-        return np.array([signal.sign * signal.factor for signal in self.signals])
-
     def si(self, values: np.ndarray) -> np.ndarray:
         """Values (n, signals) of the file in SI."""
-        return (values - np.array([signal.zero for signal in self.signals])) * self.factors
+        zeros, factors = np.array([(signal.zero, signal.sign * signal.factor) for signal in self.signals]).T
+        return (values - zeros) * factors
 
 
 @dataclass(frozen=True)
@@ -74,9 +67,10 @@ class Grid:
     period: float
     count: int
 
-    def times(self, first: int = 0, count: int | None = None) -> np.ndarray:
-        """Some or all of them."""
-        return self.start + self.period * np.arange(first, self.count if count is None else first + count)
+    @property
+    def times(self) -> np.ndarray:
+        """All of them (n,)."""
+        return self.start + self.period * np.arange(self.count)
 
     def places(self, times: np.ndarray) -> np.ndarray:
         """Nearest index of each time, which may lie outside."""
@@ -89,7 +83,7 @@ def record(
     signals: Sequence[Signal],
     hubs: Sequence[str],
     folder: Path,
-    progress: Progress = lambda text, part: None,
+    progress: Progress = silent,
 ) -> Recording:
     """Bring mapped signals of opened files onto one clock, into columns in ``folder``, and extend them by the effects.
 
@@ -102,9 +96,8 @@ def record(
     groups = [each for source, shift, drift in placing for each in _groups(source, signals, shift, drift)]
     leading = [group for group in groups if any(s.at in hubs and not s.check for s in group.signals)]
     if not leading:
-        raise InputError(
-            scene.file, "files", None, "no channel is mapped to a hub: wheel forces are what drives the vehicle"
-        )
+        needed = "no channel is mapped to a hub: wheel forces are what drives the vehicle"
+        raise InputError(scene.file, "files", None, needed)
     grid = _grid(scene, leading)
     noticed += [finding for group in groups for finding in (*_of_group(group), *_outside(scene, group, grid))]
     columns = _columns(folder, scene, signals, sources, grid)
@@ -116,7 +109,8 @@ def record(
         _referred(scene, signals, columns)
         (folder / ABSURD).write_text(json.dumps([asdict(finding) for finding in absurd]))
         columns.close(grid.count)
-    noticed += _absurd(folder)
+    for row in json.loads((folder / ABSURD).read_text()):  # of this run, or of one that was killed
+        noticed.append(Finding(**row | {key: tuple(row[key]) for key in ("signals", "times")}))
     began = start + timedelta(seconds=grid.start) if start else None
     comment = "\n".join(source.comment for source in sources if source.comment)
     said = [finding for source in sources for finding in source.noticed]
@@ -127,68 +121,53 @@ def record(
 def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
     """Moments about points above or below hubs, brought to the hubs: (Mx - r Fy, My + r Fx) of a point r above."""
     for hub, lever in scene.levers.items():
-        own = {(s.quantity, s.component): s for s in signals if s.at == hub and not s.check}
-        for axis, other, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
-            moment, force = own.get(("moment", axis)), own.get(("force", other))
+        own = {(s.quantity, s.component): s.name for s in signals if s.at == hub and not s.check}
+        for axis, across, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
+            moment, force = own.get(("moment", axis)), own.get(("force", across))
             if moment is not None and force is not None:
-                values = columns.read(moment.name) + sign * lever * columns.read(force.name)
-                columns.put((moment.name,), 0, values[:, None])
-
-
-def _absurd(folder: Path) -> list[Finding]:
-    """What was absurd when the columns were written, in this run or in one that was killed."""
-    rows = json.loads((folder / ABSURD).read_text())
-    return [Finding(**{**row, "signals": tuple(row["signals"]), "times": tuple(row["times"])}) for row in rows]
+                values = columns.read(moment) + sign * lever * columns.read(force)
+                columns.put((moment,), 0, values[:, None])
 
 
 def _rule(scene: MeasuredScene, groups: list[Group], grid: Grid) -> Finding:
     """What was done to bring all onto one clock."""
     ways: dict[str, list[str]] = {}
     for group in groups:
-        own = f"{group.source.path.name} ({group.timing.rate:.6g} Hz)"
         faster = group.timing.period < grid.period * (1 - SAME)
         way = "as it is" if _even(group, grid) else "filtered without phase" if faster else "interpolated linearly"
-        ways.setdefault(way, []).append(own)
-    by = "the scene" if scene.clock.rate else "the wheel forces"
+        ways.setdefault(way, []).append(f"{group.source.path.name} ({group.timing.rate:.6g} Hz)")
+    by, rate = "the scene" if scene.clock.rate else "the wheel forces", 1 / grid.period
     told = "; ".join(f"{way}: {', '.join(dict.fromkeys(names))}" for way, names in ways.items())
-    return Finding(
-        "clock",
-        "note",
-        "recording",
-        f"The clock is that of {by}, {1 / grid.period:.6g} Hz, {grid.count} samples; {told}.",
-        1 / grid.period,
-        "Hz",
-    )
+    text = f"The clock is that of {by}, {rate:.6g} Hz, {grid.count} samples; {told}."
+    return Finding("clock", "note", "recording", text, rate, "Hz")
 
 
 def placed(scene: MeasuredScene, sources: Sequence[Source]) -> tuple[list[float], datetime | None, list[Finding]]:
     """What is added to each file's times (s), when the common time was 0, and what to say of it."""
-    starts = [source.start for source in sources]
     offsets = [file.offset for file in scene.files]
-    known = [start for start in starts if start is not None]
-    if len(known) == len(starts):
+    known = [source.start for source in sources if source.start is not None]
+    if len(known) == len(sources):
         first = min(known)
         return [(s - first).total_seconds() + o for s, o in zip(known, offsets, strict=True)], first, []
-    silent = ", ".join(source.path.name for source in sources if source.start is None)
-    weight: Weight = "doubt" if len(starts) > 1 else "note"
-    text = f"{silent}: no start time is given"
-    if len(starts) > 1:
+    several, unsaid = len(sources) > 1, ", ".join(source.path.name for source in sources if source.start is None)
+    text = f"{unsaid}: no start time is given"
+    if several:
         text += ": the zero of every file is taken as the same moment; set offset of [[files]] if it is not"
-    found = Finding("start", weight, silent, f"{text}.")
-    return offsets, known[0] if len(starts) == 1 and known else None, [found]
+    return offsets, None, [Finding("start", "doubt" if several else "note", unsaid, f"{text}.")]
 
 
 def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: float) -> Iterator[Group]:
     """Groups of a file of which any channel is mapped."""
     of = {channel.name: channel.group for channel in source.channels}
-    own = [signal for signal in signals if signal.file == source.path.name]
-    for number in dict.fromkeys(of[signal.channel] for signal in own):
-        mapped = tuple(signal for signal in own if of[signal.channel] == number)
-        times = np.concatenate([block.times for block in source.blocks([mapped[0].channel])])
-        where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {mapped[0].channel} ..."
-        found = timing(times, where, tuple(s.name for s in mapped[:1]))
-        slowed = replace(found, times=found.times / (1 + drift) + shift, period=found.period / (1 + drift))
-        yield Group(source, mapped, slowed, shift, drift)
+    mapped = dict[int, list[Signal]]()
+    for signal in (signal for signal in signals if signal.file == source.path.name):
+        mapped.setdefault(of[signal.channel], []).append(signal)
+    for first, *others in mapped.values():
+        times = np.concatenate([block.times for block in source.blocks([first.channel])])
+        where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {first.channel} ..."
+        own = timing(times, where, (first.name,))
+        slowed = replace(own, times=own.times / (1 + drift) + shift, period=own.period / (1 + drift))
+        yield Group(source, (first, *others), slowed)
 
 
 def _of_group(group: Group) -> Iterator[Finding]:
@@ -210,58 +189,44 @@ def _of_group(group: Group) -> Iterator[Finding]:
 
 
 def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
-    own = scene.clock
-    fastest = min(leading, key=lambda group: group.timing.period)
-    period = 1.0 / own.rate if own.rate else fastest.timing.period
-    if period < fastest.timing.period * (1 - SAME):
-        raise InputError(
-            scene.file,
-            "clock.rate",
-            own.rate,
-            f"is faster than the wheel forces, {fastest.timing.rate:g} Hz, which adds nothing",
-        )
-    first, last = max(g.timing.times[0] for g in leading), min(g.timing.times[-1] for g in leading)
+    """Times of the recording; InputError for a clock that the wheel forces do not bear out."""
+    own, file, timings = scene.clock, scene.file, [group.timing for group in leading]
+    fastest = min(timings, key=lambda timing: timing.period)
+    period = 1.0 / own.rate if own.rate else fastest.period
+    if period < fastest.period * (1 - SAME):
+        slower = f"is faster than the wheel forces, {fastest.rate:g} Hz, which adds nothing"
+        raise InputError(file, "clock.rate", own.rate, slower)
+    first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
     if first >= last:
         spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
-        raise InputError(scene.file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
-    times = fastest.timing.times
+        raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
+    times = fastest.times
     start = float(times[min(np.searchsorted(times, first + own.start - EVEN * period), len(times) - 1)])
     end = last if own.duration is None else min(last, start + own.duration)
     count = int(np.floor((end - start) / period + EVEN)) + 1
     if own.duration is not None and start + own.duration > last + period:
-        raise InputError(scene.file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
+        raise InputError(file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
     if count < LEAST:
-        raise InputError(
-            scene.file, "clock", None, f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
-        )
+        few = f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
+        raise InputError(file, "clock", None, few)
     return Grid(start, period, count)
 
 
 def _outside(scene: MeasuredScene, group: Group, grid: Grid) -> Iterator[Finding]:
     """Say, or refuse, that a group does not cover the recording."""
-    end = grid.start + grid.period * (grid.count - 1)
-    late, early = group.timing.times[0] - grid.start, end - group.timing.end
-    place = f"{group.source.path.name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
-    if late >= end - grid.start or early >= end - grid.start:
-        raise InputError(
-            scene.file,
-            "files",
-            None,
-            f"{place} lies wholly outside the wheel forces "
-            f"({grid.start:.6g} to {end:.6g} s): it runs from {group.timing.times[0]:.6g} to "
-            f"{group.timing.end:.6g} s; set offset",
+    begin, end, name = float(group.timing.times[0]), grid.start + grid.period * (grid.count - 1), group.source.path.name
+    late, early = begin - grid.start, end - group.timing.end
+    place = f"{name}: {', '.join(group.names[:3])}{', ...' if len(group.names) > 3 else ''}"
+    if max(late, early) >= end - grid.start:
+        text = (
+            f"{place} lies wholly outside the wheel forces ({grid.start:.6g} to {end:.6g} s): it runs from "
+            f"{begin:.6g} to {group.timing.end:.6g} s; set offset"
         )
+        raise InputError(scene.file, "files", None, text)
     missing = max(late, 0.0) + max(early, 0.0)
     if missing > 2 * max(grid.period, group.timing.period):
-        yield Finding(
-            "overlap",
-            "doubt",
-            group.source.path.name,
-            f"{place} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it.",
-            missing,
-            "s",
-            (group.signals[0].name,),
-        )
+        text = f"{place} covers the recording but for {missing:.4g} s at its ends, where nothing is known of it."
+        yield Finding("overlap", "doubt", name, text, missing, "s", (group.signals[0].name,))
 
 
 def _columns(
@@ -289,24 +254,26 @@ def _even(group: Group, grid: Grid) -> bool:
 
 def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
     """Samples that are on the clock already, block by block, with NaN between them; what of them is absurd."""
-    names, done = tuple(signal.name for signal in group.signals), 0
+    names, done, absurd = tuple(signal.name for signal in group.signals), 0, list[Finding]()
+
+    def put(last: int, at: np.ndarray, si: np.ndarray) -> None:
+        """Samples up to ``last``, those at these places as they are."""
+        for first in range(done, last, BLOCK):
+            here = (at >= first) & (at < min(first + BLOCK, last))
+            values = np.full((min(BLOCK, last - first), len(names)), np.nan)
+            values[at[here] - first] = si[here]
+            columns.put(names, first, values)
+
     for block in group.source.blocks(group.names):
         at = grid.places(group.timing.times[block.first : block.first + len(block.values)])
         inside = (at >= done) & (at < grid.count)
         if inside.any():
             last = int(at[inside][-1]) + 1
-            for first in range(done, last, BLOCK):
-                count = min(BLOCK, last - first)
-                here = inside & (at >= first) & (at < first + count)
-                values = np.full((count, len(names)), np.nan)
-                values[at[here] - first] = group.si(block.values[here])
-                columns.put(names, first, values)
+            put(last, at[inside], group.si(block.values[inside]))
             done = last
-    for first in range(done, grid.count, BLOCK):
-        columns.put(names, first, np.full((min(BLOCK, grid.count - first), len(names)), np.nan))
-    absurd = list[Finding]()
+    put(grid.count, np.empty(0, np.int64), np.empty((0, len(names))))
     for signal in group.signals:
-        values, finding = without_absurd(signal, columns.read(signal.name), grid.times() - grid.start)
+        values, finding = without_absurd(signal, columns.read(signal.name), grid.times - grid.start)
         if finding:
             columns.put((signal.name,), 0, values[:, None])
             absurd.append(finding)
@@ -316,17 +283,15 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Fi
 def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
     """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
     absurd."""
+    own, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
     raw = Columns(folder / RAW, group.names, count)
     for block in group.source.blocks(group.names):
         raw.put(group.names, block.first, group.si(block.values))
-    times, order, absurd = grid.times(), group.timing.order, list[Finding]()
     for signal in group.signals:
-        values = raw.read(signal.channel)
-        values, finding = without_absurd(
-            signal, values if order is None else values[order], group.timing.times - grid.start
-        )
+        values = raw.read(signal.channel)[slice(None) if own.order is None else own.order]
+        values, finding = without_absurd(signal, values, own.times - grid.start)
         absurd += [finding] if finding else []
-        columns.put((signal.name,), 0, onto(group.timing.times, values, group.timing.period, times)[:, None])
+        columns.put((signal.name,), 0, onto(own.times, values, own.period, grid.times)[:, None])
     raw.remove()
     return absurd

@@ -72,25 +72,29 @@ def consequences(
 ) -> tuple[Consequence, ...]:
     """One for every doubt; run : makes a run of a recording in a folder; answers : the section forces that count."""
     shutil.rmtree(folder, ignore_errors=True)
-    known, out = dict[int, Outcome](), list[Consequence]()
-    for number, finding in enumerate(_different(findings)):
+    known = dict[int, Outcome]()
+
+    def consequence(number: int, finding: Finding) -> Consequence:
         signals = [s for s in recording.signals if s.name in finding.signals]
         right = CORRECTIONS.get(finding.check)
         if right is None or not signals:
-            out.append(Consequence(finding))
-            continue
+            return Consequence(finding)
         first, count = _window(finding, recording)
         samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
-        changed = right(finding, signals, samples, recording.period)
+        corrected, begun, place = (
+            right(finding, signals, samples, recording.period),
+            folder / f"from {first}",
+            str(number),
+        )
         try:
             if first not in known:
-                known[first] = run(_stretch(recording, samples, folder / f"from {first}"), folder / f"from {first}")
-            other = run(_stretch(recording, samples | changed, folder / str(number)), folder / str(number))
+                known[first] = run(_stretch(recording, samples, begun), begun)
+            put_right = run(_stretch(recording, samples | corrected, folder / place), folder / place)
         except (InputError, RunFailed):
-            out.append(Consequence(finding))
-            continue
-        out.append(_worst(finding, known[first], other, answers))
-    return tuple(out)
+            return Consequence(finding)
+        return _worst(finding, known[first], put_right, answers)
+
+    return tuple(consequence(number, finding) for number, finding in enumerate(_different(findings)))
 
 
 def judged(verdict: Verdict, found: Sequence[Consequence]) -> Verdict:
@@ -154,13 +158,10 @@ def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequenc
 
 
 def _late(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    assert finding.size is not None
-    return {s: _read_at(samples[s], finding.size / period * np.ones(len(samples[s]))) for s in signals}
-
-
-def _drifted(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    assert finding.size is not None
-    return {s: _read_at(samples[s], finding.size * np.arange(len(samples[s]))) for s in signals}
+    """Read later by the delay, or by what a clock has drifted since the start."""
+    size, count = finding.size or 0.0, len(next(iter(samples.values())))
+    later = size * np.arange(count) if finding.check == "drift" else size / period * np.ones(count)
+    return {s: _read_at(samples[s], later) for s in signals}
 
 
 def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
@@ -171,36 +172,34 @@ def _read_at(values: np.ndarray, later: np.ndarray) -> np.ndarray:
     if np.count_nonzero(known) < 4:
         return values
     at = np.clip(places + later, 0, len(values) - 1)
-    found = np.asarray(make_interp_spline(places[known], values[known], k=3)(np.clip(at, *places[known][[0, -1]])))
+    spline = make_interp_spline(places[known], values[known], k=3)
     lost = np.interp(at, places, (~known).astype(float)) > 0
-    return np.where(lost, np.nan, found)
+    return np.where(lost, np.nan, spline(np.clip(at, *places[known][[0, -1]])))
 
 
 def _gained(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    assert finding.size is not None
-    factor = 1.0 + finding.size / 100 if finding.unit == "%" else finding.size
+    size = finding.size or 0.0
+    factor = 1.0 + size / 100 if finding.unit == "%" else size
     return {s: samples[s] / factor for s in signals}
 
 
 def _offset(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    assert finding.size is not None
-    return {s: samples[s] - finding.size for s in signals}
+    return {s: samples[s] - (finding.size or 0.0) for s in signals}
 
 
 def _referred(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    assert finding.size is not None
     force = {(s.at, s.component): s for s in samples if s.quantity == "force" and not s.check}
-    out = dict[Signal, np.ndarray]()
-    for s in signals:
-        other, sign = {"x": ("y", -1.0), "y": ("x", 1.0)}[s.component]
-        if (s.at, other) in force:
-            out[s] = samples[s] + sign * finding.size * samples[force[s.at, other]]
-    return out
+    across = {"x": ("y", -1.0), "y": ("x", 1.0)}
+    return {
+        s: samples[s] + sign * (finding.size or 0.0) * samples[force[s.at, axis]]
+        for s, (axis, sign) in ((s, across[s.component]) for s in signals)
+        if (s.at, axis) in force
+    }
 
 
 def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    one, other = signals
-    return {one: samples[other], other: samples[one]}
+    first, second = signals
+    return {first: samples[second], second: samples[first]}
 
 
 def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
@@ -227,7 +226,7 @@ def _bridged(finding: Finding, signals: Sequence[Signal], samples: Samples, peri
 
 CORRECTIONS: dict[str, Callable[[Finding, Sequence[Signal], Samples, float], Samples]] = {
     "shift": _late,
-    "drift": _drifted,
+    "drift": _late,
     "gain": _gained,
     "sign": _gained,
     "unit": _gained,

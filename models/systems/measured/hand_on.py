@@ -1,22 +1,29 @@
-"""Section forces into files for whoever goes on with them."""
+"""What is handed on of a run: section forces in files for whoever goes on with them, and the labelled result."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from models.core.result import Channel, Result, result
+from models.drift.score import rms
+from models.fatigue.counting import Counted
 from models.measured.channel import BLOCK
 from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.systems.measured.section_run import Outcome
 from models.systems.measured.sections import Answer
 
-NAME = "section_forces"
+FILES = "section_forces"
+"""Name of the files that are handed on, before their extensions."""
+FIGURES = ("least", "greatest", "mean")
 
 
 def hand_on(
-    run: Outcome,
+    outcome: Outcome,
     folder: Path,
     formats: Iterable[str],
     answers: Sequence[Answer] | None = None,
@@ -28,8 +35,22 @@ def hand_on(
     Names, units and comments (axes and signs) go along, block by block. Returns the paths; raises InputError where a
     file exists or a format has no room for a name.
     """
-    asked = forces(run.answers) if answers is None else tuple(answers)
-    return [write(folder / f"{NAME}.{extension}", [group(run, asked)], start, comment) for extension in formats]
+    answers = forces(outcome.answers) if answers is None else answers
+    names, units, comments = (tuple(getattr(a, key) for a in answers) for key in ("name", "unit", "comment"))
+
+    def blocks() -> Iterator[np.ndarray]:
+        for first in range(0, outcome.done, BLOCK):
+            yield outcome.columns.block(names, first, min(BLOCK, outcome.done - first))
+
+    return [
+        write(
+            folder / f"{FILES}.{form}",
+            [Group(names, units, comments, outcome.period, outcome.done, blocks())],
+            start,
+            comment,
+        )
+        for form in formats
+    ]
 
 
 def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
@@ -37,19 +58,32 @@ def forces(answers: Iterable[Answer]) -> tuple[Answer, ...]:
     return tuple(answer for answer in answers if answer.section and answer.unit in ("N", "N m"))
 
 
-def group(run: Outcome, answers: Sequence[Answer]) -> Group:
-    """Answers of a run as channels of one clock."""
-    return Group(
-        tuple(answer.name for answer in answers),
-        tuple(answer.unit for answer in answers),
-        tuple(answer.comment for answer in answers),
-        run.period,
-        run.done,
-        _blocks(run, answers),
-    )
+def labelled(
+    scene: Any, outcome: Outcome | None, counted: Mapping[Answer, Counted], folder: Path, **more: Any
+) -> Result:
+    """The result of a run, whose columns lie in ``folder``; where there is none, what is said of it alone.
 
-
-def _blocks(run: Outcome, answers: Sequence[Answer]) -> Iterator[np.ndarray]:
-    names = tuple(answer.name for answer in answers)
-    for first in range(0, run.done, BLOCK):
-        yield run.columns.block(names, first, min(BLOCK, run.done - first))
+    It has the answers over time, where they are no more than a block, and figures of the section forces that were
+    counted; ``more`` as of ``models.core.result.result``.
+    """
+    channels, axes = dict[str, Channel](), dict[str, Channel]()
+    if outcome is not None:
+        more["columns"] = str(outcome.columns.path.relative_to(folder))
+        more["columns_of"] = json.dumps([answer.name for answer in outcome.answers])
+        if outcome.done <= BLOCK:
+            axes["time"] = Channel("time", outcome.period * np.arange(outcome.done), "s", "time")
+            for answer in outcome.answers:
+                name = answer.name.replace("/", "|")  # which would be a group of the file
+                channels[name] = Channel("time", outcome.samples(answer), answer.unit, answer.comment)
+    if outcome is not None and counted:
+        unit, damage = "that of the section force", [list(own.damage.values()) for own in counted.values()]
+        slopes = list(next(iter(counted.values())).damage)
+        axes["section_force"] = Channel("section_force", [answer.name for answer in counted])
+        axes["slope"] = Channel("slope", slopes, "1", "Woehler exponent")
+        figures = {name: [getattr(own, name) for own in counted.values()] for name in FIGURES}
+        figures["rms"] = [rms(outcome.samples(answer)) for answer in counted]
+        channels |= {name: Channel("section_force", values, "", unit) for name, values in figures.items()}
+        channels["unit"] = Channel("section_force", [answer.unit for answer in counted])
+        meaning = f"pseudo-damage: {unit}, to the slope"
+        channels["damage"] = Channel(("section_force", "slope"), np.array(damage), "", meaning)
+    return result(scene, channels, axes, counts=outcome.counts if outcome else {}, **more)

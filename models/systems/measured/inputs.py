@@ -9,6 +9,7 @@ bridged, too.
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
@@ -17,19 +18,13 @@ from models.core.finding import Finding
 from models.core.piecewise import interpolate
 from models.core.signals import Smooth
 from models.core.smoothing import smoothed
-from models.measured.gaps import BRIDGED, filled
+from models.measured.gaps import bridged
 from models.measured.recording import Recording
-from models.measured.signal import UNITS, Quantity, Signal
+from models.measured.signal import HUB, Signal
 from models.multibody.cut_kernel import FRAMES, WRENCH
 from models.vehicles.cut_vehicle import CutVehicle
 
-COMPONENTS: tuple[tuple[Quantity, str], ...] = tuple((q, axis) for q in ("force", "moment") for axis in "xyz")
-ANGLES: tuple[tuple[Quantity, str], ...] = (
-    ("angle", "roll"),
-    ("angle", "pitch"),
-    ("angular rate", "roll"),
-    ("angular rate", "pitch"),
-)
+ANGLES = tuple(product(("angle", "angular rate"), ("roll", "pitch")))
 WINDOW, OVERLAP = 4096, 96
 """Answers in a stretch whose spline is made at once, and samples beside it: what is farther has weights below 1e-30."""
 
@@ -63,12 +58,8 @@ class Grid:
         """InputError unless step and period are multiples of one another."""
         ratio = max(self.step / self.period, self.period / self.step)
         if abs(ratio - round(ratio)) > 1e-9 * ratio:
-            raise InputError(
-                file,
-                "run.step",
-                self.step,
-                f"must be a part or a multiple of the recording's period of {self.period:g} s",
-            )
+            fitting = f"must be a part or a multiple of the recording's period of {self.period:g} s"
+            raise InputError(file, "run.step", self.step, fitting)
 
     def rows(self, samples: np.ndarray, count: int) -> np.ndarray:
         """Rows at half steps 0 .. count - 1 after the first of ``samples`` (n, columns), on straight lines."""
@@ -93,30 +84,27 @@ class Grid:
         return place // denominator, (place % denominator) / denominator
 
 
-@dataclass(frozen=True)
-class Bridge:
-    """What stands for the lost samples ``first`` and following."""
-
-    first: int
-    values: np.ndarray
-
-
 class Inputs:
     """Hub forces and angles of a recording, those that are not named as checks."""
 
     def __init__(self, recording: Recording, vehicle: CutVehicle, enforced: bool = False) -> None:
         """``enforced`` : whether angles are bridged, too. InputError for forces that are missing or have long gaps."""
         self.recording, self.vehicle, self.findings = recording, vehicle, list[Finding]()
-        used = [signal for signal in recording.signals if not signal.check]
-        self.hubs = [_found(used, *what, hub) for hub in vehicle.hubs for what in COMPONENTS]
-        self.angles = [_found(used, *what, vehicle.chassis) for what in ANGLES]
-        self.yaw = _found(used, "angular rate", "yaw", vehicle.chassis)
-        self._check()
-        self._gaps = {
-            signal: self._gaps_of(signal)
-            for signal in [*self.hubs, *(self.angles[:2] if enforced else [])]
-            if signal is not None
+        used: dict[tuple[str, str, str], Signal] = {
+            (s.quantity, s.component, s.at): s for s in reversed(recording.signals) if not s.check
         }
+        self.hubs = [used.get((what, axis, hub)) for hub in vehicle.hubs for _, what, axis, _ in HUB]
+        self.angles = [used.get((what, axis, vehicle.chassis)) for what, axis in ANGLES]
+        self.yaw = used.get(("angular rate", "yaw", vehicle.chassis))
+        self._check()
+        self._bridges = dict[Signal, tuple[np.ndarray, np.ndarray]]()
+        for signal in (*self.hubs, *(self.angles[:2] if enforced else [])):
+            if signal is not None:
+                values, gaps, findings = bridged(recording, signal)
+                self.findings += findings
+                if gaps:
+                    lost = np.concatenate([np.arange(gap.first, gap.end) for gap in gaps])
+                    self._bridges[signal] = lost, values[lost]
 
     @property
     def frame(self) -> str:
@@ -140,90 +128,40 @@ class Inputs:
 
     def tilt(self, first: int, count: int) -> np.ndarray:
         """Roll, pitch and their rates (n, 4), NaN where not measured; rates of gyros become those of the angles."""
-        found = self._block(self.angles, first, count, np.nan)
-        gyros = [signal for signal in self.angles[2:] if signal is not None and signal.frame != "inertial"]
-        if gyros:
-            yaw = self._block([self.yaw], first, count, 0.0)[:, 0]
-            roll, pitch = np.nan_to_num(found[:, :2]).T
-            p, q, r = np.nan_to_num(found[:, 2]), np.nan_to_num(found[:, 3]), np.nan_to_num(yaw)
-            known = np.isfinite(found[:, 2:])
+        tilt = self._block(self.angles, first, count, np.nan)
+        if any(signal is not None and signal.frame != "inertial" for signal in self.angles[2:]):
+            known = np.isfinite(tilt[:, 2:])
+            roll, pitch, p, q = np.nan_to_num(tilt).T
+            r = np.nan_to_num(self._block([self.yaw], first, count, 0.0)[:, 0])
             rates = np.column_stack(
                 [p + (q * np.sin(roll) + r * np.cos(roll)) * np.tan(pitch), q * np.cos(roll) - r * np.sin(roll)]
             )
-            found[:, 2:] = np.where(known, rates, np.nan)
-        return found
+            tilt[:, 2:] = np.where(known, rates, np.nan)
+        return tilt
 
     def _block(self, signals: list[Signal | None], first: int, count: int, missing: float) -> np.ndarray:
         out = np.full((min(count, self.recording.count - first), len(signals)), missing)
         for i, signal in enumerate(signals):
             if signal is not None:
                 out[:, i] = self.recording.columns.read(signal.name, first, count)
-                for gap in self._gaps.get(signal, ()):
-                    at = np.arange(max(gap.first, first), min(gap.first + len(gap.values), first + len(out)))
-                    out[at - first, i] = gap.values[at - gap.first]
+                if signal in self._bridges:
+                    lost, values = self._bridges[signal]
+                    inside = (lost >= first) & (lost < first + len(out))
+                    out[lost[inside] - first, i] = values[inside]
         return out
 
     def _check(self) -> None:
-        for i, hub in enumerate(self.vehicle.hubs):
-            own = self.hubs[WRENCH * i : WRENCH * i + WRENCH]
-            if own[2] is None:
+        for hub, signals in zip(self.vehicle.hubs, zip(*[iter(self.hubs)] * WRENCH, strict=True), strict=True):
+            if signals[2] is None:
                 raise InputError("", "files.channels", None, f"no vertical force is put in at the hub {hub!r}")
-            without = [
-                axis for signal, axis in zip(own, ("Fx", "Fy", "Fz", "Mx", "My", "Mz"), strict=True) if signal is None
-            ]
+            without = [name for signal, (name, *_) in zip(signals, HUB, strict=True) if signal is None]
             if without:
-                self.findings.append(
-                    Finding(
-                        "components",
-                        "doubt",
-                        hub,
-                        f"{', '.join(without)} of the hub {hub} were not measured and are taken as 0.",
-                    )
-                )
+                text = f"{', '.join(without)} of the hub {hub} were not measured and are taken as 0."
+                self.findings.append(Finding("components", "doubt", hub, text))
         frames = {signal.frame for signal in self.hubs if signal is not None}
         if len(frames) > 1 or not frames <= set(FRAMES):
-            raise InputError(
-                "",
-                "files.channels",
-                None,
-                f"hub forces must all be in one frame of {', '.join(FRAMES)}: these are in {', '.join(sorted(frames))}",
-            )
-
-    def _gaps_of(self, signal: Signal) -> tuple[Bridge, ...]:
-        """Gaps of a signal; InputError where one is too long to be bridged."""
-        values, found = filled(self.recording.samples(signal), period := self.recording.period, BRIDGED)
-        if not found:
-            return ()
-        for gap in (gap for gap in found if np.isnan(gap.doubt)):
-            raise InputError(
-                signal.file,
-                signal.channel,
-                None,
-                f"is silent from {gap.first * period:.6g} s to "
-                f"{gap.end * period:.6g} s: gaps of at most {BRIDGED:g} s are bridged; take a stretch "
-                "without this one (clock.start, clock.duration)",
-            )
-        longest = max(gap.end - gap.first for gap in found) * period
-        worst = max(found, key=lambda gap: gap.doubt)
-        self.findings.append(
-            Finding(
-                "gaps",
-                "doubt",
-                signal.name,
-                f"{signal.name} is silent {len(found)} times, for at most {longest:.3g} s: "
-                f"bridged by what the channel itself makes most likely, with a standard deviation of {worst.doubt:.3g} "
-                f"{UNITS[signal.quantity]} at {worst.first * period:.6g} s, the largest.",
-                longest,
-                "s",
-                (signal.name,),
-                (found[0].first * period, found[-1].end * period),
-            )
-        )
-        return tuple(Bridge(gap.first, values[gap.first : gap.end]) for gap in found)
-
-
-def _found(signals: list[Signal], what: Quantity, component: str, at: str) -> Signal | None:
-    return next((s for s in signals if (s.quantity, s.component, s.at) == (what, component, at)), None)
+            text = f"hub forces must all be in one frame of {', '.join(FRAMES)}: these are in"
+            raise InputError("", "files.channels", None, f"{text} {', '.join(sorted(frames))}")
 
 
 class Prescribed:
@@ -235,28 +173,20 @@ class Prescribed:
         if not np.isfinite(whole).all():
             raise InputError(file, "stabilise.method", "prescribed", "needs roll and pitch, measured throughout")
         self.angles, self.grid = smoothed(whole, grid.period, bandwidth, file, "stabilise.smoothing"), grid
+        self._length = WINDOW * grid.skip
+        self._per = int(self._length / grid.part)
 
     def rows(self, first: int, count: int) -> np.ndarray:
         """Roll, pitch, their rates and accelerations (count, 6) at half steps after sample ``first``."""
-        part = self.grid.part
-        begin = int(first / part)
-        per = int(self._length / part)
-        out, done = np.empty((count, 6)), 0
+        begin, out, done, period = int(first / self.grid.part), np.empty((count, 6)), 0, self.grid.period
         while done < count:
-            window, offset = divmod(begin + done, per)
-            taken = min(per - offset, count - done)
-            out[done : done + taken] = self._window(window, per)[offset : offset + taken]
+            window, offset = divmod(begin + done, self._per)
+            taken = min(self._per - offset, count - done)
+            stretch = window * self._length
+            start = max(stretch - OVERLAP, 0)
+            samples = self.angles[start : stretch + self._length + OVERLAP + 1]
+            spline = Smooth(samples, period, derivatives=2, degree=5)
+            rows = spline.sample((stretch - start) * period, self.grid.step / 2, self._per)
+            out[done : done + taken] = rows[offset : offset + taken]
             done += taken
         return out
-
-    def _window(self, window: int, per: int) -> np.ndarray:
-        """Rows of one stretch."""
-        first, last = window * self._length, (window + 1) * self._length
-        start = max(first - OVERLAP, 0)
-        spline = Smooth(self.angles[start : last + OVERLAP + 1], self.grid.period, derivatives=2, degree=5)
-        return spline.sample((first - start) * self.grid.period, self.grid.step / 2, per)
-
-    @property
-    def _length(self) -> int:
-        """Samples of a stretch."""
-        return WINDOW * self.grid.skip

@@ -1,16 +1,138 @@
-"""What is in a measurement file: its channels, and a scene to begin with."""
+"""What is in a measurement file: its channels, and a scene to begin with, for an engineer to correct.
 
+What a channel probably measures is read from its name and unit, in English and German, as FL_Fx, WFT_RR_MZ, Radkraft
+vorne links, ax_dash or Nickrate are written.
+"""
+
+import json
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from models.core.finding import gathered
-from models.measured.channel import BLOCK, Source
+from models.measured.channel import BLOCK, Channel, Source
 from models.measured.formats import open_source
-from models.systems.measured.guess import scene_text
+from models.measured.signal import UNITS, Quantity
+from models.measured.units import quantities
 
 LOOKED_AT = 20
 """Blocks of a group whose values are read for the range: all of a file of twenty minutes at 1 kHz."""
+SCENE = """\
+title = "{title}"
+system = "measured"
+study = "recording"
+
+[vehicle]
+file = "r19_free"                # or a file of your own, whose tyres are then the hubs below
+chassis = "body"
+
+[[files]]
+file = "{file}"
+channels = ["""
+CORNERS = {
+    "fl": r"fl|lf|vl|lv|front ?left|left ?front|vorne? ?links|links ?vorne?",
+    "fr": r"fr|rf|vr|rv|front ?right|right ?front|vorne? ?rechts|rechts ?vorne?",
+    "rl": r"rl|lr|hl|lh|rear ?left|left ?rear|hinten ?links|links ?hinten",
+    "rr": r"rr|hr|rh|rear ?right|right ?rear|hinten ?rechts|rechts ?hinten",
+}
+"""Hub of r19_free -> what it is called in names."""
+SPRINGS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+"""Hub -> spring of r19_free."""
+WORDS: dict[Quantity, str] = {
+    "force": r"f[xyz]|force|rad(last|kraft)|kraft|load",
+    "moment": r"m[xyz]|moment|torque|drehmoment",
+    "acceleration": r"a[xyz]|acc|accel(eration)?|beschl(eunigung)?",
+    "angular rate": r"(roll|pitch|yaw|nick|wank|gier) ?(rate|vel)|(nick|wank|gier)(rate|geschwindigkeit)|gyro|w[xyz]",
+    "angle": r"roll|pitch|yaw|heading|nick(winkel)?|wank(winkel)?|gier(winkel)?",
+    "travel": r"travel|federweg|weg|defl(ection)?|disp(lacement)?",
+    "strain": r"strain|dms|sg|eps",
+}
+AXES = {
+    "x": r"[fmaw]?x|long(itudinal)?|längs",
+    "y": r"[fmaw]?y|lat(eral)?|quer",
+    "z": r"[fmaw]?z|vert(ical)?|hoch|vertikal",
+}
+PARTS = (
+    r"strut|damper|shock|absorber|spring|coil ?over|feder|d(ä|ae|a)mpf|sto(ß|ss)d|bellow|balg|top ?mount|domlager|"
+    r"bump ?stop|puffer|tie ?rod|track ?rod|push ?rod|pull ?rod|spurstange|druckstrebe|lenker|\barm\b|wishbone|"
+    r"\blink\b|stange|(roll|sway|torsion) ?bar|stabi|bush|buchse|ball ?joint|gelenk|sub ?frame|hilfsrahmen|"
+    r"lagerung|mount\b|\b(shk|spr|dmp|dmpr|damp|arb|coil|mcpherson|leaf)\b"
+)
+"""Parts of a suspension in names, whose forces are not those of a hub."""
+WHEEL = r"(mess)?rad(last|kraft)?|wheel(force|load)?|wft|rmr|hub|spindle|naben?(kraft)?|tyre|tire|reifen"
+"""A wheel in names."""
+PLAIN = r"f|fw|vert(ical)?|dyn(amic)?|stat(ic)?|total|sum|gesamt|measured|meas|gemessen|signal|ch|chan|channel|kanal"
+"""Words that say nothing of where a force is."""
+TURNS = {"roll": r"roll.*|wank.*|w?x", "pitch": r"pitch.*|nick.*|w?y", "yaw": r"yaw.*|gier.*|heading|w?z"}
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Of one channel; ``unit`` is empty where the file's own will do, ``doubt`` is a word on what is not sure.
+
+    ``at`` is empty where no place can be named. ``left_out`` says why the guess is not to be used as it stands.
+    """
+
+    channel: str
+    quantity: Quantity
+    at: str
+    component: str
+    unit: str
+    doubt: str
+    left_out: str = ""
+
+
+def guess(channel: Channel) -> Guess | None:
+    """None where nothing can be made of a channel; what is missing in a guess is empty."""
+    words, family = _words(channel.name), _words(channel.family)
+    kinds = quantities(channel.unit) or tuple(WORDS)
+    what = next((kind for kind in kinds if _has(WORDS[kind], words)), kinds[0] if len(kinds) == 1 else None)
+    if what is None:
+        return None
+    corner = next((hub for text in (words, family) for hub, names in CORNERS.items() if _has(names, text)), "")
+    axes = TURNS if what in ("angular rate", "angle") else AXES if what in ("force", "moment", "acceleration") else {}
+    component = next((axis for axis, names in axes.items() if _has(names, words)), "")
+    unit = "" if channel.unit.strip() or what == "strain" else UNITS[what]
+    doubts, left_out = [f"the file names no unit: is it {unit}?"] if unit else [], ""
+    part = _part(words, family) if what in ("force", "moment") else ""
+    if part:
+        left_out = (
+            f"left out: of a part of the suspension ({part}), not of a hub; at a connector it can be compared with"
+        )
+        return Guess(channel.name, what, "", "", unit, " ".join(doubts), left_out)
+    if what == "force" and corner and not component:
+        component, strange = "z", _strange(words)
+        doubts.append("vertical?")
+        left_out = f"left out: is {strange!r} at the hub?" if strange else ""
+    if what == "acceleration":
+        doubts.append("where? name the place under [sensors]")
+    places = {"force": corner, "moment": corner, "travel": SPRINGS.get(corner, ""), "strain": channel.name}
+    at = places.get(what, "" if what == "acceleration" else "body")
+    return Guess(channel.name, what, at, component, unit, " ".join(doubts), left_out)
+
+
+def _words(name: str) -> str:
+    """Words of a name in small letters, parted by spaces."""
+    return " ".join(re.findall(r"[a-zäöüß]+", re.sub(r"([a-zäöüß])([A-Z])", r"\1 \2", name).lower()))
+
+
+def _part(*texts: str) -> str:
+    """Words of a name, or of its group's, that name a part of a suspension; empty where none does."""
+    matches = (re.search(rf"[^ ]*({PARTS})[^ ]*", text) for text in texts)
+    return next((match.group() for match in matches if match), "")
+
+
+def _strange(words: str) -> str:
+    """First word of a force's name that is neither a corner, a force, a wheel nor one that says nothing."""
+    for known in (*CORNERS.values(), WORDS["force"], WHEEL, PLAIN):
+        words = re.sub(rf"(?<![^ ])(?:{known})(?![^ ])", "", words)
+    return next((word for word in words.split() if len(word) > 1), "")
+
+
+def _has(names: str, words: str) -> bool:
+    return re.search(rf"(?:^| )(?:{names})(?: |$)", words) is not None
 
 
 def describe(path: Path) -> str:
@@ -30,17 +152,14 @@ def describe(path: Path) -> str:
         f"{'most':>11}",
         f"  {'':<{width}} {'':<9}{'[Hz]':>10} {'':>10} {'[s]':>9} {'[s]':>9}",
     ]
-    ranges = {name: text for group in _groups(source) for name, text in _ranges(source, group).items()}
+    groups = dict[int, list[str]]()
+    for channel in source.channels:
+        groups.setdefault(channel.group, []).append(channel.name)
+    ranges = {name: text for names in groups.values() for name, text in _ranges(source, names).items()}
     lines += [f"  {c.name:<{width}} {c.unit:<9}{ranges[c.name]}" for c in source.channels]
     lines += [f"  {finding.weight}: {finding.text}" for finding in gathered(source.noticed)]
     lines += ["", "A scene to begin with, its map guessed from names and units; check every line."]
     return "\n".join([*(f"# {line}".rstrip() for line in lines), "", scene_text(source)])
-
-
-def _groups(source: Source) -> list[list[str]]:
-    """Names of the channels of each group."""
-    groups = dict.fromkeys(channel.group for channel in source.channels)
-    return [[c.name for c in source.channels if c.group == group] for group in groups]
 
 
 def _ranges(source: Source, names: list[str]) -> dict[str, str]:
@@ -50,7 +169,9 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
     blocks = [next(source.blocks(names, BLOCK, first)) for first in firsts]
     if not blocks:
         return dict.fromkeys(names, f"{'':>10} {0:>10}")
-    rate = _rate(np.concatenate([np.diff(block.times) for block in blocks]))
+    steps = np.concatenate([np.diff(block.times) for block in blocks])
+    step, mean = (float(fun(steps)) if len(steps) else 0.0 for fun in (np.median, np.mean))  # rounded times repeat
+    rate = f"{1.0 / step:.6g}" if step > 0 else f"~{1.0 / mean:.4g}" if mean > 0 else "none"
     low, high = (
         fun([fun(block.values, axis=0, initial=start, where=np.isfinite(block.values)) for block in blocks], axis=0)
         for fun, start in ((np.min, np.inf), (np.max, -np.inf))
@@ -59,9 +180,30 @@ def _ranges(source: Source, names: list[str]) -> dict[str, str]:
     return {name: f"{head} {a:>11.5g} {b:>11.5g}" for name, a, b in zip(names, low, high, strict=True)}
 
 
-def _rate(steps: np.ndarray) -> str:
-    """Samples per second by the steps (s) between them, their mean where rounded times repeat; none of one sample."""
-    step = float(np.median(steps)) if len(steps) else 0.0
-    if step > 0:
-        return f"{1.0 / step:.6g}"
-    return f"~{1.0 / steps.mean():.4g}" if len(steps) and steps.mean() > 0 else "none"
+def scene_text(source: Source) -> str:
+    """A scene for this file, as TOML, with what was guessed, and as comments what was not."""
+    rows = [_row(channel.name, guess(channel)) for channel in source.channels]
+    return "\n".join([SCENE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
+
+
+def _row(name: str, own: Guess | None) -> str:
+    """An entry of the map, as a comment where anything is missing."""
+    if own is None:
+        return f"  # {{ channel = {_quoted(name)} }},  # not known"
+    free = own.quantity in ("travel", "strain") or bool(own.left_out and not own.at)
+    entries = {
+        "channel": name,
+        "quantity": own.quantity,
+        "at": own.at or "?",
+        "component": own.component or ("" if free else "?"),
+        "unit": own.unit,
+    }
+    text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
+    told = " ".join(word for word in (own.doubt, own.left_out) if word)
+    unsure = own.left_out or "?" in entries.values()
+    return f"  {'# ' if unsure else ''}{{ {text} }},{f'  # {told}' if told else ''}"
+
+
+def _quoted(text: str) -> str:
+    """A TOML string."""
+    return json.dumps(text, ensure_ascii=False)

@@ -21,11 +21,11 @@ from models.drift import score
 from models.drift.score import Limits, Verdict
 from models.drift.section_forces import section_forces
 from models.measured import axle_forces
-from models.measured.axle_forces import AXLES, axle_signals, axles
+from models.measured.axle_balance import AXLES, axle_signals, axles
 from models.measured.columns import Columns
-from models.measured.gaps import BRIDGED, filled
+from models.measured.gaps import bridged
 from models.measured.recording import Recording
-from models.measured.signal import Signal
+from models.measured.signal import Quantity, Signal
 from models.systems.measured.section_run import Hold, Outcome
 from models.systems.measured.sections import Answer
 from models.systems.pitch_plane import trust as drift_trust
@@ -98,59 +98,49 @@ def _beside_pitch(job: PlaneJob, result: Result, limits: Limits, verdict: Verdic
     Where forces turn with the vehicle nothing grows, but offsets and forces of another frame drive it off all the same,
     and its forces along the vehicle are as wrong as its pitch: there a measured pitch must bear the run out.
     """
-    found = job.recording.find("angle", CHASSIS, "pitch")
-    if not found:
-        turns = any(signal.frame != "inertial" for axle in AXLES for signal in axle_signals(job.recording, axle))
-        return Verdict("stabilise", UNSEEN) if turns else verdict
-    measured = job.recording.samples(found[0])
+    angles = job.recording.find("angle", CHASSIS, "pitch")
+    if not angles:
+        return Verdict("stabilise", UNSEEN) if _frames(job) != {"inertial"} else verdict
+    measured = job.recording.samples(angles[0])
     known = np.flatnonzero(np.isfinite(measured))
     beside = np.interp(result.times, job.recording.period * known, measured[known])
     off = float(np.abs(score.low_pass(result["pitch"] + beside, float(result.times[1]))).max())
     if off <= limits.pitch_error:
         return verdict
-    return Verdict(
-        "stabilise",
-        f"free, and its pitch is up to {off:.2g} rad off the measured one "
-        f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets",
-    )
+    limit = f"(at most {limits.pitch_error:g}): check the frame of the forces and their offsets"
+    return Verdict("stabilise", f"free, and its pitch is up to {off:.2g} rad off the measured one {limit}")
+
+
+def _frames(job: PlaneJob) -> set[str]:
+    """Of the forces at both axles."""
+    return {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
 
 
 def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
     """The scene of the pitch plane, its files in the folder, and what was bridged."""
-    period, said = job.recording.period, list[Finding]()
+    period, said, frames = job.recording.period, list[Finding](), _frames(job)
     forces = {axle: ("N", _axle(job, axle, said)) for axle in AXLES}
     write_time_series(folder / "wheel_forces.csv", forces, period)
-    frames = {signal.frame for axle in AXLES for signal in axle_signals(job.recording, axle)}
-    if len(frames & {"inertial"}) != len(frames) and "inertial" in frames:
-        raise InputError(
-            job.file,
-            "files.channels",
-            None,
-            "vertical forces must all keep their direction in space, or all turn with the vehicle",
-        )
+    if "inertial" in frames and len(frames) > 1:
+        text = "vertical forces must all keep their direction in space, or all turn with the vehicle"
+        raise InputError(job.file, "files.channels", None, text)
     fixed = frames == {"inertial"} or job.hold.method == "prescribed"  # an enforced pitch does not feel the frame
-    effects: dict[str, Any] = {
-        "wheel_forces": {
-            "file": "wheel_forces.csv",
-            "interpolation": "smooth",
-            "frame": "inertial" if fixed else "body",
-            "accept": list(axle_forces.CHECKS),
-        }
-    }
+    driving = {"file": "wheel_forces.csv", "interpolation": "smooth", "accept": list(axle_forces.CHECKS)}
+    effects: dict[str, Any] = {"wheel_forces": driving | {"frame": "inertial" if fixed else "body"}}
     if job.effect:
         effects[job.effect] = _held(job, folder, said)
     step = job.step or period / math.ceil(period / STEP * (1 - 1e-9))
-    scene = build(
-        {
-            "title": "recording",
-            "vehicle": {"parameters": job.parameters},
-            "effects": effects,
-            "run": {"duration": job.recording.duration, "step": step},
-        },
-        job.file,
-        folder,
-    )
-    _check_axles(job, scene)
+    table = {
+        "title": "recording",
+        "vehicle": {"parameters": job.parameters},
+        "effects": effects,
+        "run": {"duration": job.recording.duration, "step": step},
+    }
+    scene = build(table, job.file, folder)
+    own = axles(job.recording, scene.vehicle_parameters())
+    errors = [each.text for each in axle_forces.check(own) if each.weight == "error"] if own else []
+    if errors:  # doubts are told by the checks of the recording
+        raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
     return scene, tuple(said)
 
 
@@ -166,93 +156,59 @@ def trusted(scene: Scene, deviation: float) -> Trust | None:
 
 
 def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:
+    """Vertical force (n,) of an axle, short gaps bridged; InputError for a long one, or a wheel that is missing."""
     signals = axle_signals(job.recording, axle)
     if len(signals) != (1 if signals and signals[0].at == axle else 2):
-        raise InputError(
-            job.file,
-            "files.channels",
-            None,
-            f"the vertical force is needed at {AXLES[axle][0]!r}, or at both {AXLES[axle][1]!r} and {AXLES[axle][2]!r}",
-        )
+        whole, left, right = map(repr, AXLES[axle])
+        text = f"the vertical force is needed at {whole}, or at both {left} and {right}"
+        raise InputError(job.file, "files.channels", None, text)
     return np.asarray(sum(_whole(job, signal, said) for signal in signals))
 
 
 def _whole(job: PlaneJob, signal: Signal, said: list[Finding]) -> np.ndarray:
-    """Samples of a signal, short gaps bridged; InputError for a long one."""
-    values, gaps = filled(job.recording.samples(signal), period := job.recording.period, BRIDGED)
-    if not np.isfinite(values).all():
-        raise InputError(
-            signal.file,
-            signal.channel,
-            None,
-            f"has a gap of more than {BRIDGED:g} s: take a stretch without it (clock.start, clock.duration)",
-        )
-    if gaps:
-        longest = max(gap.end - gap.first for gap in gaps) * period
-        said.append(
-            Finding(
-                "gaps",
-                "doubt",
-                signal.name,
-                f"{signal.name} is silent {len(gaps)} times, for at most {longest:.3g} s: bridged.",
-                longest,
-                "s",
-                (signal.name,),
-            )
-        )
+    values, _, findings = bridged(job.recording, signal)
+    said += findings
     return values
 
 
 def _held(job: PlaneJob, folder: Path, said: list[Finding]) -> dict[str, Any]:
     """The effect's table, and its file of pitch and rate, nose up."""
-    hold, columns, deviations = job.hold, dict[str, tuple[str, np.ndarray]](), dict[str, float]()
+    hold, filtered = job.hold, job.hold.method == "kalman"
+    columns, deviations = dict[str, tuple[str, np.ndarray]](), dict[str, float]()
     known = (
         ("angle", "pitch", "rad", "pitch_deviation", hold.angle),
         ("angular rate", "pitch_rate", "rad/s", "rate_deviation", hold.rate),
     )
-    for quantity, name, unit, key, deviation in known:
-        found = [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check]
-        if found and (job.hold.method == "kalman" or quantity == "angle"):
-            own = job.recording.samples(found[0]) if hold.method == "kalman" else _whole(job, found[0], said)
-            columns[name], deviations[key] = (unit, -own), deviation
+    for quantity, name, unit, key, deviation in known if filtered else known[:1]:
+        for signal in [s for s in job.recording.find(quantity, CHASSIS, "pitch") if not s.check][:1]:
+            values = job.recording.samples(signal) if filtered else _whole(job, signal, said)
+            columns[name], deviations[key] = (unit, -values), deviation
     if "pitch" not in columns:
         raise InputError(job.file, "stabilise.method", hold.method, f"needs the angle 'pitch' of {CHASSIS!r}")
     write_time_series(folder / "pitch.csv", columns, job.recording.period)
-    if hold.method == "prescribed":
+    if not filtered:
         return {"file": "pitch.csv", "bandwidth": hold.smoothing}
     noise = hold.force * math.sqrt(max(len(axle_signals(job.recording, axle)) for axle in AXLES))
     return {"file": "pitch.csv", "force_deviation": noise, "start_deviation": hold.angle, **deviations}
 
 
-def _check_axles(job: PlaneJob, scene: Scene) -> None:
-    """Refuse forces that cannot be this vehicle's; doubts are told by the checks of the recording."""
-    own = axles(job.recording, scene.vehicle_parameters())
-    errors = [each.text for each in axle_forces.check(own) if each.weight == "error"] if own else []
-    if errors:
-        raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
-
-
 def _outcome(result: Result, said: tuple[Finding, ...], folder: Path) -> Outcome:
     """Body-frame section forces and pitch as answers, x forward, z up, nose down positive as in every recording."""
     forces = section_forces(result["f3"], result["f4"], result["pitch"])
-    found = {
-        Answer(
-            f"{spring} F{axis}",
-            "N",
-            f"on the {CHASSIS} in its axes, {'forward' if axis == 'x' else 'upward'} positive",
-            spring,
-            "force",
-            spring,
-            axis,
-        ): forces[f"{name}{axis}"]
-        for name, spring in SPRINGS.items()
-        for axis in "xz"
-    }
-    found[Answer(f"{CHASSIS} pitch", "rad", "nose down positive", "", "angle", CHASSIS, "pitch")] = -result["pitch"]
-    found[
-        Answer(f"{CHASSIS} pitch rate", "rad/s", "nose down positive", "", "angular rate", CHASSIS, "pitch")
-    ] = -result["pitch_rate"]
-    columns = Columns(folder / "run.f64", tuple(answer.name for answer in found), len(result.times))
-    columns.write(0, np.column_stack(list(found.values())))
+    channels = dict[Answer, np.ndarray]()
+    for name, spring in SPRINGS.items():
+        for axis, way in (("x", "forward"), ("z", "upward")):
+            text = f"on the {CHASSIS} in its axes, {way} positive"
+            channels[Answer(f"{spring} F{axis}", "N", text, spring, "force", spring, axis)] = forces[f"{name}{axis}"]
+    pitch: tuple[tuple[str, Quantity, str, str], ...] = (
+        ("", "angle", "rad", "pitch"),
+        (" rate", "angular rate", "rad/s", "pitch_rate"),
+    )
+    for suffix, quantity, unit, name in pitch:
+        answer = Answer(f"{CHASSIS} pitch{suffix}", unit, "nose down positive", "", quantity, CHASSIS, "pitch")
+        channels[answer] = -result[name]
+    columns = Columns(folder / "run.f64", tuple(answer.name for answer in channels), len(result.times))
+    columns.write(0, np.column_stack(list(channels.values())))
     surprise = result["kalman_surprise"][-1] / result["kalman_used"][-1] if "kalman_used" in result.data else math.nan
-    return Outcome(columns, tuple(found), float(result.times[1]), len(result.times), float(surprise), said)
+    period, count = float(result.times[1]), len(result.times)
+    return Outcome(columns, tuple(channels), period, count, float(surprise), said, counts=result.counts())

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 
 from models.core.errors import InputError
 from models.core.finding import Finding
-from models.core.finding import lines as told
+from models.core.finding import lines as told_of
 from models.core.scene_effects import lines as effect_lines
 from models.measured.channel import Source
 from models.measured.formats import open_source
 from models.measured.signal import Signal
 from models.systems.measured.channel_map import signals
-from models.systems.measured.rig import Rig
-from models.systems.measured.scene import MeasuredScene
+from models.systems.measured.scene import MeasuredScene, Rig
 from models.systems.measured.virtual import check as check_virtual
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
@@ -38,36 +37,36 @@ def opened(scene: MeasuredScene) -> tuple[Source, ...]:
 
 def mapped(scene: MeasuredScene, sources: Sequence[Source], rig: Rig) -> tuple[Signal, ...]:
     """Signals of all files; raises InputError, also where a wheel has no vertical force or the stabiliser no angles."""
-    found = signals(scene, sources, rig.places)
-    driving = {(s.quantity, s.at, s.component) for s in found if not s.check}
+    every, method = signals(scene, sources, rig.places), scene.stabilise.method
+    driving = {(s.quantity, s.at, s.component) for s in every if not s.check}
     for hub in rig.hubs if rig.vehicle else ():
         if ("force", hub, "z") not in driving:
             raise InputError(scene.file, "files", None, MISSING.format(repr(hub)))
-    wanted = [("angle", axis) for axis in rig.angles] if scene.stabilise.method != "none" else []
-    wanted += [("angular rate", axis) for axis in rig.angles] if scene.stabilise.method == "kalman" else []
-    for quantity, axis in wanted:
-        if (quantity, rig.chassis, axis) not in driving:
-            raise InputError(
-                scene.file,
-                "stabilise.method",
-                scene.stabilise.method,
-                f"needs the {quantity} "
-                f"{axis!r} of {rig.chassis!r}, which no channel is mapped to: map it, or say 'none'",
-            )
-    return found
+    wanted = {"none": (), "prescribed": ("angle",), "kalman": ("angle", "angular rate")}[method]
+    for quantity in wanted:
+        for axis in rig.angles:
+            if (quantity, rig.chassis, axis) not in driving:
+                needed = f"needs the {quantity} {axis!r} of {rig.chassis!r}, which no channel is mapped to"
+                raise InputError(scene.file, "stabilise.method", method, f"{needed}: map it, or say 'none'")
+    return every
 
 
 def _check_names(scene: MeasuredScene, rig: Rig) -> None:
-    for name, sensor in scene.sensors.items():
-        if sensor.body not in rig.places.bodies:
-            raise InputError(
-                scene.file, f"sensors.{name}.body", sensor.body, "the vehicle has no such body", rig.places.bodies
-            )
-    for name in (name for name in scene.levers if name not in rig.hubs):
-        raise InputError(scene.file, "levers", name, "the vehicle has no such hub", rig.hubs)
-    for name in scene.hand_on.sections or ():
-        if name not in rig.sections:
-            raise InputError(scene.file, "hand_on.sections", name, "the vehicle has no such section", rig.sections)
+    bodies = rig.places.bodies
+    named = [
+        *(
+            (f"sensors.{name}.body", own.body, "the vehicle has no such body", bodies)
+            for name, own in scene.sensors.items()
+        ),
+        *(("levers", name, "the vehicle has no such hub", rig.hubs) for name in scene.levers),
+        *(
+            ("hand_on.sections", name, "the vehicle has no such section", rig.sections)
+            for name in scene.hand_on.sections or ()
+        ),
+    ]
+    for place, name, wrong, known in named:
+        if name not in known:
+            raise InputError(scene.file, place, name, wrong, known)
 
 
 def findings(scene: MeasuredScene) -> tuple[Finding, ...]:
@@ -85,51 +84,40 @@ def describe(scene: MeasuredScene) -> str:
     _check_names(scene, rig)
     size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
-    lines += _virtual(scene) if scene.virtual is not None else _files(scene, rig)
-    own = scene.stabilise
+    virtual, own, wanted = scene.virtual, scene.stabilise, scene.hand_on
+    if virtual is None:
+        lines += _files(scene, rig)
+    else:
+        road = f"{virtual.duration:g} s on ISO 8608 class {virtual.road.iso8608} at {virtual.road.speed:g} m/s"
+        told = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
+        lines.append(_line("measured", told))
     how = {
         "kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
         "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
         "none": "nothing",
     }
+    sections, slopes = ", ".join(wanted.sections or ["every section"]), ", ".join(f"{each:g}" for each in wanted.slopes)
     lines += [
         _line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
-        _line(
-            "hand on",
-            f"{', '.join(scene.hand_on.sections or ['every section'])}; as "
-            f"{', '.join(scene.hand_on.formats)}; damage of slopes "
-            f"{', '.join(f'{slope:g}' for slope in scene.hand_on.slopes)}",
-        ),
+        _line("hand on", f"{sections}; as {', '.join(wanted.formats)}; damage of slopes {slopes}"),
     ]
     return "\n".join([*lines, *effect_lines(scene)])
-
-
-def _virtual(scene: MeasuredScene) -> list[str]:
-    own = scene.virtual
-    assert own is not None
-    return [
-        _line(
-            "measured",
-            f"virtually: {own.duration:g} s on ISO 8608 class {own.road.iso8608} at "
-            f"{own.road.speed:g} m/s, {own.sampling_rate:g} Hz, as {own.format} and back",
-        )
-    ]
 
 
 def _files(scene: MeasuredScene, rig: Rig) -> list[str]:
     """Every file with its channels as they will be read."""
     sources, lines = opened(scene), list[str]()
-    found = mapped(scene, sources, rig)
+    every = mapped(scene, sources, rig)
     for source in sources:
         began = f", began {source.start.isoformat(sep=' ')}" if source.start else ""
         lines.append(_line("file", f"{source.path.name}: {len(source.channels)} channels{began}"))
-        for s in (s for s in found if s.file == source.path.name):
+        for s in (s for s in every if s.file == source.path.name):
             what = f"{s.quantity} {s.component}".strip()
             sign, use = "-" if s.sign < 0 else "", ", only compared with" if s.check else ""
             lines.append(
                 _line("", f"{s.channel:<24} {what} at {s.at}, axes {s.frame}, {sign}{s.factor:g} x [{s.unit}]{use}")
             )
-        lines += told(source.noticed)
+        lines += told_of(source.noticed)
     return lines
 
 

@@ -1,6 +1,7 @@
 """Scenes of an engineer's own measurements: files and their channel map, vehicle, stabiliser, what is handed on."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,16 +12,39 @@ from models.core.scene_effects import with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Query, Strict, accepted, quantity
 from models.drift.score import Limits
-from models.measured.signal import Frame, Quantity
-from models.systems.measured.rig import Rig, in_plane, in_space
+from models.measured.axle_balance import AXLES
+from models.measured.signal import Frame, Place, Places, Quantity
+from models.systems.measured.pitch_plane import CHASSIS, SPRINGS
+from models.systems.measured.sections import names
 from models.systems.measured.verdict import LIMITS
 from models.systems.measured.virtual import VirtualTable
 from models.systems.pitch_plane.scene import parameter_set
-from models.vehicles.cut_vehicle import cut
+from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.pitch_plane import Parameters
 from models.vehicles.vehicle_file import load_vehicle
 
 Engine = Literal["reference", "exudyn", "mujoco"]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What a recording drives.
+
+    name : of the vehicle or the parameter set; chassis : whose angles hold it; sections that can be asked for; angles :
+    the components that hold it; vehicle : cut at its wheels, None of the pitch plane.
+    """
+
+    name: str
+    chassis: str
+    places: Places
+    sections: tuple[str, ...]
+    angles: tuple[str, ...]
+    vehicle: CutVehicle | None
+
+    @property
+    def hubs(self) -> tuple[str, ...]:
+        """Where forces are put in."""
+        return self.places.hubs
 
 
 class Vehicle(Strict):
@@ -127,14 +151,21 @@ class MeasuredScene(SceneFile):
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
 
     def rig(self) -> Rig:
-        """The vehicle that is driven; raises InputError."""
+        """The vehicle that is driven, the pitch plane at its axles or at the wheels of each; raises InputError."""
         own = self.vehicle
         if own.file is None:
-            assert own.parameters is not None
-            return in_plane(own.parameters)
-        return in_space(
-            cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis), tuple(self.sensors)
-        )
+            hubs, springs = tuple(hub for axle in AXLES.values() for hub in axle), tuple(SPRINGS.values())
+            places = Places(hubs, (CHASSIS,), springs)
+            return Rig(str(own.parameters), CHASSIS, places, springs, ("pitch",), None)
+        vehicle = cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis)
+        bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.whole.bodies, vehicle.elements))
+        places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
+        return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """Where sensors sit."""
+        return {name: Place(s.body, (s.position[0], s.position[1], s.position[2])) for name, s in self.sensors.items()}
 
     def plane(self) -> Parameters | None:
         """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
@@ -145,26 +176,17 @@ class MeasuredScene(SceneFile):
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(MeasuredScene, table, file, folder)
-    _check_vehicle(scene)
-    if bool(scene.files) == (scene.virtual is not None):
+    own, names = scene.vehicle, [each.file for each in scene.files]
+    if (own.file is None) == (own.parameters is None):
+        what = "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle"
+        raise InputError(file, "vehicle", None, what)
+    if own.parameters is not None and "chassis" in own.model_fields_set:
+        raise InputError(file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
+    if own.parameters is not None and scene.virtual is not None:
+        raise InputError(file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
+    if bool(names) == (scene.virtual is not None):
         raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")
-    names = [each.file for each in scene.files]
     for i, name in enumerate(names):
         if name in names[:i]:
             raise InputError(file, f"files.{i}.file", name, "is named twice: put all its channels into one [[files]]")
     return with_own(scene)
-
-
-def _check_vehicle(scene: MeasuredScene) -> None:
-    own = scene.vehicle
-    if (own.file is None) == (own.parameters is None):
-        raise InputError(
-            scene.file,
-            "vehicle",
-            None,
-            "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle",
-        )
-    if own.parameters is not None and "chassis" in own.model_fields_set:
-        raise InputError(scene.file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
-    if own.parameters is not None and scene.virtual is not None:
-        raise InputError(scene.file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")

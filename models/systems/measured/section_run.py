@@ -4,10 +4,13 @@ Only a block is in memory. The state goes from block to block as it is, the stab
 read alike whatever the block: a run in blocks, or resumed after any interruption, has the bits of a run in one piece.
 """
 
+import hashlib
+import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,13 +18,13 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
+from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import UPRIGHT, HubModel, build, check_step
 from models.engines.protocol import SIZE_BOUND
 from models.machine.compiled import checksum
 from models.measured.columns import Columns
-from models.measured.recording import Recording
+from models.measured.recording import Recording, silent
 from models.multibody.cut_table import Drive, table
-from models.systems.measured.checkpoint import Checkpoint, digest, digest_of
 from models.systems.measured.inputs import Grid, Inputs, Prescribed
 from models.systems.measured.sections import Answer, Sections
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, rigid
@@ -81,7 +84,7 @@ class SectionRun:
 @dataclass(frozen=True)
 class Outcome:
     """Answers of a run, ``period`` (s) apart, of which ``done`` are there; ``surprise`` of the filter, NaN without,
-    and what it says against its measurements."""
+    and what it says against its measurements; counts of steps, force calls and states."""
 
     columns: Columns
     answers: tuple[Answer, ...]
@@ -90,96 +93,132 @@ class Outcome:
     surprise: float
     findings: tuple[Finding, ...]
     doubts: tuple[str, ...] = ()
+    counts: dict[str, int] = field(default_factory=dict)
 
-    def samples(self, answer: Answer) -> np.ndarray:
-        """Samples (done,) of one answer."""
-        return self.columns.read(answer.name, 0, self.done)
+    def samples(self, answer: Answer | str) -> np.ndarray:
+        """Samples (done,) of one answer, or of that of a name."""
+        return self.columns.read(answer if isinstance(answer, str) else answer.name, 0, self.done)
 
 
-def check(own: SectionRun) -> None:
+@dataclass(frozen=True)
+class Checkpoint:
+    """A file that holds arrays, and the inputs that they are of: ``of`` gives each a name that a user understands."""
+
+    path: Path
+    of: dict[str, str] = field(default_factory=dict)
+
+    def load(self) -> dict[str, np.ndarray] | None:
+        """What was saved, None if nothing; InputError, which names the input that differs, if it is of others."""
+        if not self.path.is_file():
+            return None
+        try:
+            with np.load(self.path) as file:
+                arrays = dict(file)
+            of = json.loads(str(arrays.pop("of")))
+        except Exception as error:
+            raise InputError(self.path, "", None, f"is no checkpoint of a run: remove its folder ({error})") from error
+        differing = [name for name in sorted({*of, *self.of}) if of.get(name) != self.of.get(name)]
+        if differing:
+            what = f"is of a run with another {' and another '.join(differing)}"
+            raise InputError(self.path, "", None, f"{what}: choose another folder, or remove this one")
+        return arrays
+
+    def save(self, **arrays: np.ndarray) -> None:
+        """Replace what was saved by these arrays."""
+        buffer = BytesIO()
+        np.savez(buffer, of=np.array(json.dumps(self.of)), **arrays)  # type: ignore[arg-type]
+        write_whole(self.path, buffer.getvalue())
+
+
+def digest(*parts: object) -> str:
+    """Digest of objects by their representation, arrays by their bytes."""
+    total = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            total.update(f"{part.dtype} {part.shape}".encode())
+            total.update(np.ascontiguousarray(part).data)
+        else:
+            total.update(f"{part!r};".encode())
+    return total.hexdigest()
+
+
+def check(job: SectionRun) -> None:
     """Refuse what no run can do right, before any is made."""
-    own.grid.check(own.file)
-    if own.count < 2:
-        raise InputError(own.file, "files", None, f"the recording has {own.recording.count} samples: nothing to run")
-    check_step(own.engine, own.vehicle, own.grid.step, own.grid.step * own.grid.every)
-    if own.hold.method == "kalman" and own.hold.bandwidth * own.grid.step > STIFF:
-        raise InputError(
-            own.file,
-            "stabilise.bandwidth",
-            own.hold.bandwidth,
-            f"must be at most {STIFF:g} of the rate of the run's steps, {STIFF / own.grid.step:g} Hz",
-        )
-    used = [signal for signal in own.recording.signals if not signal.check and signal.at == own.vehicle.chassis]
-    if own.hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
-        raise InputError(
-            own.file,
-            "stabilise.method",
-            own.hold.method,
-            f"needs roll and pitch or their rates at the body {own.vehicle.chassis!r}; 'none' runs without",
-        )
+    grid, hold = job.grid, job.hold
+    grid.check(job.file)
+    if job.count < 2:
+        raise InputError(job.file, "files", None, f"the recording has {job.recording.count} samples: nothing to run")
+    check_step(job.engine, job.vehicle, grid.step, grid.step * grid.every)
+    if hold.method == "kalman" and hold.bandwidth * grid.step > STIFF:
+        limit = f"must be at most {STIFF:g} of the rate of the run's steps, {STIFF / grid.step:g} Hz"
+        raise InputError(job.file, "stabilise.bandwidth", hold.bandwidth, limit)
+    used = [signal for signal in job.recording.signals if not signal.check and signal.at == job.vehicle.chassis]
+    if hold.method != "none" and not any(signal.quantity in ("angle", "angular rate") for signal in used):
+        needed = f"needs roll and pitch or their rates at the body {job.vehicle.chassis!r}; 'none' runs without"
+        raise InputError(job.file, "stabilise.method", hold.method, needed)
 
 
-def run(own: SectionRun, folder: Path, progress: Progress = lambda done, of: None, block: float = BLOCK) -> Outcome:
+def run(job: SectionRun, folder: Path, progress: Progress = silent, block: float = BLOCK) -> Outcome:
     """Run all of a recording, or what is missing of it in ``folder``; ``progress`` is told seconds done and in all.
 
     ``block`` : s between checkpoints, which changes no bit of the answers. Raises InputError where the folder holds a
     run of other inputs, and RunFailed, whose ``partial`` is the outcome until then, where the vehicle topples.
     """
-    check(own)
-    march = _March(own, folder, max(round(block / (own.grid.step * own.grid.every)), 1))
-    period = own.recording.period * own.grid.skip
-    progress(march.done * period, own.recording.duration)
-    while march.done < own.count:
+    check(job)
+    march = _March(job, folder, max(round(block / (job.grid.step * job.grid.every)), 1))
+    period = job.recording.period * job.grid.skip
+    progress(march.done * period, job.recording.duration)
+    while march.done < job.count:
         march.advance()
-        progress(march.done * period, own.recording.duration)
+        progress(march.done * period, job.recording.duration)
     return march.outcome()
 
 
 class _March:
     """A run under way: ``done`` answers are on disk, ``state`` (2 n,) is that of the next one."""
 
-    def __init__(self, own: SectionRun, folder: Path, length: int) -> None:
-        self.own, self.length, hold = own, length, own.hold
-        self.inputs = Inputs(own.recording, own.vehicle, hold.method == "prescribed")
+    def __init__(self, job: SectionRun, folder: Path, length: int) -> None:
+        self.job, self.grid, self.length, hold = job, job.grid, length, job.hold
+        self.inputs = Inputs(job.recording, job.vehicle, hold.method == "prescribed")
         self.filter = self._filter() if hold.method == "kalman" else None
         self.prescribed = None
         if hold.method == "prescribed":
-            self.prescribed = Prescribed(self.inputs, own.grid, hold.smoothing, own.file)
+            self.prescribed = Prescribed(self.inputs, self.grid, hold.smoothing, job.file)
         folder.mkdir(parents=True, exist_ok=True)
-        self._checkpoint = Checkpoint(folder / "run.npz", _inputs_of(own, self.inputs))
-        found = self._checkpoint.load()
-        self.done, self.state = (0, self._start()) if found is None else (int(found["done"]), found["state"])
-        if found is None:
+        self._checkpoint = Checkpoint(folder / "run.npz", _inputs_of(job, self.inputs))
+        saved = self._checkpoint.load()
+        self.done, self.state = (0, self._start()) if saved is None else (int(saved["done"]), saved["state"])
+        if saved is None:
             self._save()
         elif self.filter is not None:
             known = self.filter.state
-            self.filter.state = replace(known, **{name: found[name] for name in vars(known)})
-        names = tuple(answer.name for answer in own.sections.answers)
-        self.columns = Columns(folder / "run.f64", names, own.count)
+            self.filter.state = replace(known, **{name: saved[name] for name in vars(known)})
+        self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
     def outcome(self) -> Outcome:
         """What there is until now."""
-        grid = self.own.grid
+        steps = (self.done - 1) * self.grid.every
         return Outcome(
             self.columns,
-            self.own.sections.answers,
-            grid.period * grid.skip,
+            self.job.sections.answers,
+            self.grid.period * self.grid.skip,
             self.done,
             self.filter.surprise if self.filter else math.nan,
             tuple(self.inputs.findings),
             self.filter.doubts() if self.filter else (),
+            {"steps": steps, "force calls": 4 * steps, "states": 2 * self.job.vehicle.size},
         )
 
     def advance(self) -> None:
         """March a block and save it; RunFailed with the outcome until then."""
-        grid, last = self.own.grid, self.own.count - 1
+        grid, last = self.grid, self.job.count - 1
         answers = min(self.length, max(last - self.done, 1))
         drive = self._drive(self.done * grid.skip, answers * grid.every)
-        model = build(self.own.engine, self.own.vehicle, drive, grid.step, answers * grid.every * grid.step)
+        model = build(self.job.engine, self.job.vehicle, drive, grid.step, answers * grid.every * grid.step)
         states, failure = self._marched(model)
         ends = self.done + answers >= last
         kept = states[:: grid.every] if failure or ends else states[: -1 : grid.every]
-        self.columns.write(self.done, self.own.sections.read(model.numbers, kept, 2 * grid.every))
+        self.columns.write(self.done, self.job.sections.read(model.numbers, kept, 2 * grid.every))
         self.done, self.state = self.done + len(kept), states[-1].copy()
         if failure is not None:
             failure.partial = self.outcome()
@@ -188,15 +227,14 @@ class _March:
 
     def _marched(self, model: HubModel) -> tuple[np.ndarray, RunFailed | None]:
         """States of a block until its end or until the vehicle topples, and the failure that says when."""
-        began, steps = self.done * self.own.grid.period * self.own.grid.skip, model.steps
+        began, steps = self.done * self.grid.period * self.grid.skip, model.steps
         try:
             states = model.marched(*np.split(self.state, 2))
-        except RunFailed as error:
-            states = self._until(model, error)
-        n = self.own.vehicle.size
-        inside = np.delete(np.arange(2 * n), [0, 1, 2, 3])  # where it is and where it heads may be anything
+        except RunFailed:
+            states = self._until(model)
+        inside = states[:, 4:]  # where it is and where it heads may be anything
         toppled = np.abs(states[:, [ROLL, PITCH]]).max(axis=1) > UPRIGHT
-        bad = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(states[:, inside]) > SIZE_BOUND).any(axis=1)
+        bad = toppled | ~np.isfinite(states).all(axis=1) | (np.abs(inside) > SIZE_BOUND).any(axis=1)
         if not bad.any() and len(states) == steps + 1:
             return states, None
         good = int(np.argmax(bad)) if bad.any() else len(states)
@@ -206,79 +244,72 @@ class _March:
             else "the state became infinite or not a number"
         )
         states = states[: max(good, 1)]
-        at = began + (len(states) - 1) * self.own.grid.step
-        return states, RunFailed(self.own.engine, reason, at, states[-1])
+        return states, RunFailed(self.job.engine, reason, began + (len(states) - 1) * self.grid.step, states[-1])
 
-    def _until(self, model: HubModel, error: RunFailed) -> np.ndarray:
+    def _until(self, model: HubModel) -> np.ndarray:
         """States of a block that the engine gave up: the longest part, by halves, that it can march."""
         good, bad, states = 0, model.steps, self.state[None]
         while bad - good > 1:
             model.steps = (good + bad) // 2
             try:
-                found = model.marched(*np.split(self.state, 2))
-                good, states = model.steps, found
+                states = model.marched(*np.split(self.state, 2))
+                good = model.steps
             except RunFailed:
                 bad = model.steps
         return states
 
     def _drive(self, first: int, steps: int) -> Drive:
         """What drives the vehicle from a sample on."""
-        own, grid, rows = self.own, self.own.grid, 2 * steps + 1
-        samples = math.floor((rows - 1) * grid.part) + 2
-        wrenches = self.inputs.around(first, samples)
-        drive = Drive(grid.cubic(wrenches, rows), self.inputs.frame)
-        if self.prescribed is not None:
-            return Drive(drive.hubs, drive.frame, guide=self.prescribed.rows(first, rows))
-        if self.filter is None:
-            return drive
+        grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
+        wrenches = self.inputs.around(first, used + 1)
+        free = Drive(grid.cubic(wrenches, rows), self.inputs.frame)
+        if self.prescribed is not None:
+            return replace(free, guide=self.prescribed.rows(first, rows))
+        if self.filter is None:
+            return free
         tilt, _ = self.filter.advance(wrenches[1 : used + 1], self.inputs.tilt(first, used))
         guide = np.hstack([grid.rows(tilt, rows), np.zeros((rows, 2))])
-        corner, (roll, pitch, _) = 2 * math.pi * own.hold.bandwidth, np.diag(rigid(own.vehicle).inertia)
+        corner, (roll, pitch, _) = 2 * math.pi * self.job.hold.bandwidth, np.diag(rigid(self.job.vehicle).inertia)
         pull = (roll * corner**2, 2 * DAMPING * roll * corner, pitch * corner**2, 2 * DAMPING * pitch * corner)
-        return Drive(drive.hubs, drive.frame, guide=guide, pull=pull)
+        return replace(free, guide=guide, pull=pull)
 
     def _start(self) -> np.ndarray:
         """At rest in the design position; where roll and pitch are held, these and their rates as measured."""
-        state, n = np.zeros(2 * self.own.vehicle.size), self.own.vehicle.size
+        n = self.job.vehicle.size
+        state, held = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
         if self.prescribed is not None:
-            state[[ROLL, PITCH, n + ROLL, n + PITCH]] = self.prescribed.rows(0, 1)[0, :4]
+            state[held] = self.prescribed.rows(0, 1)[0, :4]
         elif self.filter is not None:
-            state[[ROLL, PITCH, n + ROLL, n + PITCH]] = np.nan_to_num(self.inputs.tilt(0, 1)[0])
+            state[held] = np.nan_to_num(self.inputs.tilt(0, 1)[0])
         return state
 
     def _filter(self) -> "TiltFilter":
         from models.systems.hub_forces.tilt_filter import TiltFilter
 
-        own, hold = self.own, self.own.hold
-        deviations = np.tile(np.repeat([hold.force, hold.moment], 3), len(own.vehicle.hubs))
-        return TiltFilter(
-            own.vehicle,
-            self.inputs.frame,
-            own.recording.period,
-            deviations,
-            (hold.angle, hold.rate),
-            hold.model,
-            own.file,
-        )
+        vehicle, hold, period = self.job.vehicle, self.job.hold, self.job.recording.period
+        deviations, angles = np.tile([hold.force] * 3 + [hold.moment] * 3, len(vehicle.hubs)), (hold.angle, hold.rate)
+        return TiltFilter(vehicle, self.inputs.frame, period, deviations, angles, hold.model, self.job.file)
 
     def _save(self) -> None:
         known = vars(self.filter.state) if self.filter else {}
         self._checkpoint.save(done=np.array(self.done), state=self.state, **known)
 
 
-def _inputs_of(own: SectionRun, inputs: Inputs) -> dict[str, str]:
+def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
     """What decides the bits of a run, by names that a user understands."""
-    library = {"reference": "numpy"}.get(own.engine, own.engine)
+    library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
-    idle = np.zeros((1, 6 * len(inputs.hubs)))
-    vehicle = digest(table(own.vehicle, Drive(idle), own.grid.step), own.vehicle.tree.coordinates())
+    idle = Drive(np.zeros((1, 6 * len(inputs.hubs))))
+    samples = digest(job.recording.period, job.recording.count)
+    for signal in inputs.used:
+        samples = digest(samples, signal, job.recording.samples(signal))
     return {
-        "vehicle": vehicle,
-        "recording": digest_of(own.recording, inputs.used),
-        "stabiliser": repr(own.hold),
-        "engine": f"{own.engine} {version(library)}",
-        "step": repr(own.grid.step),
-        "list of sections": digest(own.sections.answers, own.sections.frame),
+        "vehicle": digest(table(job.vehicle, idle, job.grid.step), job.vehicle.tree.coordinates()),
+        "recording": samples,
+        "stabiliser": repr(job.hold),
+        "engine": f"{job.engine} {version(library)}",
+        "step": repr(job.grid.step),
+        "list of sections": digest(job.sections.answers, job.sections.frame),
         "version": f"{version('twinrig')} {sources}",
     }

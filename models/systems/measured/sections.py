@@ -7,27 +7,18 @@
 - ``NAME hub``: what acts on the hub NAME from outside, about the hub.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from models.core.errors import InputError
-from models.measured.checks.place import Place
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import HUB, Place, Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, felt
 from models.multibody.cut_table import Joints, joints
 from models.vehicles.cut_vehicle import CutVehicle
 
-AXES: tuple[tuple[str, Quantity, str, str], ...] = (
-    ("Fx", "force", "x", "N"),
-    ("Fy", "force", "y", "N"),
-    ("Fz", "force", "z", "N"),
-    ("Mx", "moment", "x", "N m"),
-    ("My", "moment", "y", "N m"),
-    ("Mz", "moment", "z", "N m"),
-)
 MOTION: tuple[tuple[str, Quantity | None, str, str], ...] = (
     ("x", None, "", "m"),
     ("y", None, "", "m"),
@@ -89,29 +80,29 @@ class Sections:
     _guides: tuple[np.ndarray, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        every = _answers(self.vehicle, self.frame, self.points)
         if self.wanted is not None:
             known = names(self.vehicle)
             for name in (name for name in self.wanted if name not in known):
                 raise InputError("", "hand_on.sections", name, "the vehicle has no such section", known)
-        asked = [self.wanted is None or answer.section in ("", *self.wanted) for answer, _ in every]
-        kept = [i for i, (_, free) in enumerate(every) if asked[i] and not free]
+        sliding, kept = _sliding(self.vehicle, self.frame), list[tuple[int, Answer]]()
+        for column, answer in enumerate(_answers(self.vehicle, self.frame, self.points)):
+            asked = self.wanted is None or answer.section in ("", *self.wanted)
+            if asked and answer.name not in sliding:
+                kept.append((column, answer))
         joined = joints(self.vehicle)
-        object.__setattr__(self, "answers", tuple(every[i][0] for i in kept))
-        object.__setattr__(self, "columns", np.array(kept))
-        own = (*_guides(self.vehicle, joined), _points(self.points, joined))
-        object.__setattr__(self, "_guides", own)
+        object.__setattr__(self, "answers", tuple(answer for _, answer in kept))
+        object.__setattr__(self, "columns", np.array([column for column, _ in kept]))
+        rows = [
+            [joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in self.points
+        ]
+        points = np.array(rows, float).reshape(len(rows), 5)
+        object.__setattr__(self, "_guides", (*_guides(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
         """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
         guides, carried, points = self._guides
-        count = (
-            2 * len(self.vehicle.elements)
-            + CHASSIS_ROW
-            + MOMENTS
-            + POINT * len(points)
-            + WRENCH * (len(guides) + len(self.vehicle.hubs))
-        )
+        wrenches = len(guides) + len(self.vehicle.hubs)
+        count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * len(points) + WRENCH * wrenches
         out = np.empty((len(states), count))
         felt(numbers, float(every), np.ascontiguousarray(states), guides, carried, points, self.frame == "hub", out)
         return out[:, self.columns]
@@ -128,83 +119,47 @@ def guided(vehicle: CutVehicle) -> tuple[str, ...]:
     return tuple(body.name for body in vehicle.whole.bodies if body.name != vehicle.chassis)
 
 
-def _answers(vehicle: CutVehicle, frame: str, points: tuple[Point, ...]) -> list[tuple[Answer, bool]]:
-    """Every column of the kernel's row, and whether it is nought because the body slides freely along it."""
-    found = list[Answer]()
+def _answers(vehicle: CutVehicle, frame: str, points: tuple[Point, ...]) -> Iterator[Answer]:
+    """Every column of the kernel's row."""
+    chassis, about = vehicle.chassis, "chassis" if frame == "body" else ""
     for e in vehicle.elements:
-        bar, sign = e.unit != "N", "along its own axis, compression positive"
-        found.append(
-            Answer(
-                f"{e.name} {'M' if bar else 'F'}",
-                e.unit,
-                "moment, left end pushed up positive" if bar else sign,
-                e.name,
-                "moment" if bar else "force",
-                e.name,
-            )
-        )
+        if e.unit == "N":
+            text = "along its own axis, compression positive"
+            yield Answer(f"{e.name} F", e.unit, text, e.name, "force", e.name)
+        else:
+            text = "moment, left end pushed up positive"
+            yield Answer(f"{e.name} M", e.unit, text, e.name, "moment", e.name)
     for e in vehicle.elements:
-        bar = e.unit != "N"
-        found.append(
-            Answer(
-                f"{e.name} travel",
-                "rad" if bar else "m",
-                "from the design position, compression positive",
-                e.name,
-                "travel",
-                e.name,
-            )
-        )
-    found += [
-        Answer(
-            f"{vehicle.chassis} {name}",
-            unit,
-            "of the chassis, x forward, y left, z up",
-            "",
-            what,
-            vehicle.chassis if what else "",
-            axis,
-        )
-        for name, what, axis, unit in MOTION
-    ]
-    found += [
-        Answer(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
-        for name in ("roll", "pitch")
-    ]
-    free = len(found) * [False]
+        unit = "m" if e.unit == "N" else "rad"
+        text = "from the design position, compression positive"
+        yield Answer(f"{e.name} travel", unit, text, e.name, "travel", e.name)
+    for name, quantity, axis, unit in MOTION:
+        text = "of the chassis, x forward, y left, z up"
+        yield Answer(f"{chassis} {name}", unit, text, "", quantity, chassis if quantity else "", axis)
+    for name in ("roll", "pitch"):
+        yield Answer(f"stabiliser {name}", "N m", "artificial moment on the chassis", component=name)
     for name in guided(vehicle):
-        axes = "chassis" if frame == "body" else name
-        found += [
-            Answer(f"{name} guide {axis}", unit, f"on {name} from what carries it, axes of {axes}", f"{name} guide")
-            for axis, _, _, unit in AXES
-        ]
-        free += [_slides(vehicle, name, frame, axis) for axis, *_ in AXES]
+        for axis, _, _, unit in HUB:
+            text = f"on {name} from what carries it, axes of {about or name}"
+            yield Answer(f"{name} guide {axis}", unit, text, f"{name} guide")
     for hub, tyre in zip(vehicle.hubs, vehicle.whole.tyres, strict=True):
-        axes = "chassis" if frame == "body" else tyre.body
-        found += [
-            Answer(
-                f"{hub} hub {axis}",
-                unit,
-                f"on the hub from outside, axes of {axes}",
-                f"{hub} hub",
-                what,
-                hub,
-                component,
-            )
-            for axis, what, component, unit in AXES
-        ]
+        for axis, quantity, component, unit in HUB:
+            text = f"on the hub from outside, axes of {about or tyre.body}"
+            yield Answer(f"{hub} hub {axis}", unit, text, f"{hub} hub", quantity, hub, component)
     for p in points:
         text = f"{'with' if p.gravity else 'without'} gravity, axes of {p.body}"
-        found += [Answer(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz"]
-    return list(zip(found, free + (len(found) - len(free)) * [False], strict=True))
+        yield from (Answer(f"{p.name} a{axis}", "m/s^2", text, "", "acceleration", p.name, axis) for axis in "xyz")
 
 
-def _slides(vehicle: CutVehicle, name: str, frame: str, axis: str) -> bool:
-    """Whether a body slides along a component of its guide's force, so that there is none."""
-    body = vehicle.whole.body(name)
-    turns = any(freedom.startswith("r") for freedom in body.freedoms)
-    straight = body.parent == vehicle.chassis and (frame == "body" or not turns)
-    return straight and axis.startswith("F") and axis[1:] in body.freedoms
+def _sliding(vehicle: CutVehicle, frame: str) -> set[str]:
+    """Components of guides along which a body slides freely, so that they are nought."""
+    sliding = set[str]()
+    for name in guided(vehicle):
+        body = vehicle.whole.body(name)
+        turns = any(freedom.startswith("r") for freedom in body.freedoms)
+        if body.parent == vehicle.chassis and (frame == "body" or not turns):
+            sliding |= {f"{name} guide F{axis}" for axis in body.freedoms}
+    return sliding
 
 
 def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray]:
@@ -213,23 +168,13 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
     ends = [end for element in vehicle.elements for end in (element.one, element.two)]
     owners = [*heavy, *(tyre.body for tyre in vehicle.whole.tyres), *ends]
     parents = {body.name: body.parent for body in vehicle.whole.bodies}
-    rows = [[float(name in _line(owner, parents)) for owner in owners] for name in guided(vehicle)]
+
+    def behind(name: str | None, guide: str) -> bool:
+        return name is not None and (name == guide or behind(parents[name], guide))
+
     last = np.array([joined.last[name] for name in guided(vehicle)], np.int64)
+    rows = [[float(behind(owner, name)) for owner in owners] for name in guided(vehicle)]
     return last, np.array(rows).reshape(len(last), len(owners))
-
-
-def _line(name: str, parents: dict[str, str | None]) -> list[str]:
-    """A body and all that carry it."""
-    found, above = [name], parents[name]
-    while above is not None:
-        found.append(above)
-        above = parents[above]
-    return found
-
-
-def _points(points: tuple[Point, ...], joined: Joints) -> np.ndarray:
-    rows = [[joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in points]
-    return np.array(rows, float).reshape(len(points), 5)
 
 
 def points(vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, Place]) -> tuple[Point, ...]:

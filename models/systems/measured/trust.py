@@ -15,6 +15,7 @@ run are right whatever its tilt is. What ends its trust for them is tumbling, wh
 forces keep their directions an error of ``ANGLE`` turns as much of every force into another axis.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -40,8 +41,12 @@ class Level:
     force: float
     moment: float
     bias: np.ndarray | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)
-    rate: tuple[float, float] = (0.0, 0.0)
+    tilt: Sequence[float] = (0.0, 0.0)
+    rate: Sequence[float] = (0.0, 0.0)
+
+    def deviations(self, vehicle: CutVehicle) -> np.ndarray:
+        """Standard deviations (6 h,), hub by hub."""
+        return np.tile(np.repeat([self.force, self.moment], 3), len(vehicle.hubs))
 
 
 @dataclass(frozen=True)
@@ -63,9 +68,13 @@ class Drift:
 
         source : one of ``means`` or "noise" alone; None: all together.
         """
+        from scipy.special import ndtr
+
         mean = sum((own for name, own in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3)))
         spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
-        beyond = _inside(mean[:, :2], spread[:, :2], angle) < 0.5
+        mean, deviation = mean[:, :2], np.maximum(spread[:, :2], 1e-300)
+        inside = np.prod(ndtr((angle - mean) / deviation) - ndtr((-angle - mean) / deviation), axis=1)
+        beyond = inside < 0.5
         return float(self.times[beyond.argmax()]) if beyond.any() else None
 
     @property
@@ -89,18 +98,15 @@ class Drift:
 def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
     """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
     own, law = rigid(vehicle), _Law(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
-    deviation = np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
-    noise = period * own.turning(deviation)
+    noise = period * own.turning(level.deviations(vehicle))
     spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
     means = dict[str, np.ndarray]()
     if level.bias is not None:
         turning = np.linalg.solve(own.inertia, own.moments(np.asarray(level.bias, float)[None])[0])
         means["bias"] = law.summed(law.impulse) @ turning
-    start, rate = np.array([*level.tilt, 0.0]), np.array([*level.rate, 0.0])
-    if start.any():
-        means["tilt at the start"] = law.step @ start
-    if rate.any():
-        means["rate at the start"] = law.impulse @ rate
+    for name, start, response in (("tilt", level.tilt, "step"), ("rate", level.rate, "impulse")):
+        if np.any(start):
+            means[f"{name} at the start"] = getattr(law, response) @ np.array([*start, 0.0])
     return Drift(law.times, means, spread, law.rates, frame)
 
 
@@ -110,7 +116,7 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
     Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
     bias alone. One standard deviation of the noise beside the others' means.
     """
-    own, deviation = rigid(vehicle), np.tile(np.repeat([level.force, level.moment], 3), len(vehicle.hubs))
+    own, deviation = rigid(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))
     bias = np.zeros(len(deviation)) if level.bias is None else np.asarray(level.bias, float)
     mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / own.mass)
@@ -161,11 +167,3 @@ class _Law:
         """Integral (n, ...) of values (n, ...) from 0 on, by the trapezoidal rule."""
         steps = 0.5 * (values[1:] + values[:-1]) * self.times[1]
         return np.concatenate((np.zeros_like(values[:1]), np.cumsum(steps, axis=0)))
-
-
-def _inside(mean: np.ndarray, deviation: np.ndarray, angle: float) -> np.ndarray:
-    """Share (n,) of normal errors of these means and deviations (n, axes) all of which are within +-angle."""
-    from scipy.special import ndtr
-
-    spread = np.maximum(deviation, 1e-300)
-    return np.asarray(np.prod(ndtr((angle - mean) / spread) - ndtr((-angle - mean) / spread), axis=1))

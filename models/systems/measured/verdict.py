@@ -1,5 +1,7 @@
 """What a run of a recording is worth: accepted, rejected, or to be stabilised first, with the threshold that says so.
 
+A measured channel that was not put in is held beside what the run says of it: error by frequency, damage, trust.
+
 The concept is that of the pitch plane (``models.drift.score``), with both angles of a vehicle in space: the artificial
 moment by what turns the chassis, the angles, and what the measurement leaves unknown of them. A true run, which only a
 virtual measurement has, adds damage and angle errors. Channels that were measured but not put in are compared with
@@ -8,16 +10,19 @@ what the run says of them; one that disagrees rejects the run, whatever its own 
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from models.core.finding import Finding
 from models.drift import score
 from models.drift.score import SURPRISED, Errors, Limits, Own, Verdict, low_pass, rms
-from models.fatigue.damage import SLOPE, damage_ratio
-from models.systems.measured.comparison import Compared
-from models.systems.measured.section_run import DAMPING, Hold, Outcome
+from models.fatigue.damage import SLOPE, damage_ratio, pseudo_damage
+from models.measured.recording import Recording
+from models.measured.signal import Signal
+from models.systems.measured.section_run import DAMPING, Hold, Outcome, SectionRun
+from models.systems.measured.sections import Answer
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, rigid
 
@@ -29,6 +34,12 @@ DISAGREES = 0.15
 wrong by 5 % and a delay of 2 ms at 10 Hz together stay below it."""
 LOUD = 1 / 3
 """Part of a check channel that may be noise."""
+BANDS = (0.0, 0.5, 4.0, 20.0, 80.0, math.inf)
+"""Hz: drift and slow motion, the body on its springs, wheels and engine, what stiff mounts pass on, the rest."""
+SEGMENT = 8.0
+"""s, of the stretches whose spectra are averaged."""
+STRETCH, HALF = 1.0, 0.5
+"""s; part of a channel's own rms: a stretch this long with a larger error is not to be trusted."""
 WORDS = {
     "I pitch''": "what turns the chassis",
     "the measured pitch": "measured roll and pitch",
@@ -39,6 +50,110 @@ WORDS = {
 """What ``score`` says of the pitch plane, and what it means here."""
 EFFECTS = {"kalman": {"kalman_filter"}, "prescribed": {"prescribed_pitch"}, "none": set[str]()}
 """Methods of holding a run, by the names that ``score`` has for them."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Frequencies from ``low`` to ``high`` (Hz): rms of what was measured and of the error, in the channel's unit."""
+
+    low: float
+    high: float
+    measured: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One check channel.
+
+    offset : mean of the error; bands : of all but that; explained : part of the measured variance that the run gives,
+    1 at best; damage : of the run by that of the channel, by slope, NaN where the channel never moves; trusted : s
+    until the error of a stretch of ``STRETCH`` s exceeds ``HALF`` of the channel's rms, infinite if never.
+    """
+
+    signal: Signal
+    answer: Answer
+    offset: float
+    bands: tuple[Band, ...]
+    explained: float
+    damage: dict[float, float]
+    trusted: float
+
+
+def checks(job: SectionRun) -> tuple[tuple[Signal, Answer], ...]:
+    """Every channel that is not put in and that the run answers, with its answer: named as checks, and accelerations.
+
+    Strains and sensors of unknown place have none.
+    """
+    outside = [s for s in job.recording.signals if s.check or s.quantity == "acceleration"]
+    return tuple((s, a) for s in outside if _same_axes(job, s) for a in job.sections.answers if a.measures(s))
+
+
+def _same_axes(job: SectionRun, signal: Signal) -> bool:
+    """Whether answers of a signal's quantity are in its axes."""
+    if signal.at in job.vehicle.hubs and signal.quantity in ("force", "moment"):
+        return signal.frame == job.sections.frame
+    return signal.frame != "inertial" or signal.quantity == "angle"
+
+
+def overlay(
+    recording: Recording, run: Outcome, signal: Signal, answer: Answer
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times (n,) in s, measured and computed values (n,) of all answers of a run."""
+    computed, skip = run.samples(answer), round(run.period / recording.period)
+    measured = recording.columns.read(signal.name, 0, (len(computed) - 1) * skip + 1)[::skip]
+    return run.period * np.arange(len(computed)), measured, computed
+
+
+def compare(
+    recording: Recording, run: Outcome, signal: Signal, answer: Answer, slopes: tuple[float, ...] = (3.0, 5.0, 8.0)
+) -> Compared:
+    """Compare a channel with its answer over all that was run."""
+    _, measured, computed = overlay(recording, run, signal, answer)
+    known = np.isfinite(measured)
+    if not known.any():
+        return Compared(signal, answer, math.nan, (), math.nan, dict.fromkeys(slopes, math.nan), math.inf)
+    error, size = computed - measured, float(np.std(measured[known]))
+    offset, true = float(np.mean(error[known])), {slope: pseudo_damage(measured[known], slope) for slope in slopes}
+    return Compared(
+        signal,
+        answer,
+        offset,
+        _bands(measured, error, run.period),
+        1.0 - float(np.var(error[known])) / size**2 if size > 0 else math.nan,
+        {slope: pseudo_damage(computed[known], slope) / own if own > 0 else math.nan for slope, own in true.items()},
+        _trusted(error - offset, size, run.period),
+    )
+
+
+def _bands(measured: np.ndarray, error: np.ndarray, period: float) -> tuple[Band, ...]:
+    """rms by band, from averaged spectra of overlapping stretches under a Hann window; those with gaps are left out."""
+    length = min(round(SEGMENT / period), len(error))
+    window = np.hanning(length + 1)[:-1]
+    power, used = np.zeros((2, length // 2 + 1)), 0
+    for first in range(0, len(error) - length + 1, max(length // 2, 1)):
+        both = np.stack([each[first : first + length] for each in (measured, error)])
+        if np.isfinite(both).all():
+            power += np.abs(np.fft.rfft((both - both.mean(axis=1, keepdims=True)) * window, axis=1)) ** 2
+            used += 1
+    if used == 0:
+        return ()
+    power *= 2.0 / (used * length * np.sum(window**2))  # mean squares, from both halves of the spectrum
+    frequencies, bands = np.fft.rfftfreq(length, period), []
+    for low, high in pairwise(BANDS):
+        inside = (frequencies >= low) & (frequencies < high)
+        if inside.any():
+            bands.append(Band(low, min(high, 0.5 / period), *np.sqrt(power[:, inside].sum(axis=1))))
+    return tuple(bands)
+
+
+def _trusted(error: np.ndarray, size: float, period: float) -> float:
+    """When the error of a stretch first exceeds ``HALF`` of a size (s)."""
+    length = max(round(STRETCH / period), 1)
+    whole = error[: len(error) // length * length].reshape(-1, length)
+    rms = np.sqrt(np.nanmean(np.where(np.isfinite(whole), whole, 0.0) ** 2, axis=1))
+    beyond = np.flatnonzero(rms > HALF * size)
+    return float(beyond[0] * length * period) if len(beyond) else math.inf
 
 
 def judge(
@@ -58,7 +173,10 @@ def judge(
     """
     shares = {own.signal.name: disagreement(own, (noise or {}).get(own.signal.name, 0.0)) for own in compared}
     off = {name: share for name, share in shares.items() if not share <= DISAGREES}
-    found = score.blind_verdict(
+    if off:
+        told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
+        return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
+    verdict = score.blind_verdict(
         own_figures(run, vehicle),
         EFFECTS[hold.method],
         run.period * (run.done - 1),
@@ -66,10 +184,7 @@ def judge(
         trusted,
         uncertainty=uncertainty(vehicle, hold, sampled),
     )
-    if not off:
-        return _in_space(found)
-    told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
-    return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
+    return _in_space(verdict)
 
 
 def surprised(run: Outcome) -> tuple[Finding, ...]:
@@ -88,45 +203,29 @@ def judge_beside_truth(
     run: Outcome, true: VirtualMeasurement, hold: Hold, limits: Limits = LIMITS, slope: float = SLOPE
 ) -> Verdict:
     """The verdict on a run of a virtual measurement, beside the true one."""
-    found = errors(run, true, slope)
-    return _in_space(score.verdict(own_figures(run, true.vehicle), found, EFFECTS[hold.method], limits))
+    figures = own_figures(run, true.vehicle), errors(run, true, slope)
+    return _in_space(score.verdict(*figures, EFFECTS[hold.method], limits))
 
 
-def _in_space(found: Verdict) -> Verdict:
+def _in_space(verdict: Verdict) -> Verdict:
     """A verdict in the words of a vehicle that rolls, too."""
-    reason = found.reason
+    reason = verdict.reason
     for plane, space in WORDS.items():
         reason = reason.replace(plane, space)
-    return replace(found, reason=reason)
+    return Verdict(verdict.word, reason)
 
 
 def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:
     """Figures of a run by itself, of roll or pitch, whichever is worse; cost is not among them (0)."""
     inertia, chassis = np.diag(rigid(vehicle).inertia), vehicle.chassis
-    axes = [
-        _axis(_named(run, f"stabiliser {name}"), _named(run, f"{chassis} {name} rate"), inertia[i], run.period)
-        for i, name in enumerate(("roll", "pitch"))
-    ]
-    worse = max(axes, key=lambda own: own.moment_share_band)
-    tilt = max(float(np.abs(_named(run, f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
-    return replace(worse, pitch_max=tilt)
-
-
-def _axis(moment: np.ndarray, rate: np.ndarray, inertia: float, period: float) -> Own:
-    """Artificial moment (n,), N m, beside the inertia times what the rate (n,), rad/s, changes by."""
-    moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia * np.diff(rate) / period
-    held, whole = low_pass(moment, period), low_pass(turning, period)
-    return Own(
-        moment_rms=rms(moment),
-        moment_max=float(np.abs(moment).max()),
-        moment_share=_share(moment, turning),
-        moment_share_band=_share(held, whole),
-        force_share_band=0.0,
-        pitch_max=0.0,
-        seconds=0.0,
-        force_calls=0,
-        steps=0,
-    )
+    tilt = max(float(np.abs(run.samples(f"{chassis} {name}")).max()) for name in ("roll", "pitch"))
+    figures = list[Own]()
+    for i, name in enumerate(("roll", "pitch")):
+        moment, rate = run.samples(f"stabiliser {name}"), run.samples(f"{chassis} {name} rate")
+        moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
+        shares = _share(moment, turning), _share(low_pass(moment, run.period), low_pass(turning, run.period))
+        figures.append(Own(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
+    return max(figures, key=lambda own: own.moment_share_band)
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:
@@ -157,19 +256,19 @@ def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
 
 def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
     """What a run is beside the true one, at the answers' times: section forces of springs, mounts and bars, angles."""
-    every = round(run.period / true.step)
+    every, chassis = round(run.period / true.step), true.vehicle.chassis
     loads, states = true.run.elements[::every][: run.done], true.run.states[::every][: run.done]
     damage, force = dict[str, float](), dict[str, float]()
-    for i, element in enumerate(true.vehicle.elements):
-        found = _named(run, f"{element.name} {'M' if element.unit != 'N' else 'F'}")
-        damage[element.name] = damage_ratio(found, loads[:, i], slope)
-        force[element.name] = rms(found - loads[:, i])
-    off = {
-        name: _named(run, f"{true.vehicle.chassis} {name}") - states[:, i]
+    for element, load in zip(true.vehicle.elements, loads.T, strict=True):
+        computed = run.samples(f"{element.name} {'M' if element.unit != 'N' else 'F'}")
+        damage[element.name] = damage_ratio(computed, load, slope)
+        force[element.name] = rms(computed - load)
+    roll, pitch, height = (
+        np.abs(run.samples(f"{chassis} {name}") - states[:, i])
         for name, i in (("roll", ROLL), ("pitch", PITCH), ("z", Z))
-    }
-    tilt = np.maximum(np.abs(off["roll"]), np.abs(off["pitch"]))
-    return Errors(damage, force, {}, float(tilt.max()), rms(tilt), float(np.abs(off["z"]).max()))
+    )
+    tilt = np.maximum(roll, pitch)
+    return Errors(damage, force, {}, float(tilt.max()), rms(tilt), float(height.max()))
 
 
 def disagreement(own: Compared, noise: float = 0.0) -> float:
@@ -182,8 +281,3 @@ def disagreement(own: Compared, noise: float = 0.0) -> float:
     if whole <= 0.0 or noise > LOUD * math.sqrt(whole):
         return 0.0
     return math.sqrt(max(error - noise**2, 0.0) / (whole - noise**2))
-
-
-def _named(run: Outcome, name: str) -> np.ndarray:
-    """Samples (done,) of the answer of this name."""
-    return run.columns.read(name, 0, run.done)

@@ -1,8 +1,10 @@
-"""A virtual measurement: a vehicle in space on a rough road, and what transducers on it would write into a file."""
+"""A virtual measurement: a vehicle in space on a rough road, what transducers on it would write, and their file."""
 
+import json
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
@@ -10,12 +12,16 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.steps import divides, fitting
 from models.core.strict import Strict, quantity
+from models.core.whole_files import write_whole
 from models.engines.cut_vehicle import HubRun, build
+from models.measured.channel import BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured
 from models.measured.faults_of_measurement import check as check_faults
+from models.measured.formats import write
+from models.measured.formats.writing import Group
 from models.measured.recording import Recording
-from models.measured.signal import Quantity, Signal
+from models.measured.signal import HUB, Quantity, Signal
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import from_cardan, matrix
@@ -23,6 +29,9 @@ from models.sensors.virtual_accelerometers import in_space
 from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.hub_forces.scene import Frame, Road
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
+
+if TYPE_CHECKING:
+    from models.systems.measured.scene import MeasuredScene
 
 FILE_UNITS: dict[Quantity, tuple[str, float]] = {
     "force": ("kN", 1e3),
@@ -34,17 +43,8 @@ FILE_UNITS: dict[Quantity, tuple[str, float]] = {
     "strain": ("-", 1.0),
 }
 """Unit of each quantity in the files that are written, and its factor: those of a test track, not SI throughout."""
-HUB: tuple[tuple[str, Quantity, str], ...] = (
-    ("fx", "force", "x"),
-    ("fy", "force", "y"),
-    ("fz", "force", "z"),
-    ("mx", "moment", "x"),
-    ("my", "moment", "y"),
-    ("mz", "moment", "z"),
-)
-"""Channels of a hub, after its name and an underscore: quantity and component."""
-
-
+BEGAN = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
+"""When a virtual measurement began: the same in every one, so that it repeats bit for bit."""
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
@@ -102,56 +102,47 @@ def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, fil
     drive = two_tracks(vehicle, left, right, own.road.speed, own.step, round(own.duration / own.step))
     run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
     hubs = run.wrenches.reshape(len(run.times), -1)
-    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), _checks(vehicle, run, drive, own)])
+    elements = [element.name for element in vehicle.elements]
+    forces, gauged = ([elements.index(name) for name in names] for names in (own.sections, own.travels))
+    checks = [run.elements[:, forces], *([travels(vehicle, run, drive)[:, gauged]] if gauged else [])]
+    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), *checks])
     return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
 
 
 def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signal, ...]:
     """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
-    period = 1.0 / own.sampling_rate
+    period, whole = 1.0 / own.sampling_rate, f"divide virtual.duration = {own.duration:g} s"
     if not divides(own.step, own.duration):
-        raise InputError(
-            file,
-            "virtual.step",
-            own.step,
-            f"must divide virtual.duration = {own.duration:g} s, as {fitting(own.step, own.duration)} s does",
-        )
+        fit = f"must {whole}, as {fitting(own.step, own.duration)} s does"
+        raise InputError(file, "virtual.step", own.step, fit)
     if not (divides(own.step, period) and divides(period, own.duration)):
-        raise InputError(
-            file,
-            "virtual.sampling_rate",
-            own.sampling_rate,
-            "its period must be a multiple of "
-            f"virtual.step = {own.step:g} s and divide virtual.duration = {own.duration:g} s",
-        )
+        fit = f"its period must be a multiple of virtual.step = {own.step:g} s and {whole}"
+        raise InputError(file, "virtual.sampling_rate", own.sampling_rate, fit)
     known = tuple(element.name for element in vehicle.elements)
-    for place, names in (("travels", own.travels), ("sections", own.sections)):
-        for name in (name for name in names if name not in known):
+    for place in ("travels", "sections"):
+        for name in (name for name in getattr(own, place) if name not in known):
             raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
     signals = _signals(vehicle, own)
     check_faults(own.faults, signals, file)
     return signals
 
 
-def _signal(channel: str, what: Quantity, at: str, component: str, frame: Frame, check: bool = False) -> Signal:
-    unit, factor = FILE_UNITS[what]
-    return Signal(channel, "", channel, what, at, component, frame, 1, unit, factor, check=check)
-
-
 def _signals(vehicle: CutVehicle, own: VirtualTable) -> tuple[Signal, ...]:
     """Of hubs, motion and check channels, in the order of their columns."""
-    body, elements = vehicle.chassis, {element.name: element for element in vehicle.elements}
-    found = [_signal(f"{hub}_{name}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis in HUB]
-    found += [_signal(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
-    found += [_signal(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
-    found += [
-        _signal(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers for axis in "xyz"
+    body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
+    rows: list[tuple[str, Quantity, str, str, Frame]] = [
+        (f"{hub}_{name.lower()}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB
     ]
-    found += [
-        _signal(f"{name}_force", "force" if elements[name].unit == "N" else "moment", name, "", "body", True)
-        for name in own.sections
-    ]
-    return (*found, *(_signal(f"{name}_travel", "travel", name, "", "body", True) for name in own.travels))
+    rows += [(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
+    rows += [(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
+    rows += [(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers for axis in "xyz"]
+    checks = len(rows)
+    rows += [(f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body") for name in own.sections]
+    rows += [(f"{name}_travel", "travel", name, "", "body") for name in own.travels]
+    return tuple(
+        Signal(name, "", name, what, at, axis, frame, 1, *FILE_UNITS[what], check=i >= checks)
+        for i, (name, what, at, axis, frame) in enumerate(rows)
+    )
 
 
 def _motion(vehicle: CutVehicle, run: HubRun, places: dict[str, list[float]]) -> np.ndarray:
@@ -184,15 +175,6 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
     )
 
 
-def _checks(vehicle: CutVehicle, run: HubRun, drive: Drive, own: VirtualTable) -> np.ndarray:
-    """Forces and travels (n, m) of springs, mounts and bars, only to be compared with."""
-    names = [element.name for element in vehicle.elements]
-    forces = run.elements[:, [names.index(name) for name in own.sections]]
-    if not own.travels:
-        return forces
-    return np.hstack([forces, travels(vehicle, run, drive)[:, [names.index(name) for name in own.travels]]])
-
-
 def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
     """Travel (n, elements) from the design position, m (rad of a bar), positive in compression, along a run."""
     gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
@@ -200,24 +182,52 @@ def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
     return model.reported(run.times, run.states).elements
 
 
+def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
+    """Samples (n, signals), SI, in the units of the file that they are written to."""
+    factors = np.array([signal.factor for signal in signals])
+    blocks = (samples[i : i + BLOCK] / factors for i in range(0, len(samples), BLOCK))
+    comments = tuple(f"{s.quantity} {s.component} at {s.at}, axes {s.frame}" for s in signals)
+    names, units = tuple(s.channel for s in signals), tuple(s.unit for s in signals)
+    return Group(names, units, comments, period, len(samples), blocks)
+
+
+def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> Path:
+    """Write samples (n, signals), SI, as ``measured.EXTENSION`` in the file's units, and ``scene.toml`` beside it.
+
+    Returns the scene's path. Raises InputError where a file exists or the format has no room for the channels.
+    """
+    assert scene.virtual is not None
+    path, groups = folder / f"measured.{scene.virtual.format}", [group(virtual.signals, samples, virtual.period)]
+    write(path, groups, BEGAN, f"virtual measurement: {scene.title}")
+    table = scene.model_dump(exclude_unset=True, exclude={"virtual", "files", "sensors", "file", "folder", "options"})
+    table |= {f"effects.{name}": own for name, own in table.pop("effects", {}).items()}
+    lines = [f"{key} = {_toml(value)}" for key, value in table.items() if not isinstance(value, dict)]
+    for name, own in table.items():
+        if isinstance(own, dict):
+            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in own.items())]
+    for name, place in scene.virtual.accelerometers.items():
+        lines += ["", f"[sensors.{_toml(name)}]", f'body = "{virtual.vehicle.chassis}"', f"position = {place}"]
+    write_whole(folder / "scene.toml", "\n".join([*lines, "", map_lines(virtual.signals, path.name)]))
+    return folder / "scene.toml"
+
+
+def _toml(value: object) -> str:
+    """A TOML value: text, number, truth or a list of these."""
+    return json.dumps(value, ensure_ascii=False)
+
+
 def map_lines(signals: tuple[Signal, ...], file: str, offset: float = 0.0) -> str:
     """The scene's table of a file that holds these channels, as TOML; ``offset`` (s) is added to its clock."""
     lines = ["[[files]]", f'file = "{file}"', *([f"offset = {offset}"] if offset else []), "channels = ["]
     for signal in signals:
-        entry = {
-            "channel": signal.channel,
-            "quantity": signal.quantity,
-            "at": signal.at,
-            "component": signal.component,
-            "frame": signal.frame,
-        }
+        entry = {key: getattr(signal, key) for key in ("channel", "quantity", "at", "component", "frame")}
         text = ", ".join(f'{key} = "{value}"' for key, value in entry.items() if value)
         lines.append(f"  {{ {text}{', check = true' if signal.check else ''} }},")
     return "\n".join([*lines, "]", ""])
 
 
-def recording(found: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
+def recording(virtual: VirtualMeasurement, samples: np.ndarray, path: Path) -> Recording:
     """The samples (m, signals) as a recording, past all files and maps; ``path`` is where its columns lie."""
-    columns = Columns(path, tuple(signal.name for signal in found.signals), len(samples))
+    columns = Columns(path, tuple(signal.name for signal in virtual.signals), len(samples))
     columns.write(0, samples)
-    return Recording(found.signals, columns, found.period)
+    return Recording(virtual.signals, columns, virtual.period)

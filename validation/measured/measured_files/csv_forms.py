@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from validation.measured.measured_files.csv import holes, raw
-from validation.measured.measured_files.odd import FX, FZ, TIMES, Odd, Truth, usual
+from validation.measured.measured_files.csv import holes
+from validation.measured.measured_files.odd import FX, FZ, TIMES, TWICE, Files, Truth, every, raw, usual
 
 BEGAN = datetime(2026, 3, 2, 9, 30, 0)
 DAY_END = datetime(2026, 3, 2, 23, 59, 59, 900_000)
@@ -269,39 +269,25 @@ TWO_MEANINGS: tuple[tuple[str, str, Form, str], ...] = (
     ("line ends of an old Macintosh", "the whole file is one line", Form(end="\r"), "Macintosh"),
     ("text in UTF-32", "four bytes a letter", Form(encoding="utf-32"), "save it as UTF-8"),
 )
-NAMED = (
-    Odd(
-        "CSV: a value beyond the last heading",
-        "a channel without a name",
-        raw(Form(beside=("",)).text().replace("-25.0,\n", "-25.0,7\n").encode()),
-        "refused",
-        "beyond the last heading",
-    ),
-    Odd(
-        "CSV: a column of forces that is text",
+VALUE = raw(Form(beside=("",)).text().replace("-25.0,\n", "-25.0,7\n").encode())
+UNKNOWN = Form(("time [s]", "Fz [µ]", "Fx [°]"), encoding="cp1252")
+NAMED: Files = {
+    "CSV: a column of forces that is text": (
         "a whole channel would be lost",
         Form((*HEADINGS, "Fy [N]"), beside=("off",)).make,
-        "named",
         "no numbers: 'Fy [N]'",
     ),
-    Odd(
-        "CSV: repeated names without groups",
+    "CSV: repeated names without groups": (
         "Fz of which wheel",
         Form(("time [s]", "Fz [N]", "Fz [N]")).make,
-        "named",
         "2 channels are called 'Fz'",
-        {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)},
+        TWICE,
     ),
-    Odd(
-        "CSV: units of Windows-1252",
-        "the bytes are no UTF-8",
-        Form(("time [s]", "Fz [µ]", "Fx [°]"), encoding="cp1252").make,
-        "named",
-        "Windows-1252",
-    ),
-)
-FILES = (
-    *(Odd(f"CSV: {name}", hard, form.make, "right", truth=truth) for name, hard, form, truth in READ),
-    *(Odd(f"CSV: {name}", hard, form.make, "refused", says) for name, hard, form, says in TWO_MEANINGS),
-    *NAMED,
+    "CSV: units of Windows-1252": ("the bytes are no UTF-8", UNKNOWN.make, "Windows-1252"),
+}
+FILES = every(
+    {f"CSV: {name}": (hard, form.make, says) for name, hard, form, says in TWO_MEANINGS}
+    | {"CSV: a value beyond the last heading": ("a channel without a name", VALUE, "beyond the last heading")},
+    NAMED,
+    {f"CSV: {name}": (hard, form.make, truth) for name, hard, form, truth in READ},
 )

@@ -1,31 +1,25 @@
 """Files of other kinds that measurements come as: named for what they are, with what to do."""
 
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
-from validation.measured.measured_files.csv import plain, raw
-from validation.measured.measured_files.odd import Odd, written
+from validation.measured.measured_files.csv import whole
+from validation.measured.measured_files.odd import Make, called, every, raw
 
 TEXT = b"no table at all\n"
 BINARY = bytes(range(32)) * 8
 
 
-def archive(name: str, *members: str) -> Callable[[Path], Path]:
+def archive(name: str, *members: str) -> Make:
     """Make a zip archive with these files in it."""
 
     def make(folder: Path) -> Path:
         with zipfile.ZipFile(folder / name, "w") as file:
             for member in members:
-                file.writestr(member, plain())
+                file.writestr(member, whole())
         return folder / name
 
     return make
-
-
-def called(name: str) -> Callable[[Path], Path]:
-    """Make a file of RPC III under another extension."""
-    return lambda folder: written(folder / "odd.rsp").rename(folder / name)
 
 
 KINDS = (
@@ -56,16 +50,18 @@ KINDS = (
     ("MDF that is none", raw(BINARY, "odd.mf4"), "begins with MDF"),
     ("binary without a name", raw(BINARY, "odd.bin"), "no known format"),
 )
-FILES = (
-    *(Odd(f"kind: {name}", "its samples cannot be read", make, "refused", says) for name, make, says in KINDS),
-    Odd("kind: RPC III called .tim", "another extension of the same", called("odd.tim"), "right"),
-    Odd("kind: RPC III called .drv", "drive signals are no measurement", called("odd.drv"), "named", "actuators"),
-    Odd("kind: table called .asc", "a bus trace, or text", raw(plain().encode(), "odd.asc"), "right"),
-    Odd(
-        "kind: table called .xlsx",
-        "saved under the wrong name",
-        raw(plain().encode(), "odd.xlsx"),
-        "named",
-        "extension .xlsx",
-    ),
+FILES = every(
+    {f"kind: {name}": ("its samples cannot be read", make, says) for name, make, says in KINDS},
+    {
+        "kind: RPC III called .drv": ("drive signals are no measurement", called(".rsp", "odd.drv"), "actuators"),
+        "kind: table called .xlsx": (
+            "saved under the wrong name",
+            raw(whole().encode(), "odd.xlsx"),
+            "extension .xlsx",
+        ),
+    },
+    {
+        "kind: RPC III called .tim": ("another extension of the same", called(".rsp", "odd.tim")),
+        "kind: table called .asc": ("a bus trace, or text", raw(whole().encode(), "odd.asc")),
+    },
 )

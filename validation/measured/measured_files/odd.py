@@ -3,10 +3,10 @@
 import hashlib
 import time
 import tracemalloc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,11 +18,23 @@ from models.measured.formats.writing import Group
 Wanted = Literal["right", "named", "refused"]
 """Read right, read right as far as it goes with a sentence about it, or refused with a reason."""
 Truth = Mapping[str, tuple[np.ndarray, np.ndarray]]
+Make = Callable[[Path], Path]
+"""Writes a file into a folder, and returns its path."""
+Files = dict[str, tuple[Any, ...]]
+"""By name: what makes a file hard, how it is made, a phrase of what is said of it, and its truth unless the usual one;
+nothing is said of those that are read right."""
 COUNT, PERIOD = 40, 0.01
 """Samples of the usual file, s between them."""
 TIMES = PERIOD * np.arange(COUNT)
 FZ, FX = 1000.0 + 2.0**-6 * np.arange(COUNT), -2.5 * np.arange(COUNT)
 """Values with a few bits, which every format keeps exactly."""
+SLOW = 0.05
+"""s between samples of a channel of another rate."""
+TWO_RATES = {"Fz": (TIMES, FZ), "Fx": (SLOW * np.arange(COUNT), FX)}
+MANY = {f"c{i}": (TIMES, FZ + i) for i in range(300)}
+"""Truth of files of two rates, and of 300 channels."""
+TWICE = {"Fz (1)": (TIMES, FZ), "Fz (2)": (TIMES, FX)}
+"""Truth of a file that has the same name twice."""
 TOLERANCE = 1e-12
 """Of times and values alike: CSV writes times with 15 digits, the values are kept to the last bit."""
 MEMORY, SECONDS = 5e7, 10.0
@@ -45,7 +57,7 @@ class Odd:
 
     name: str
     hard: str
-    make: Callable[[Path], Path]
+    make: Make
     wanted: Wanted
     says: str = ""
     truth: Truth = field(default_factory=usual)
@@ -81,6 +93,23 @@ class Odd:
             tracemalloc.stop()
             if peak > MEMORY or time.perf_counter() - began > SECONDS:
                 raise AssertionError(f"{self.name}: {peak / 1e6:.0f} MB, {time.perf_counter() - began:.1f} s")
+
+
+def every(
+    refused: Files | None = None, named: Files | None = None, right: Files | None = None, greedy: Sequence[str] = ()
+) -> tuple[Odd, ...]:
+    """All files of these tables; greedy : names of those that claim a size that must not be taken."""
+    tables: tuple[tuple[Wanted, Files], ...] = (
+        ("refused", refused or {}),
+        ("named", named or {}),
+        ("right", right or {}),
+    )
+    odds = list[Odd]()
+    for wanted, files in tables:
+        for name, (hard, make, *rest) in files.items():
+            says, *truth = rest if wanted != "right" else ("", *rest)
+            odds.append(Odd(name, hard, make, wanted, says, truth[0] if truth else usual(), name in greedy))
+    return tuple(odds)
 
 
 def _state(folder: Path) -> dict[str, str]:
@@ -126,18 +155,57 @@ def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarra
     return write(path, [group])
 
 
-def patched(path: Path, place: int, new: bytes) -> Path:
-    """Replace bytes of a file."""
-    data = bytearray(path.read_bytes())
-    data[place : place + len(new)] = new
-    path.write_bytes(bytes(data))
-    return path
+def raw(data: bytes, name: str = "odd.csv") -> Make:
+    """Make a file of bytes."""
+
+    def make(folder: Path) -> Path:
+        (folder / name).write_bytes(data)
+        return folder / name
+
+    return make
 
 
-def cut(path: Path, length: int) -> Path:
-    """Cut a file off."""
-    path.write_bytes(path.read_bytes()[:length])
-    return path
+def plain(extension: str) -> Make:
+    """Make the usual file."""
+    return lambda folder: written(folder / f"odd{extension}")
+
+
+def wide(extension: str) -> Make:
+    """Make a file of 300 channels."""
+    table = np.column_stack([values for _, values in MANY.values()])
+    return lambda folder: written(folder / f"odd{extension}", tuple(MANY), table)
+
+
+def altered(make: Make, change: Callable[[bytes], bytes], name: str = "") -> Make:
+    """Make a file with other bytes, or under another name, too."""
+
+    def altered_file(folder: Path) -> Path:
+        path = make(folder)
+        path.write_bytes(change(path.read_bytes()))
+        return path.rename(folder / name) if name else path
+
+    return altered_file
+
+
+def patched(data: bytes, place: int, new: bytes) -> bytes:
+    """Bytes of a file, some of them replaced."""
+    return data[:place] + new + data[place + len(new) :]
+
+
+def two_rates(extension: str) -> Make:
+    """Make a file of two groups of different rates."""
+    clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW, FX))
+
+    def make(folder: Path) -> Path:
+        groups = [Group((name,), ("N",), ("",), period, COUNT, [own[:, None]]) for name, period, own in clocks]
+        return write(folder / f"odd{extension}", groups)
+
+    return make
+
+
+def called(extension: str, name: str) -> Make:
+    """Make the usual file under another name."""
+    return altered(plain(extension), bytes, name)
 
 
 @dataclass(frozen=True)
@@ -153,11 +221,11 @@ class Sweep:
     def silent(self, folder: Path) -> int:
         """Cuts after which something is read that is not right or not said."""
         folder.mkdir(parents=True, exist_ok=True)
-        path = written(folder / f"cut{self.extension}", values=_long() if self.extension == ".rsp" else None)
+        count = 7000 if self.extension == ".rsp" else COUNT  # three groups of RPC III and a half
+        table = np.column_stack((FZ, FX)) if count == COUNT else np.arange(float(count))[:, None] * [1.0, -2.5]
+        path = written(folder / f"cut{self.extension}", values=table)
+        truth = {name: (PERIOD * np.arange(count), column) for name, column in zip(("Fz", "Fx"), table.T, strict=True)}
         data = path.read_bytes()
-        table = _long() if self.extension == ".rsp" else np.column_stack((FZ, FX))
-        times = PERIOD * np.arange(len(table))
-        truth = {"Fz": (times, table[:, 0]), "Fx": (times, table[:, 1])}
         places = range(len(data)) if self.cuts == 0 else np.linspace(0, len(data) - 1, self.cuts).astype(int).tolist()
         return sum(self._is_silent(path, data[:place], truth) for place in places)
 
@@ -170,8 +238,3 @@ class Sweep:
             return difference(source, own, "cut off") > TOLERANCE
         except InputError as refusal:
             return path.name not in str(refusal)
-
-
-def _long() -> np.ndarray:
-    """Samples of three groups of RPC III and a half."""
-    return np.column_stack((np.arange(7000.0), -2.5 * np.arange(7000.0)))

@@ -2,19 +2,14 @@
 
 import math
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 from models.advice.choice.answer import Answer, Quantity
 from models.core.errors import InputError
 from models.systems.measured.clock import LEAST
-from models.systems.measured.hold_of import hold_of
-from models.systems.measured.of_scene import recorded
+from models.systems.measured.run import Examination, read, run
 from models.systems.measured.scene import MeasuredScene
-from models.systems.measured.section_run import SectionRun
-from models.systems.measured.section_run import run as march
-from models.systems.measured.sections import Sections
 
 ENGINE, WINDOWED = "mujoco", True
 FINE = 60
@@ -23,25 +18,17 @@ FINE = 60
 
 def answer(scene: MeasuredScene, engine: str) -> Answer:
     """Record, and march; the seconds are those of the march."""
-    vehicle = scene.rig().vehicle
-    if vehicle is None:
-        raise InputError(
-            scene.file,
-            "vehicle.parameters",
-            scene.vehicle.parameters,
-            "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file",
-        )
-    with tempfile.TemporaryDirectory() as name:
-        recording = recorded(scene, engine, Path(name))
-        job = SectionRun(
-            vehicle, recording, Sections(vehicle), engine, hold_of(scene, recording), scene.run.step, scene.file
-        )
-        begun = time.process_time()
-        run = march(job, Path(name) / "run")
-        seconds = time.process_time() - begun
-        found = {own.name: Quantity(own.unit, (run.samples(own).copy(),)) for own in run.answers}
-    count = (job.count - 1) * job.grid.every
-    return Answer(found, {"steps": count, "calls": 4 * count, "states": 2 * vehicle.size}, seconds)
+    if scene.vehicle.file is None:
+        allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
+        raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
+    result = run(scene, engine)
+    exam: Examination = result.detail
+    assert exam.outcome is not None
+    forces = [each for each in exam.outcome.answers if each.quantity != "acceleration"]
+    quantities = {each.name: Quantity(each.unit, (exam.outcome.samples(each),)) for each in forces}
+    counts = result.counts()
+    called = {"steps": counts["steps"], "calls": counts["force calls"], "states": counts["states"]}
+    return Answer(quantities, called, result.seconds)
 
 
 def steps(scene: MeasuredScene) -> int:
@@ -63,7 +50,7 @@ def _clock(scene: MeasuredScene) -> tuple[float, float]:
         whole = scene.virtual.duration - scene.clock.start
         return 1.0 / (scene.clock.rate or scene.virtual.sampling_rate), min(whole, scene.clock.duration or whole)
     with tempfile.TemporaryDirectory() as name:
-        recording = recorded(scene, ENGINE, Path(name))
+        recording = read(scene, Path(name))
         return recording.period, recording.duration
 
 

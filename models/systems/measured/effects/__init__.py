@@ -1,1 +1,130 @@
-"""Effects of scenes of a recording, one file each: see ``models.core.scene_effects``."""
+"""Effects of scenes of a recording: see ``models.core.scene_effects``."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.scene_effects import Entry, Table
+
+
+def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **counts: int) -> Entry:
+    """An effect of virtual transducers: a key of [virtual.faults]; files have the faults that they have."""
+    why = "for files have the faults that they have"
+
+    def there(scene: Any) -> bool:
+        own = getattr(scene.virtual.faults, key) if scene.virtual is not None else None
+        return any(own.values()) if isinstance(own, Mapping) else own is not None
+
+    def put_in(table: Table, scene: Any) -> None:
+        if "virtual" not in table:
+            raise InputError(scene.file, f"virtual.faults.{key}", None, f"needs a table [virtual], {why}")
+        table["virtual"].setdefault("faults", {})[key] = usual
+
+    faulty = {name.replace("_", " "): count for name, count in counts.items()}
+    needs = ("virtual_measurement",)
+    return Entry(says, f"virtual.faults.{key}", cost, faulty, needs, why=why, there=there, put_in=put_in)
+
+
+def _of_stabiliser(method: str, says: str, cost: str, count: str, modules: tuple[str, ...] = ()) -> Entry:
+    """A method that holds roll and pitch; without it nothing does, as the other one costs more."""
+
+    def leave_out(table: Table, scene: Any) -> None:
+        table.setdefault("stabilise", {})["method"] = "none"
+
+    return Entry(
+        says,
+        "stabilise.method",
+        cost,
+        {count: 2},
+        modules=modules,
+        usual=method,
+        there=lambda scene: scene.stabilise.method == method,
+        leave_out=leave_out,
+    )
+
+
+def _count_alike(table: Table, scene: Any) -> None:
+    """All files count the same time."""
+    for file in table["files"]:
+        file.pop("offset", None)
+        file.pop("drift", None)
+
+
+def _keep_road(table: Table, scene: Any) -> None:
+    """InputError: files must take its place."""
+    raise InputError(scene.file, "virtual", None, "can only give way to [[files]] that were measured: name them")
+
+
+TABLE = {
+    "dropouts": _of_transducers(
+        "dropouts",
+        "Virtual transducers that fall silent for a while",
+        "gaps to be bridged or left to the filter before the run, no more in it",
+        {"rate": 0.1, "length": 0.01},
+        faulty_channels=29,
+        silent_channels=29,
+    ),
+    "kalman_filter": _of_stabiliser(
+        "kalman",
+        "Roll and pitch held by a moment towards a Kalman filter's estimate",
+        "a filter over all samples before the run, and a moment over time",
+        "pulled angles",
+        ("models.systems.hub_forces.tilt_filter", "models.systems.hub_forces.tilt_march"),
+    ),
+    "late_channels": _of_transducers(
+        "delay",
+        "Channels of virtual transducers that are late",
+        "a spline through each late channel before the run, no more in it",
+        {"force": 2e-3},
+        faulty_channels=12,
+    ),
+    "offsets": _of_transducers(
+        "bias",
+        "Virtual transducers that do not read nought at nought",
+        "a sum per sample and channel before the run, no more in it",
+        {"force": 20.0},
+        faulty_channels=12,
+    ),
+    "own_clocks": Entry(
+        "Clocks of files that are shifted or too fast",
+        "files.0.offset",
+        "signals are moved to one clock by interpolation",
+        {"moved clocks": 1},
+        there=lambda scene: any(file.offset or file.drift for file in scene.files),
+        leave_out=_count_alike,
+    ),
+    "prescribed_angles": _of_stabiliser(
+        "prescribed",
+        "Roll and pitch enforced as measured, smoothed",
+        "derivatives of the smoothed angles before the run, and in every call a mass matrix solved for two moments",
+        "enforced angles",
+    ),
+    "quantisation": _of_transducers(
+        "quantisation",
+        "Samples of virtual transducers rounded to the steps of a converter",
+        "a rounding per sample and channel before the run, no more in it",
+        {"bits": 12},
+        faulty_channels=29,
+    ),
+    "sensor_noise": _of_transducers(
+        "noise",
+        "White noise on every sample of virtual transducers",
+        "a random number per sample and channel before the run, no more in it",
+        {"force": 8.0, "moment": 1.0, "angle": 1.75e-3, "angular rate": 5e-3},
+        faulty_channels=29,
+    ),
+    "virtual_measurement": Entry(
+        "A virtual measurement in place of files",
+        "virtual",
+        "a run of the whole vehicle on its tyres, written as a file and read again",
+        {"runs on tyres": 1},
+        leave_out=_keep_road,
+    ),
+    "wrong_gains": _of_transducers(
+        "gain",
+        "Virtual transducers whose factor is wrong",
+        "a product per sample and channel before the run, no more in it",
+        {"force": 0.01},
+        faulty_channels=12,
+    ),
+}

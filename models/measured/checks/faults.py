@@ -1,0 +1,89 @@
+"""Single faults of channels, by what each accounts for in the motion of the vehicle: factors, shifts, levers.
+
+A factor is a sign, a unit or a calibration; a shift one in time; a lever moments about another point than the hub:
+about the contact patch, or a plane of the transducer.
+"""
+
+from models.core.finding import Finding, Weight
+from models.measured.checks.agreement import Fault
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.spikes import spikes
+from models.measured.ratios import sentence
+
+TOLD = 0.02, 0.1
+"""Errors of a factor of which it is said in how many channels they would be seen."""
+SHIFT = 3e-3
+"""s: a channel in which less would not be seen is named as not checked."""
+PATCH = 0.2, 0.6
+"""m: radii of wheels; a lever of this size is one of them."""
+
+
+def factors(evidence: Evidence) -> list[Finding]:
+    """Sizes are shares in %, or recorded by true value where sign or unit is wrong: a doubt if a spike may say so."""
+    if evidence.lacking:
+        what = "Signs, units and factors were not checked by the motion of the vehicle"
+        return [Finding("factor", "note", "", f"{what}: this needs {evidence.lacking}.")]
+    findings = [_factor(evidence, fault) for fault in evidence.faults if fault.kind == "factor"]
+    least = [wrong for _, wrong in evidence.seen.values()]
+    parts = " and ".join(f"by {100 * size:.0f} % in {sum(wrong < size for wrong in least)}" for size in TOLD)
+    text = f"A factor that is wrong {parts} of {len(least)} channels would be seen by the motion."
+    return [*findings, Finding("gain", "note", "", text)]
+
+
+def _factor(evidence: Evidence, fault: Fault) -> Finding:
+    kind, text = sentence(fault.size, fault.signals[0], "what the motion of the vehicle and all other channels tell")
+    if len(fault.signals) > 1:
+        text = f"{fault.name[0].upper()}{fault.name[1:]} are wrong alike: {text}"
+    if kind in ("gain", "size"):
+        text += f" The factor is {fault.size:.4g} +- {2 * fault.error:.2g} (95 %), if the vehicle file is right."
+        return Finding("gain", "doubt", fault.name, text, 100 * (fault.size - 1), "%", fault.names)
+    spiky = any(len(spikes(evidence.recording.samples(s))[0]) for s in fault.signals)
+    weight: Weight = "doubt" if spiky else "error"
+    return Finding(kind, weight, fault.name, text, fault.size, "1", fault.names)
+
+
+def shifts(evidence: Evidence) -> list[Finding]:
+    """Sizes are in s, positive where a channel is late; by the motion that the hub forces should cause."""
+    if evidence.agreement is None:
+        what = "Shifts in time were not checked by the motion of the vehicle"
+        return [Finding("shift", "note", "", f"{what}: this needs {evidence.lacking}.")]
+    findings = [_shift(fault) for fault in evidence.faults if fault.kind == "late"]
+    blind = [name for name, (late, _) in evidence.seen.items() if not late < SHIFT]
+    seen = f"{len(evidence.seen) - len(blind)} of {len(evidence.seen)}"
+    text = f"A shift of {1e3 * SHIFT:g} ms would be seen in {seen} channels by the motion of the vehicle"
+    text += f"; too little of it comes from {', '.join(blind)}." if blind else "."
+    return [*findings, Finding("shift", "note", "", text)]
+
+
+def _shift(fault: Fault) -> Finding:
+    late, single = "late" if fault.size > 0 else "early", len(fault.signals) == 1
+    subject = f"{fault.name} is" if single else f"{fault.name[0].upper()}{fault.name[1:]} are"
+    text = (
+        f"{subject} {1e3 * abs(fault.size):.2f} ms {late} (+-{2e3 * fault.error:.2g} ms at 95 %) against the other "
+        "channels, if the vehicle file is right: take out the delay of filter or telemetry, or give the file "
+        f"offset = {-fault.size:.4f} if all of it is shifted."
+    )
+    return Finding("shift", "doubt", fault.name, text, fault.size, "s", fault.names)
+
+
+def levers(evidence: Evidence) -> list[Finding]:
+    """Sizes are in m, the height of the point above the hub; by the motion that the hub forces should cause."""
+    return [_lever(fault) for fault in evidence.faults if fault.kind == "lever"]
+
+
+def _lever(fault: Fault) -> Finding:
+    hubs = tuple(dict.fromkeys(signal.at for signal in fault.signals))
+    length, side, wheel = abs(fault.size), "above" if fault.size > 0 else "below", ""
+    if PATCH[0] < length < PATCH[1]:
+        wheel = (
+            ", a wheel's radius: they are about the contact patch"
+            if fault.size < 0
+            else ", a wheel's radius: they were referred from the contact patch to the hub twice, or with a wrong sign"
+        )
+    remedy = ", ".join(f"{hub} = {fault.size:.3g}" for hub in hubs)
+    text = (
+        f"{', '.join(fault.names)} are about a point {length:.3g} m {side} the hub (+-{2 * fault.error:.2g} m at 95 %)"
+        f"{wheel}, if the vehicle file is right. Moments are needed about the hub: give levers = {{ {remedy} }} in the "
+        f"scene, which takes {fault.size:.3g} m Fy off Mx and adds {fault.size:.3g} m Fx to My."
+    )
+    return Finding("lever", "doubt", " and ".join(hubs), text, fault.size, "m", fault.names)

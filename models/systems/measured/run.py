@@ -1,0 +1,355 @@
+"""A scene of a recording, run: its files on one clock, checked, run free and held, judged, handed on.
+
+Whoever runs such a scene does so here. Samples lie on disk in columns, read block by block. A result holds those of the
+run that is handed on as far as they are a block, figures of every section force, and the place of the columns.
+"""
+
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from models.core.errors import InputError, RunFailed
+from models.core.finding import Finding
+from models.core.result import Result
+from models.core.systems import load
+from models.drift.score import Verdict
+from models.fatigue.counting import Counted, count
+from models.measured.checks import findings
+from models.measured.checks.evidence import Evidence
+from models.measured.checks.spectra import noise
+from models.measured.checks.weight import moments
+from models.measured.recording import Progress, Recording, silent
+from models.measured.signal import Quantity, Signal
+from models.multibody.cut_kernel import WRENCH
+from models.systems.measured.clock import record
+from models.systems.measured.consequences import Consequence, consequences, judged
+from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
+from models.systems.measured.pitch_plane import PlaneJob
+from models.systems.measured.pitch_plane import run as run_plane
+from models.systems.measured.plan import mapped, opened
+from models.systems.measured.scene import Deviations, MeasuredScene, Rig
+from models.systems.measured.section_run import Hold, Outcome, SectionRun
+from models.systems.measured.section_run import check as check_run
+from models.systems.measured.section_run import run as march
+from models.systems.measured.sections import Answer, Sections, points
+from models.systems.measured.trust import Drift, Level, drift
+from models.systems.measured.verdict import Compared, checks, compare, judge, surprised
+from models.systems.measured.virtual import VirtualMeasurement, virtual_measurement, write_pattern
+from models.systems.pitch_plane.trust import ANGLE, Trust
+from models.vehicles.cut_vehicle import CutVehicle
+
+WORK = "work"
+"""Folder of what a killed run goes on with: samples on one clock, and runs with their checkpoints."""
+FREE = "free"
+NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "angle", "rate": "angular rate"}
+"""Keys of the scene's table ``noise``, and the quantities that they are of."""
+
+
+@dataclass
+class Examination:
+    """What there is of a recording, in the order in which it is made; what was not reached is empty.
+
+    scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
+    seconds : of each part. counted : what is handed on. temporary : where all of it lies, None in a user's folder.
+    """
+
+    scene: MeasuredScene
+    rig: Rig
+    engine: str
+    recording: Recording
+    virtual: VirtualMeasurement | None
+    holds: dict[str, Hold]
+    findings: tuple[Finding, ...] = ()
+    drift: Drift | None = None
+    trust: tuple[tuple[str, Trust], ...] = ()
+    runs: dict[str, Outcome] = field(default_factory=dict)
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    consequences: tuple[Consequence, ...] = ()
+    compared: tuple[Compared, ...] = ()
+    counted: dict[Answer, Counted] = field(default_factory=dict)
+    handed: tuple[Path, ...] = ()
+    failed: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    temporary: "TemporaryDirectory[str] | None" = None
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """What the checks look at."""
+        stated = {quantity: getattr(self.scene.noise, key) for key, quantity in NOISE.items()}
+        claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
+        return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an error in the recording forbids a run."""
+        return any(finding.weight == "error" for finding in self.findings)
+
+    @property
+    def chosen(self) -> str:
+        """The run that is handed on: with the stabiliser, or free where the scene names none."""
+        return [*self.holds][-1]
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """The same; None where none was made."""
+        return self.runs.get(self.chosen)
+
+    def put_in(self, signal: Signal) -> bool:
+        """Whether a signal drives or holds the vehicle; all others are compared with."""
+        moving = signal.at == self.rig.chassis and signal.quantity in ("angle", "angular rate")
+        return not signal.check and (signal.at in self.rig.hubs or (moving and self.chosen != FREE))
+
+    def forces(self, outcome: Outcome) -> list[Answer]:
+        """Section forces and moments of a run at the sections that the scene names, all if none."""
+        wanted = self.scene.hand_on.sections
+        return [answer for answer in forces(outcome.answers) if wanted is None or answer.section in wanted]
+
+    def job(self, name: str, recording: Recording | None = None) -> SectionRun | PlaneJob:
+        """A run of this name to be made, or of another recording held alike; answers at all sections, in the chassis'
+        axes, and at accelerometers."""
+        recording, vehicle = recording or self.recording, self.rig.vehicle
+        settings = self.engine, self.holds[name], self.scene.run.step, self.scene.file
+        if vehicle is None:
+            return PlaneJob(recording, self.rig.name, *settings)
+        sections = Sections(vehicle, points=points(vehicle, recording.signals, self.scene.places))
+        return SectionRun(vehicle, recording, sections, *settings)
+
+    def march(self, name: str, folder: Path, told: Callable[[float, float], None] = silent) -> Outcome:
+        """Make a run of this name, or what is missing of it in a folder."""
+        job = self.job(name)
+        if isinstance(job, SectionRun):
+            return march(job, folder, told)
+        shutil.rmtree(folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
+        run = run_plane(job, folder, self.scene.limits)
+        self.verdicts[name] = run.verdict
+        if name == FREE and run.trust is not None:
+            self.trust = (("pitch", run.trust),)
+        return run.outcome
+
+    def again(self, name: str, recording: Recording, folder: Path) -> Outcome:
+        """A run of another recording, held as the one of this name."""
+        job = self.job(name, recording)
+        return march(job, folder / "run") if isinstance(job, SectionRun) else run_plane(job, folder / "run").outcome
+
+
+def run(
+    scene: MeasuredScene, engine: str = "", folder: Path | None = None, progress: Progress = silent, whole: bool = False
+) -> Result:
+    """Run a recording held as its scene says; the result's detail is the Examination.
+
+    folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole : whether
+    the recording is checked, run free, too, and judged, and files are handed on. Raises InputError for files that
+    cannot be read; a whole run that fails is told in the detail, another one raises RunFailed.
+    """
+    temporary = None if folder else TemporaryDirectory()
+    folder = folder or Path(temporary.name if temporary else "")
+    exam = _begun(scene, engine or scene.run.engine, folder, progress)
+    exam.temporary = temporary
+    if whole:
+        _examined(exam, folder, progress)
+    else:
+        begun = time.process_time()
+        exam.runs[exam.chosen] = exam.march(exam.chosen, folder / WORK / exam.chosen)
+        exam.seconds["march"] = time.process_time() - begun
+    return _labelled(scene, exam, folder)
+
+
+def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress) -> Examination:
+    """The recording on one clock: of the scene's files, or of those that a virtual measurement leaves."""
+    rig, virtual, seconds, begun = scene.rig(), None, dict[str, float](), time.perf_counter()
+    (folder / WORK).mkdir(parents=True, exist_ok=True)
+    if scene.virtual is not None and rig.vehicle is not None:
+        progress("virtual measurement", 0.0)
+        virtual = virtual_measurement(rig.vehicle, scene.virtual, engine, scene.file)
+        if not (folder / "scene.toml").is_file():  # else a killed run has written it
+            write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
+        scene = load(folder / "scene.toml")
+        seconds["virtual measurement"] = time.perf_counter() - begun
+    recording = read(scene, folder / WORK, lambda text, part: progress(text, 0.2 * part))
+    exam = Examination(scene, rig, engine, recording, virtual, holds_of(scene, recording), seconds=seconds)
+    _lap(exam, "reading", begun)
+    return exam
+
+
+def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Recording:
+    """The files of a scene on one clock, in columns in a folder; raises InputError for files that cannot be."""
+    sources, rig = opened(scene), scene.rig()
+    return record(scene, sources, mapped(scene, sources, rig), rig.hubs, folder, progress)
+
+
+def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
+    """How each run is held: free, and by the stabiliser that the scene names."""
+    own, deviations = scene.stabilise, noise_of(scene.noise, recording)
+    held = {own.method: Hold(own.method, own.bandwidth, own.model, own.smoothing, **deviations)}
+    return {FREE: Hold("none", **deviations)} | ({} if own.method == "none" else held)
+
+
+def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:
+    """Noise (SI, by key) as stated; or else estimated, and not below what transducers have: filters hide noise."""
+    deviations = dict[str, float]()
+    for key, quantity in NOISE.items():
+        sizes = np.array([noise(recording, s) for s in recording.find(quantity) if not s.check])
+        known = sizes[np.isfinite(sizes)]  # none of a channel with too many gaps
+        least = float(getattr(Hold, key))
+        deviations[key] = getattr(stated, key) or max(least, float(np.median(known)) if len(known) else least)
+    return deviations
+
+
+def _lap(exam: Examination, part: str, begun: float) -> None:
+    """Seconds of a part that has ended, since ``begun`` and without the parts before it."""
+    exam.seconds[part] = time.perf_counter() - begun - sum(exam.seconds.values())
+
+
+def _examined(exam: Examination, folder: Path, progress: Progress) -> None:
+    """Check, predict, run, judge, and hand on, as far as the recording can be used."""
+    lap = partial(_lap, exam, begun=time.perf_counter() - sum(exam.seconds.values()))
+    progress("checks", 0.2)
+    exam.findings = findings(exam.evidence)
+    lap("checks")
+    if exam.stopped:
+        return
+    if exam.rig.vehicle is not None:
+        _predicted(exam, exam.rig.vehicle)
+    _run(exam, folder / WORK, progress)
+    if exam.rig.vehicle is not None:
+        _judged(exam, exam.rig.vehicle)
+    lap("runs")
+    if exam.outcome is not None:
+        named = {(finding.check, finding.signals, finding.place) for finding in exam.findings}
+        exam.findings += tuple(f for f in exam.outcome.findings if (f.check, f.signals, f.place) not in named)
+        exam.findings += surprised(exam.outcome)
+    progress("what the findings do", 0.9)
+    _weighed(exam, folder / WORK)
+    lap("what the findings do")
+    if exam.outcome is not None:
+        progress("files", 0.95)
+        _handed(exam, exam.outcome, folder)
+        lap("files")
+
+
+def _predicted(exam: Examination, vehicle: CutVehicle) -> None:
+    """Drift of the free run, which begins level and at rest, from the noise and from how the vehicle really began."""
+    recording, free = exam.recording, exam.holds[FREE]
+    tilt, rate = (
+        [_began(recording, what, axis, vehicle.chassis) for axis in ("roll", "pitch")]
+        for what in ("angle", "angular rate")
+    )
+    couple = moments(exam.evidence)  # that the motion does not bear out, at the first hub
+    bias = np.concatenate([np.zeros(3), couple, np.zeros(WRENCH * len(vehicle.hubs) - 5)]) if couple.any() else None
+    frame = next(s.frame for s in recording.signals if s.at in vehicle.hubs)
+    level = Level(free.force, free.moment, bias, tilt, rate)
+    exam.drift = drift(vehicle, level, recording.period, recording.duration, frame)
+    lacking = exam.evidence.lacking
+    rest = f"not checked: whether a channel is late; this needs {lacking}" if lacking else ""
+    exam.trust = tuple(
+        (what, replace(exam.drift.trust(angle), unchecked=rest))
+        for what, angle in (("section forces", None), ("motion", ANGLE))
+    )
+
+
+def _began(recording: Recording, what: str, axis: str, chassis: str) -> float:
+    """Mean (rad, rad/s) of the first tenth of a second of an angle or a rate; 0 where it is not measured."""
+    for signal in recording.find(what, chassis, axis)[:1]:
+        values = recording.columns.read(signal.name, 0, max(round(0.1 / recording.period), 1))
+        return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
+    return 0.0
+
+
+def _run(exam: Examination, work: Path, progress: Progress) -> None:
+    """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
+    for name in exam.holds:
+        if isinstance(job := exam.job(name), SectionRun):
+            check_run(job)
+    for i, name in enumerate(exam.holds):
+        progress(f"{name} run", 0.2 + 0.7 * i / len(exam.holds))
+        told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(exam.holds), 0.7 / len(exam.holds))
+        try:
+            exam.runs[name] = exam.march(name, work / name, told)
+        except RunFailed as error:
+            exam.failed[name] = str(error)
+            if isinstance(error.partial, Outcome):
+                exam.runs[name] = error.partial
+        except InputError as error:  # what the filter refuses, the findings may explain
+            if exam.rig.vehicle is None or all(finding.weight == "note" for finding in exam.findings):
+                raise
+            exam.failed[name] = str(error)
+
+
+def _left(name: str, progress: Progress, begin: float, share: float) -> Callable[[float, float], None]:
+    """Progress of a run with the time that it will still take."""
+    started, first = time.monotonic(), [-1.0]
+
+    def told(done: float, whole: float) -> None:
+        first[0] = done if first[0] < 0 else first[0]
+        spent = time.monotonic() - started
+        left = f", {spent * (whole - done) / (done - first[0]):.0f} s left" if done > first[0] else ""
+        progress(f"{name}: {done:.0f} of {whole:.0f} s{left}", begin + share * done / max(whole, 1e-9))
+
+    return told
+
+
+def _judged(exam: Examination, vehicle: CutVehicle) -> None:
+    """Check channels beside the run that is handed on, and the verdict on every run."""
+    assert exam.drift is not None
+    recording, slopes = exam.recording, tuple(exam.scene.hand_on.slopes)
+    for name, outcome in exam.runs.items():
+        job = exam.job(name)
+        assert isinstance(job, SectionRun)
+        beside = tuple(compare(recording, outcome, *pair, slopes) for pair in checks(job))
+        exam.verdicts[name] = judge(
+            outcome,
+            vehicle,
+            exam.holds[name],
+            recording.period,
+            exam.scene.limits,
+            exam.drift.passes(exam.drift.angle) or recording.duration,
+            [compared for compared in beside if compared.signal.check],
+            {s.name: noise(recording, s) for s in recording.signals if s.check},
+        )
+        if name == exam.chosen:
+            exam.compared = beside
+
+
+def _weighed(exam: Examination, work: Path) -> None:
+    """What the findings do to the section forces that are handed on, and the verdicts that follow from it: by the run
+    with the stabiliser, or by the free one where that failed."""
+    name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
+    if name in exam.runs:
+        again, answers = partial(exam.again, name), exam.forces(exam.runs[name])
+        exam.consequences = consequences(exam.findings, exam.recording, again, answers, work / "findings")
+        exam.verdicts = {name: judged(verdict, exam.consequences) for name, verdict in exam.verdicts.items()}
+
+
+def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:
+    """Section forces counted, and into files in every format that the scene names; those of a killed run are left."""
+    answers, wanted = exam.forces(outcome), exam.scene.hand_on
+    exam.counted = {answer: count(outcome.samples(answer), tuple(wanted.slopes)) for answer in answers}
+    exam.handed = tuple(folder / f"{FILES}.{form}" for form in wanted.formats)
+    formats = [path.suffix[1:] for path in exam.handed if not path.exists()]
+    comment = f"{exam.scene.title}; computed from wheel forces, {exam.chosen} run, {exam.engine}"
+    hand_on(outcome, folder, formats, answers, exam.recording.start, comment)
+
+
+def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
+    """The result of a scene, whose detail is its examination."""
+    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
+    return labelled(
+        scene,
+        exam.outcome,
+        exam.counted,
+        folder,
+        engine=exam.engine,
+        seconds=exam.seconds.get("march", 0.0),
+        doubts=[finding.text for finding in exam.findings if finding.weight != "note"],
+        detail=exam,
+        run=exam.chosen,
+        verdicts=json.dumps(verdicts),
+        failed=json.dumps(exam.failed),
+    )

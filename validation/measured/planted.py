@@ -1,0 +1,172 @@
+"""A bench for the checks of a recording: a car on a road, its samples spoilt, and what the checks find in them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache, wraps
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from models.core.finding import Finding
+from models.measured.checks import check
+from models.measured.faults_of_measurement import Faults
+from models.measured.signal import HUB, Place
+from models.systems.hub_forces.scene import Road
+from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, recording, virtual_measurement
+from models.vehicles.cut_vehicle import CutVehicle, cut
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+from validation.spatial.cars import twin
+
+SEED = 61
+SENSORS = {"rail": [0.3, 0.5, 0.4], "tower": [1.0, 0.0, 0.7], "shelf": [-1.2, -0.3, 0.6], "bonnet": [1.3, -0.5, 0.8]}
+"""Accelerometers on the chassis, m."""
+NOISE: dict[str, float] = {"force": 8.0, "moment": 1.0, "acceleration": 0.05, "angular rate": 5e-3, "angle": 1.75e-3}
+"""White noise on every sample, SI."""
+Ride = tuple[Literal["A", "B", "C", "D"], int, float, float]
+"""Class, seed, speed (m/s) and length (s) of a recording."""
+Spoil = Callable[[VirtualMeasurement, np.ndarray], None]
+"""Changes samples (n, signals) where they are."""
+
+
+def columns(virtual: VirtualMeasurement, *names: str) -> list[int]:
+    """Numbers of channels."""
+    return [[s.name for s in virtual.signals].index(name) for name in names]
+
+
+def spoiling(change: Callable[..., None]) -> Callable[..., Spoil]:
+    """A change of a recording's samples, asked for by what it takes beside these."""
+
+    def made(*settings: Any, **named: Any) -> Spoil:
+        return lambda virtual, samples: change(virtual, samples, *settings, **named)
+
+    return wraps(change)(made)
+
+
+@spoiling
+def times(virtual: VirtualMeasurement, samples: np.ndarray, factor: float, *names: str, add: float = 0.0) -> None:
+    """Samples of some channels, times a factor."""
+    samples[:, columns(virtual, *names)] = factor * samples[:, columns(virtual, *names)] + add
+
+
+@spoiling
+def exchanged(virtual: VirtualMeasurement, samples: np.ndarray, *pairs: tuple[str, str]) -> None:
+    """All channels of hubs, exchanged."""
+    for pair in pairs:
+        first, second = (columns(virtual, *(f"{hub}_{name.lower()}" for name, *_ in HUB)) for hub in pair)
+        samples[:, first + second] = samples[:, second + first]
+
+
+@spoiling
+def lost(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+    """A channel that is silent from a time on, for another (s)."""
+    first = round(begin / virtual.period)
+    samples[first : first + round(length / virtual.period), columns(virtual, name)] = np.nan
+
+
+@spoiling
+def held(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
+    """A channel that keeps its value from a time on, for another (s)."""
+    first, (own,) = round(begin / virtual.period), columns(virtual, name)
+    samples[first : first + round(length / virtual.period), own] = samples[first, own]
+
+
+@spoiling
+def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: float, height: float) -> None:
+    """One sample of a channel too high."""
+    samples[round(time / virtual.period), columns(virtual, name)] += height
+
+
+@spoiling
+def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, part: float) -> None:
+    """The largest samples of a channel cut off."""
+    (own,) = columns(virtual, name)
+    samples[:, own] = np.minimum(samples[:, own], np.quantile(samples[:, own], 1 - part))
+
+
+@spoiling
+def referred(virtual: VirtualMeasurement, samples: np.ndarray, lever: float, *hubs: str) -> None:
+    """Moments of hubs about a point so far (m) above them: (Mx + r Fy, My - r Fx)."""
+    for hub in hubs:
+        fx, fy, mx, my = columns(virtual, *(f"{hub}_{name}" for name in ("fx", "fy", "mx", "my")))
+        samples[:, mx] += lever * samples[:, fy]
+        samples[:, my] -= lever * samples[:, fx]
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A fault: ``check`` and a part of the ``place`` that must be named, and the ``size`` in its ``unit``."""
+
+    name: str
+    check: str
+    place: str
+    size: float
+    unit: str
+    spoil: Spoil | None = None
+    faults: dict[str, Any] = field(default_factory=dict)
+
+
+@cache
+def measurement(
+    vehicle: str = "r19_free", road: Ride = ("C", 1, 20.0, 15.0), rate: float = 500.0
+) -> VirtualMeasurement:
+    """A car on a road; it and the four accelerometers are read at a rate (Hz)."""
+    kind, seed, speed, duration = road
+    own = VirtualTable(
+        road=Road(iso8608=kind, seed=seed, speed=speed),
+        duration=duration,
+        step=2e-3,
+        sampling_rate=rate,
+        accelerometers=SENSORS,
+    )
+    return virtual_measurement(_vehicle(vehicle), own, "mujoco")
+
+
+def _vehicle(name: str) -> CutVehicle:
+    """R19-free; without any symmetry; with 80 kg on board; on springs 20 % stiffer; on dampers 30 % weaker."""
+    whole = load_vehicle("r19_free")
+    body, *others = whole.bodies
+    vehicles = {
+        "r19_free": whole,
+        "twin": twin(),
+        "loaded": replace(whole, bodies=(replace(body, mass=body.mass + 80), *others)),
+        "stiff": _sprung(whole, 1.2, 1.0),
+        "worn": _sprung(whole, 1.0, 0.7),
+    }
+    return cut(vehicles[name], "body")
+
+
+def _sprung(whole: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehicle:
+    springs = tuple(replace(s, stiffness=stiffer * s.stiffness, damping=damped * s.damping) for s in whole.springs)
+    return replace(whole, springs=springs)
+
+
+def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
+    """Errors and doubts of samples (m, signals)."""
+    own = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
+    places = {name: Place("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
+    claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
+    return tuple(finding for finding in check(own, virtual.vehicle, places, claimed) if finding.weight != "note")
+
+
+def planted(
+    virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
+) -> tuple[Finding, ...]:
+    """What is found in a recording with faults of its transducers, and spoilt samples."""
+    samples = virtual.samples(Faults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
+    for change in spoil:
+        if change is not None:
+            change(virtual, samples)
+    return findings(virtual, samples, folder)
+
+
+def drifting(virtual: VirtualMeasurement, fast: float, folder: Path) -> tuple[Finding, ...]:
+    """Findings where all but the hub forces is in a file whose clock is fast by a part."""
+    samples, driving = virtual.samples(Faults(noise=NOISE), SEED), ("force", "moment")
+    clock = virtual.period * np.arange(len(samples))
+    for i in (i for i, s in enumerate(virtual.signals) if s.quantity not in driving):
+        samples[:, i] = make_interp_spline(clock, samples[:, i])(np.minimum(clock / (1 + fast), clock[-1]))
+    signals = tuple(replace(s, file="wheels" if s.quantity in driving else "inertial") for s in virtual.signals)
+    return findings(replace(virtual, signals=signals), samples, folder)
