@@ -6,12 +6,11 @@ limit cycle) is that of ``rail.equations``, of which this takes the rates and th
 """
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
 
 import numpy as np
 
 from models.core.errors import RunFailed
-from models.rail.equations import LEAN, LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
+from models.rail.equations import LEAN, LIMIT, ROLL, YAW, Equations, Y, Z
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
 
 
@@ -22,8 +21,6 @@ def leaning(weight: float, body: np.ndarray) -> np.ndarray:
 
 class EngineWheelset(Equations, ABC):
     """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
-
-    ENGINE: ClassVar[str]
 
     @abstractmethod
     def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -38,17 +35,11 @@ class EngineWheelset(Equations, ABC):
         joints = to_joints(np.asarray(state, float))
         return rates_of(joints, self.accelerations(joints[:JOINTS], joints[JOINTS:]))
 
-    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
-        """As ``Equations.run``, by the engine's RK4; the contacts are those of the states that are kept."""
-        count, joints = self._steps(state, duration, step, every), to_joints(np.array(state, float))
+    def _marched(self, state: np.ndarray, count: int, step: float, every: int) -> tuple[np.ndarray, np.ndarray]:
+        """States by the engine's RK4, and the contacts of those that are kept."""
+        joints = to_joints(state)
         states = from_joints(self.marched(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        kept = states[::every]
-        contacts, out = self.blank(len(kept)), np.empty(STATES)
-        for one, contact in zip(kept, contacts, strict=True):
-            rates(one, *self.given, out, contact)
-        found = Path(np.arange(len(kept)) * step * every, kept, contacts)
-        self._check(found, step, every, self.ENGINE)
-        return found
+        return states[::every], self.contacts(states[::every])

@@ -93,7 +93,7 @@ class ExudynWheelset(EngineWheelset):
                 numberOfODE2Coordinates=JOINTS,
             )
         )
-        suspension(mbs, tree(mbs, node, table(self.given), self.body), self.body)
+        suspension(mbs, tree(mbs, node, table(*self.parameters), self.body), self.body)
         sensors = [
             mbs.AddSensor(
                 items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)

@@ -69,7 +69,7 @@ class MujocoWheelset(EngineWheelset):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The model; without ``rail_law`` installed, it has no rails."""
-        return model(table(self.given), self.body)
+        return model(table(*self.parameters), self.body)
 
     @cached_property
     def _data(self) -> mujoco.MjData:

@@ -84,7 +84,7 @@ def _there(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.nda
     """Rates (n, 10) of states and the powers (n, 5) that the works add up."""
     rates, contacts = np.empty_like(states), equations.blank(len(states))
     for state, rate, contact in zip(states, rates, contacts, strict=True):
-        eq.rates(state, *equations.given, rate, contact)
+        eq.rates(state, *equations.parameters, rate, contact)
     out = -contacts.sum(axis=1)
     return rates, np.column_stack(
         [

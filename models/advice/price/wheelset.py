@@ -89,7 +89,7 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     states = np.ascontiguousarray(done.y.T)
     contacts, out = equations.blank(len(times)), np.empty(STATES)
     for one, contact in zip(states, contacts, strict=True):
-        rates(one, *equations.given, out, contact)
+        rates(one, *equations.parameters, out, contact)
     return Path(times, states, contacts)
 
 
