@@ -11,7 +11,7 @@ from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.linear import klingel
-from models.rail.orbit import Orbit
+from models.rail.limit_cycle import Orbit
 from models.rail.wheelset import Wheelset
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}

@@ -22,7 +22,7 @@ from models.rail.eigenvalues import growth as of_all
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
 from models.rail.linear import _gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
-from models.rail.orbit import refined
+from models.rail.limit_cycle import refined
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import CONTACT, sums
 

@@ -17,7 +17,7 @@ from models.rail.eigenvalues import free, growth
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
 from models.rail.linear import NoCriticalSpeed, critical_speed
-from models.rail.orbit import beginning, branch, refined, solved
+from models.rail.limit_cycle import beginning, branch, refined, solved
 from models.rail.wheelset import CHOSEN
 from models.systems.wheelset import plan
 from models.systems.wheelset.of_scene import path_speeds, wheelset_of

@@ -13,8 +13,10 @@ from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
 from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, placed
 from models.core.errors import InputError
+from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
 
+BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 SPACING, OF_KNOTS = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
 SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
@@ -44,6 +46,17 @@ class Profiles(Strict):
     back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
+    def located(self, scene: SceneFile) -> "Profiles":
+        """The same with the paths of the files that a scene names; InputError for what is neither file nor built in."""
+        files = {}
+        for kind, known in BUILT_IN.items():
+            name = getattr(self, kind)
+            if Path(name).suffix:
+                files[kind] = str(scene.path(name, f"profiles.{kind}"))
+            elif name not in known:
+                raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
+        return self.model_copy(update=files)
+
     def side(self, radius: float) -> Side:
         """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
         rail = _profile(self.rail, "rail", self.smoothing)
@@ -61,7 +74,7 @@ class Profiles(Strict):
 
 
 def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
-    known = WHEELS if kind == "wheel" else RAILS
+    known = BUILT_IN[kind]
     if name in known:
         return known[name]()
     if not Path(name).suffix:

@@ -151,3 +151,13 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
             return float(brentq(lambda v: growth(wheelset, v), below, speed, xtol=PRECISION * speed, rtol=PRECISION))
         below = speed
     raise NoCriticalSpeed(unstable=False)
+
+
+def critical_or_why(
+    wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth
+) -> tuple[float | None, str]:
+    """The critical speed (m/s), or why there is none, as words that follow "the wheelset"."""
+    try:
+        return critical_speed(wheelset, growth), ""
+    except NoCriticalSpeed as error:
+        return None, str(error.allowed)

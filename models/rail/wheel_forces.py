@@ -219,7 +219,13 @@ def _one_way(sign, contacts, slip, speed, rails, found):
     else:
         shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
         for k in range(len(contacts)):
-            a, b, x, y, spin = contacts[k, 0], contacts[k, 1], contacts[k, XI_X], contacts[k, XI_X + 1], contacts[k, SPIN]
+            a, b, x, y, spin = (
+                contacts[k, 0],
+                contacts[k, 1],
+                contacts[k, XI_X],
+                contacts[k, XI_X + 1],
+                contacts[k, SPIN],
+            )
             found[k, 0], found[k, 1], found[k, 2] = _linear(a, b, x, y, spin, shear, poisson)
 
 

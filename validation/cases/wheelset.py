@@ -16,7 +16,7 @@ from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained
 from models.rail.linear import LOWEST_SPEED, NoCriticalSpeed, critical_speed, klingel
-from models.rail.orbit import Orbit, beside, refined, solved
+from models.rail.limit_cycle import Orbit, beside, refined, solved
 from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
 from validation.common.rows import Row, System, Table, at_most, behaves, within

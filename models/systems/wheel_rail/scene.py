@@ -91,7 +91,10 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
             raise InputError(file, place, value, f"must be from {least:g} to {most:g} {unit}")
     for name, case in scene.cases.items():
         _check_case(scene, name, case)
-    return _with_files(scene)
+    profiles = scene.profiles
+    if profiles.smoothing and not any(Path(name).suffix for name in (profiles.wheel, profiles.rail)):
+        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+    return scene.model_copy(update={"profiles": profiles.located(scene)})
 
 
 def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
@@ -106,14 +109,3 @@ def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
         )
     if case.friction > LARGEST_FRICTION:
         raise InputError(scene.file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
-
-
-def _with_files(scene: WheelRailScene) -> WheelRailScene:
-    """The scene with the paths of its profiles' files."""
-    named = {kind: getattr(scene.profiles, kind) for kind in ("wheel", "rail")}
-    files = {kind: str(scene.path(name, f"profiles.{kind}")) for kind, name in named.items() if Path(name).suffix}
-    if scene.profiles.smoothing and not files:
-        raise InputError(
-            scene.file, "profiles.smoothing", scene.profiles.smoothing, "has no meaning for built-in profiles"
-        )
-    return scene.model_copy(update={"profiles": scene.profiles.model_copy(update=files)})
