@@ -25,7 +25,7 @@ def test_study_saves_patches_of_both_wheels_and_a_figure(twinrig, capsys):
     assert twinrig("run", "manchester", *args, "--out", "out", "--json") == 0
     (found,) = json.loads(capsys.readouterr().out)["answer"]["A-1"]
     names = {path.name for path in Path("out").iterdir()}
-    assert names == {"command.txt", "A-1.csv", "A-1_right.csv", "A-1_left.csv", "manchester.png"}
+    assert names == {"command.txt", "A-1.csv", "A-1.nc", "A-1_right.csv", "A-1_left.csv", "manchester.png"}
     assert (len(found["right"]), len(found["left"])) == (2, 1)
     right = np.genfromtxt("out/A-1_right.csv", delimiter=",", skip_header=1)
     heads = Path("out/A-1_right.csv").read_text().splitlines()[0].split(",")
