@@ -11,18 +11,12 @@ from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
-from models.rail.contact_table import (
-    Contact,
-    benchmark_side,
-    equivalent_conicity,
-    manchester,
-    rolling_radius_difference,
-)
+from models.rail.contact_table import Contact, benchmark_side, manchester, rolling_radius_difference
 from models.rail.eigenvalues import growth as of_all
 from models.rail.equations import Equations
-from models.rail.limit_cycle import attained
-from models.rail.linear import _gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
-from models.rail.limit_cycle import refined
+from models.rail.limit_cycle import attained, refined
+from models.rail.linear import gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
+from models.rail.profile_statics import equivalent_conicity
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import CONTACT, sums
 
@@ -111,7 +105,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     h = 2e-3
     measured = [-CHOSEN.load * (fall(h * (k == 0), h * (k == 1)) * 2 - 2 * fall(0, 0)) / h**2 for k in (0, 1)]
     heavier = matrices(FREE.changed(load=2 * FREE.load), 10.0).stiffness
-    assert np.diag(_gravity(CHOSEN)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
+    assert np.diag(gravity(CHOSEN)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
     assert heavier[0, 0] == pytest.approx(2 * measured[0], rel=1e-4)  # creep forces do not follow y in the first row
 
 

@@ -42,4 +42,4 @@ class EngineWheelset(Equations, ABC):
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        return states[::every], self.contacts(states[::every])
+        return states[::every], self.at(states[::every])[1]

@@ -213,12 +213,12 @@ class Equations:
         rates(np.asarray(state, float), *self.parameters, out, self.blank())
         return out
 
-    def contacts(self, states: np.ndarray) -> np.ndarray:
-        """Contacts (n, patches, REPORTED) at states (n, 10)."""
-        contacts, out = self.blank(len(states)), np.empty(STATES)
-        for state, contact in zip(states, contacts, strict=True):
-            rates(state, *self.parameters, out, contact)
-        return contacts
+    def at(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (n, 10) by the written equations and contacts (n, patches, REPORTED) at states (n, 10)."""
+        every, contacts = np.empty_like(states), self.blank(len(states))
+        for state, rate, contact in zip(states, every, contacts, strict=True):
+            rates(state, *self.parameters, rate, contact)
+        return every, contacts
 
     @cached_property
     def rest(self) -> np.ndarray:

@@ -101,12 +101,11 @@ def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[np.ndarray, np.
 
 def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Heights (ny, nx) of a patch along its normal, on the common contour."""
-    known, own = patch.distance, y - patch.place
-    over = (own >= known.y[0]) & (own <= known.y[-1])
-    found = np.full((y.size, x.size), FAR)
-    inside = np.clip(x, known.x[0], known.x[-1])
-    found[over] = known.at(inside[None, :], own[over][:, None])
-    return found
+    known, across = patch.distance, y - patch.place
+    over = (across >= known.y[0]) & (across <= known.y[-1])
+    heights = np.full((y.size, x.size), FAR)
+    heights[over] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[over][:, None])
+    return heights
 
 
 def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cell: float, pieces: np.ndarray) -> Share:

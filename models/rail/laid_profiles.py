@@ -95,9 +95,9 @@ def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
     head = [int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]
-    found = np.concatenate((head, nodes.ravel(), rail.ravel()))
-    found.flags.writeable = False
-    return found
+    numbers = np.concatenate((head, nodes.ravel(), rail.ravel()))
+    numbers.flags.writeable = False
+    return numbers
 
 
 def _even(y: np.ndarray, z: np.ndarray, spacing: float) -> np.ndarray:
@@ -108,7 +108,7 @@ def _even(y: np.ndarray, z: np.ndarray, spacing: float) -> np.ndarray:
 
 def _cuts(side: Side) -> list[float]:
     """Places (m from the taping line) on the wheel that first contact jumps across, over a ridge of the gap."""
-    touched = [(float(shift), found[0]) for shift in SHIFTS if (found := _first(side, float(shift))) is not None]
+    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first(side, shift)) is not None]
     cuts = [_ridge(side, before, after) for before, after in pairwise(touched)]
     return [cut for cut in cuts if cut is not None]
 
@@ -120,24 +120,26 @@ def _first(side: Side, shift: float) -> tuple[float, np.ndarray, np.ndarray] | N
     except InputError:
         return None
     points, gap = side.gaps(pose)
-    own = points[:, 1] - shift - side.wheelset.arm
-    return float(own[np.argmin(gap)]), own, gap
+    places = points[:, 1] - shift - side.wheelset.arm
+    return float(places[np.argmin(gap)]), places, gap
 
 
 def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) -> float | None:
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
     while abs(after[1] - before[1]) > APART:
         middle = (before[0] + after[0]) / 2.0
-        found = _first(side, middle)
-        if found is None:
+        touch = _first(side, middle)
+        if touch is None:
             return None
-        here, own, gap = found
+        here, places, gap = touch
+        low, high = sorted((before[1], after[1]))
         if after[0] - before[0] < CLOSE:
-            between = (own > min(before[1], after[1])) & (own < max(before[1], after[1]))
-            return float(own[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
-        before, after = (
-            (before, (middle, here)) if abs(here - before[1]) > abs(here - after[1]) else ((middle, here), after)
-        )
+            between = (places > low) & (places < high)
+            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
+        if abs(here - before[1]) > abs(here - after[1]):
+            after = middle, here
+        else:
+            before = middle, here
     return None
 
 

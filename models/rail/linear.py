@@ -87,7 +87,7 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
     gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
     damping, stiffness = _suspension(w)
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
-    stiffness += _gravity(w)
+    stiffness += gravity(w)
     for motion, place in _contacts(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ place
@@ -98,24 +98,23 @@ def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
     """Creepages (3) of the right and the left wheel by (y', psi') / V and by (y, psi), (3, 2) each."""
     cosine, b = w.slant[1], w.half_gauge
     across = b / (b - w.conicity * w.radius) / cosine
-    found = []
-    for side in (1.0, -1.0):
-        motion = np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]])
-        place = np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]])
-        found.append((motion, place))
-    return found
+    return [
+        (
+            np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]]),
+            np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]]),
+        )
+        for side in (1.0, -1.0)
+    ]
 
 
 def _suspension(w: Wheelset) -> tuple[np.ndarray, np.ndarray]:
     """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
     arm = w.half_spacing**2
-    return tuple(
-        2.0 * np.diag([y + z * arm * w.tilt**2, x * arm])
-        for x, y, z in ((w.damping_x, w.damping_y, w.damping_z), (w.stiffness_x, w.stiffness_y, w.stiffness_z))
-    )  # type: ignore[return-value]
+    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
+    return damping, 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
 
 
-def _gravity(w: Wheelset) -> np.ndarray:
+def gravity(w: Wheelset) -> np.ndarray:
     """Stiffness of the load, which rises with y and sinks with yaw."""
     b, c = w.half_gauge, w.conicity
     rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2
@@ -125,8 +124,7 @@ def _gravity(w: Wheelset) -> np.ndarray:
 def kinematic_wavelength(wheelset: Wheelset) -> float:
     """Wavelength (m) by the eigenvalues of creep forces alone: no inertia, no suspension, no weight."""
     creep = kalker(wheelset)
-    motion = sum(m.T @ creep @ m for m, _ in _contacts(wheelset))
-    place = sum(m.T @ creep @ p for m, p in _contacts(wheelset))
+    motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contacts(wheelset)) for k in (0, 1))
     values = np.linalg.eigvals(-np.linalg.solve(motion, place))
     return float(2.0 * math.pi / np.abs(values.imag).max())
 

@@ -45,24 +45,24 @@ def held(wheelset: Wheelset, shift: float) -> Held:
     """
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
-    given, half = numbers(wheelset), 0.5 * wheelset.load
+    contact, half = numbers(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
-    def found(unknown: np.ndarray) -> Held:
-        touches = np.zeros((patches(given), TOUCH))
+    def pose(unknown: np.ndarray) -> Held:
+        touches = np.zeros((patches(contact), TOUCH))
         here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
-        contact_points(shift, *here, 0.0, given, touches)
-        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], given[MODULUS])[0] for touch in touches])
+        contact_points(shift, *here, 0.0, contact, touches)
+        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], contact[MODULUS])[0] for touch in touches])
         return Held(*here, touches, loads)
 
     def off(unknown: np.ndarray) -> np.ndarray:
-        one = found(unknown)
-        return (one.loads * one.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
+        now = pose(unknown)
+        return (now.loads * now.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
 
     solved = root(off, [5.0, 0.0], tol=1e-14)
     if np.abs(solved.fun).max() > PRECISION:
         raise RunFailed("wheelset", f"no height was found at which both wheels carry their load at y = {shift:g} m")
-    return found(solved.x)
+    return pose(solved.x)
 
 
 def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
