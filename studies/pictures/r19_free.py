@@ -14,10 +14,9 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
-from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
-from studies.pictures.shapes import Colour, Surface, ball, box, extruded, revolved
+from studies.pictures.shapes import PAINT, Colour, Surface, ball, box, extruded, tyred_wheel
 
 SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
 """m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
@@ -31,9 +30,6 @@ SCENE = {
 }
 KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
 CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
-PAINT: Colour = (0.16, 0.42, 0.72)
-RUBBER: Colour = (0.16, 0.16, 0.17)
-RIM: Colour = (0.78, 0.79, 0.8)
 ENGINE: Colour = (0.75, 0.45, 0.15)
 PERSON: Colour = (0.93, 0.76, 0.55)
 
@@ -129,7 +125,7 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
-    found = {tyre.body: _wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
+    found = {tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
     found["engine"] = [box(0.5, 0.7, 0.45, ENGINE)]
     found |= {
         f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
@@ -137,11 +133,6 @@ def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     }
     found["body"] = _car(vehicle)
     return found
-
-
-def _wheel(radius: float) -> list[Surface]:
-    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
-    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
 
 
 def _car(vehicle: SpatialVehicle) -> list[Surface]:

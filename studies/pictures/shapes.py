@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 Colour = tuple[float, float, float]
+PAINT: Colour = (0.16, 0.42, 0.72)
+RUBBER: Colour = (0.16, 0.16, 0.17)
+RIM: Colour = (0.78, 0.79, 0.8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,12 @@ def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 
     corners = [_patches(net[i : i + 2]) for i in range(len(slopes))]
     normals = [_patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
     return Surface(np.concatenate(corners), np.concatenate(normals), colour, alpha)
+
+
+def tyred_wheel(radius: float) -> list[Surface]:
+    """A tyre and its rim."""
+    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
+    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
 
 
 def box(x: float, y: float, z: float, colour: Colour, alpha: float = 1.0) -> Surface:
