@@ -10,10 +10,9 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result, joined
 from models.core.tables import write_table
-from models.rail import wheel_forces as wf
 from models.rail.energy import ledger
-from models.rail.equations import Y
 from models.rail.equations import Path as Motion
+from models.rail.equations import Y
 from models.rail.limit_cycle import maxima
 from models.rail.linear import critical_or_why, kinematic_wavelength, klingel
 from models.rail.wheelset import Wheelset

@@ -10,8 +10,8 @@ from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
-from models.rail.linear import klingel
 from models.rail.limit_cycle import Orbit
+from models.rail.linear import klingel
 from models.rail.wheelset import Wheelset
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}

@@ -15,7 +15,7 @@ from models.rail.contact_table import Contact, benchmark_side, manchester, rolli
 from models.rail.eigenvalues import growth as of_all
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained, refined
-from models.rail.linear import gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
+from models.rail.linear import critical_speed, gravity, growth, kinematic_wavelength, klingel, matrices
 from models.rail.profile_statics import equivalent_conicity
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import CONTACT, sums

@@ -83,7 +83,7 @@ def test_accelerations_are_those_of_the_equations(engine):
     states[::3, [eq.Y, eq.Z, eq.ROLL]] += [6.5e-3, -6e-4, -1e-3]
     contact, out, seen = written.blank(), np.empty(eq.STATES), []
     for state in states:
-        eq.rates(state, *written.given, out, contact)
+        eq.rates(state, *written.parameters, out, contact)
         seen.append(contact.copy())
         expected = out[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
         found = built.rates(state)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
@@ -133,7 +133,7 @@ def test_ledger_with_friction_and_flange():
 
 def test_standstill_reversal_and_lift_off():
     equations = Equations(ON_PROFILES, 50.0)
-    _, *given = equations.given
+    _, *given = equations.parameters
     state, contact = equations.displaced(5e-3), equations.blank()
     state[eq.SPIN] = 0.0
     found = []

@@ -8,15 +8,17 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
+from models.contact.inputs import Array
 from models.core.errors import RunFailed
 
 exu.config.printToConsole = False
 items: Any = typed_items
+lists: Any = exu
 Listed = Callable[[Any, Any], Any]
 """Forces of lists of positions and rates, as a list."""
 
 
-def compiled_forces(size: int, numbers: np.ndarray, law: Callable[..., Any], *more: int) -> Listed:
+def compiled_forces(size: int, numbers: Array, law: Callable[..., Any], *more: int) -> Listed:
     """``law(address, *more)`` about one block of doubles: forces, positions, rates (size,), then numbers.
 
     Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
@@ -44,7 +46,7 @@ def add_node(mbs: Any, size: int) -> Any:
     )
 
 
-def started(mbs: Any, q: np.ndarray, v: np.ndarray) -> Any:
+def started(mbs: Any, q: Array, v: Array) -> Any:
     """Settings that write no file, the system at positions and rates."""
     options, initial = exu.SimulationSettings(), exu.ConfigurationType.Initial
     mbs.systemData.SetODE2Coordinates(q, initial)
@@ -53,7 +55,7 @@ def started(mbs: Any, q: np.ndarray, v: np.ndarray) -> Any:
     return options
 
 
-def accelerations(mbs: Any, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def accelerations(mbs: Any, q: Array, v: Array) -> Array:
     """Accelerations (n,) of the coordinates from Exudyn's own residual and mass matrix."""
     options = started(mbs, q, v)
     solver: Any = exu.MainSolverImplicitSecondOrder()
@@ -78,7 +80,7 @@ def solve(mbs: Any, options: Any, steps: int, step: float, solver: str) -> bool:
         raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
 
 
-def march(mbs: Any, sensors: list[Any], q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+def march(mbs: Any, sensors: list[Any], q: Array, v: Array, steps: int, step: float) -> Array:
     """What sensors record (steps + 1, columns) of a march by RK44; RunFailed where it stops or is not finite."""
     options = started(mbs, q, v)
     options.solution.sensors.active, options.solution.sensors.writePeriod = True, step

@@ -10,7 +10,8 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from models.engines.exudyn_coordinates import accelerations, add_node, compiled_forces, items, march
+from models.contact.inputs import Array
+from models.engines.exudyn_coordinates import accelerations, add_node, compiled_forces, items, lists, march
 from models.engines.wheelset import EngineWheelset, leaning
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
 from models.rail.joint_forces import JOINTS, set_joint_forces, table
@@ -21,9 +22,9 @@ CHAIN = [KIND.PrismaticY, KIND.PrismaticZ, KIND.RevoluteZ, KIND.RevoluteX, KIND.
 """From the track to the wheelset."""
 
 
-def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
+def tree(mbs: Any, node: Any, numbers: Array, body: Array) -> Any:
     """The wheelset of ``Equations.body`` on a node of five coordinates; ``numbers`` is the table of the rails."""
-    zero, forces = exu.Vector3DList([[0.0, 0.0, 0.0]] * JOINTS), compiled_forces(JOINTS, numbers, set_joint_forces)
+    zero, forces = lists.Vector3DList([[0.0, 0.0, 0.0]] * JOINTS), compiled_forces(JOINTS, numbers, set_joint_forces)
     inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag(body[[ACROSS, ALONG, ACROSS]])]
     return mbs.AddObject(
         items.ObjectKinematicTree(
@@ -31,9 +32,9 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
             gravity=leaning(GRAVITY, body),
             jointTypes=CHAIN,
             linkParents=list(range(-1, JOINTS - 1)),
-            jointTransformations=exu.Matrix3DList([np.eye(3)] * JOINTS),
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * JOINTS),
             jointOffsets=zero,
-            linkInertiasCOM=exu.Matrix3DList(inertias),
+            linkInertiasCOM=lists.Matrix3DList(inertias),
             linkCOMs=zero,
             linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]],
             forceUserFunction=lambda mbs, t, item, q, v: forces(q, v),
@@ -41,7 +42,7 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
     )
 
 
-def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
+def suspension(mbs: Any, wheelset: Any, body: Array) -> None:
     """Springs and dampers of both ends along the track's axes, if any, and what the vehicle weighs on them."""
     ground = mbs.AddObject(items.ObjectGround())
     for arm in (body[ARM], -body[ARM]):
@@ -79,10 +80,10 @@ class ExudynWheelset(EngineWheelset):
         mbs.Assemble()
         return mbs, sensors
 
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, q: Array, v: Array) -> Array:
         """Accelerations (5,) of the joints from Exudyn's own residual and mass matrix."""
         return accelerations(self.system[0], q, v)
 
-    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
         """Positions and rates (steps + 1, 10) by Exudyn's RK44; RunFailed where it stops or is not finite."""
         return march(*self.system, q, v, steps, step)

@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from models.contact.inputs import Array
 from models.engines.contact_bridge_mujoco import Marcher, add_joint, blank, compiled, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.wheelset import EngineWheelset, leaning
@@ -27,7 +28,7 @@ JOINTS = (
 """Kind and axis, from the track to the wheelset."""
 
 
-def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
+def model(numbers: Array, body: Array) -> mujoco.MjModel:
     """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
     spec = blank("rails", numbers, "RK4", leaning(GRAVITY, body))
     wheelset = spec.worldbody.add_body(mass=body[MASS], inertia=body[[ACROSS, ALONG, ACROSS]], explicitinertial=True)
@@ -63,7 +64,7 @@ class MujocoWheelset(EngineWheelset):
     def _data(self) -> mujoco.MjData:
         return mujoco.MjData(self.model)
 
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, q: Array, v: Array) -> Array:
         """Accelerations (5,) of the joints by ``mj_forward``."""
         data = self._data
         data.qpos[:], data.qvel[:] = q, v
@@ -71,7 +72,7 @@ class MujocoWheelset(EngineWheelset):
             mujoco.mj_forward(self.model, data)
         return data.qacc.copy()
 
-    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
         """Positions and rates (steps + 1, 10) by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
         with installed(rail_law()):

@@ -22,7 +22,7 @@ from functools import cache
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.inputs import quantity
+from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
 from models.contact.standard_profiles import s1002, uic60
@@ -275,7 +275,7 @@ class Contact:
     def _radius(self, touch: Touch) -> float:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
-    def _arm(self, pose: Pose, touch: Touch) -> np.ndarray:
+    def _arm(self, pose: Pose, touch: Touch) -> Array:
         """From the wheelset's centre to a place of first touch, in the track (m)."""
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
@@ -363,13 +363,13 @@ def rolling_radius_difference(placed_at: Placed) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def _axes(touch: Touch) -> tuple[np.ndarray, np.ndarray]:
+def _axes(touch: Touch) -> tuple[Array, Array]:
     """Directions along the rail's surface and into the rail, in the track."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _moments(lever: np.ndarray, touch: Touch, force: Triple) -> np.ndarray:
+def _moments(lever: Array, touch: Touch, force: Triple) -> Array:
     """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
     across, into = _axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.rail.equations import (
     ARM,
     CARRIED,
@@ -39,18 +40,18 @@ from models.rail.wheelset import GRAVITY
 class Ledger:
     """Energies (n,) in J at times (n,) in s; works count from the path's start, those done by the wheelset positive."""
 
-    times: np.ndarray
-    kinetic: np.ndarray
-    springs: np.ndarray
-    gravity: np.ndarray
-    contacts: np.ndarray
-    drive: np.ndarray
-    dampers: np.ndarray
-    contact_damping: np.ndarray
-    creep: np.ndarray
+    times: Array
+    kinetic: Array
+    springs: Array
+    gravity: Array
+    contacts: Array
+    drive: Array
+    dampers: Array
+    contact_damping: Array
+    creep: Array
 
     @cached_property
-    def residual(self) -> np.ndarray:
+    def residual(self) -> Array:
         """What the sums do not account for (n,), 0 at the start (J)."""
         stored = self.kinetic + self.springs + self.gravity + self.contacts
         return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
@@ -66,7 +67,7 @@ def ledger(equations: Equations, path: Path) -> Ledger:
     return Ledger(path.times, *energies(equations, path.states), *done.cumsum(axis=0).T)
 
 
-def rates_and_powers(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
     """Rates (n, 10) of states and the powers (n, 5) that the works add up, in the order of the ledger."""
     rates, contacts = equations.at(states)
     out = -contacts.sum(axis=1)
@@ -74,7 +75,7 @@ def rates_and_powers(equations: Equations, states: np.ndarray) -> tuple[np.ndarr
     return rates, np.column_stack([out[:, ELASTIC_POWER], drive, dampers, out[:, DAMPING_POWER], out[:, POWER]])
 
 
-def energies(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
     """Energies (n,) of motion, of the springs and of gravity at states (n, 10), in J."""
     w, body = equations.wheelset, equations.body
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
@@ -83,7 +84,7 @@ def energies(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.n
     return kinetic, _suspension(body, states)[0], -(w.mass * GRAVITY + 2.0 * body[CARRIED]) * states[:, Z]
 
 
-def _suspension(body: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _suspension(body: Array, states: Array) -> tuple[Array, Array]:
     """Energy of the springs (n,) and power into the dampers (n,)."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])

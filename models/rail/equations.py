@@ -24,7 +24,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.contact.inputs import number, quantity
+from models.contact.inputs import Array, number, quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
@@ -156,8 +156,8 @@ class Path:
     """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
 
     times: np.ndarray
-    states: np.ndarray
-    contacts: np.ndarray
+    states: Array
+    contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,7 @@ class Equations:
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
-    def body(self) -> np.ndarray:
+    def body(self) -> Array:
         """Numbers of the body and its suspension (14,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
@@ -194,7 +194,7 @@ class Equations:
         )
 
     @cached_property
-    def parameters(self) -> tuple[float, np.ndarray, Rails]:
+    def parameters(self) -> tuple[float, Array, Rails]:
         """What the compiled functions take after the state: speed, body and rails."""
         return float(self.speed), self.body, rails_of(self.wheelset, self.law, self.cells)
 
@@ -203,17 +203,17 @@ class Equations:
         contact = numbers(self.wheelset)
         return float(brentq(lambda z: carried(z, contact) - self.wheelset.load, 0.0, DEEPEST, xtol=1e-15))
 
-    def blank(self, *shape: int) -> np.ndarray:
+    def blank(self, *shape: int) -> Array:
         """Contacts (*shape, patches, REPORTED) that are not known yet."""
         return np.full((*shape, patches(self.parameters[2].numbers), REPORTED), np.nan)
 
-    def rates(self, state: np.ndarray) -> np.ndarray:
+    def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
         out = np.empty(STATES)
         rates(np.asarray(state, float), *self.parameters, out, self.blank())
         return out
 
-    def at(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, states: Array) -> tuple[Array, Array]:
         """Rates (n, 10) by the written equations and contacts (n, patches, REPORTED) at states (n, 10)."""
         every, contacts = np.empty_like(states), self.blank(len(states))
         for state, rate, contact in zip(states, every, contacts, strict=True):
@@ -221,13 +221,13 @@ class Equations:
         return every, contacts
 
     @cached_property
-    def rest(self) -> np.ndarray:
+    def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATES)
         start[Z], start[SPIN] = self.body[SUNK], -self.speed / self.wheelset.radius
         return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
 
-    def displaced(self, shift: float) -> np.ndarray:
+    def displaced(self, shift: float) -> Array:
         """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
         start, w = self.rest.copy(), self.wheelset
         start[Y] = shift
@@ -237,12 +237,12 @@ class Equations:
             start[Z] += rise
         return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _settled(self, start: np.ndarray, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> np.ndarray:
+    def _settled(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
         """The state with two of its values such that two accelerations vanish."""
         places = list(coordinates)
         scale = np.maximum(np.abs(start[places]), self.body[SUNK])
 
-        def moved(unknown: np.ndarray) -> np.ndarray:
+        def moved(unknown: Array) -> Array:
             state = start.copy()
             state[places] += unknown * scale
             return state
@@ -253,7 +253,7 @@ class Equations:
         return moved(solution.x)
 
     @cached_property
-    def state_matrix(self) -> np.ndarray:
+    def state_matrix(self) -> Array:
         """A (9, 9) about rest, the angle of spin left out."""
         return slopes(self.rates, self.rest)
 
@@ -262,7 +262,7 @@ class Equations:
         """Largest rate (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
-    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
+    def run(self, state: Array, duration: float, step: float, every: int = 1) -> Path:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
@@ -275,7 +275,7 @@ class Equations:
         self.check(path, step, every)
         return path
 
-    def _marched(self, state: np.ndarray, count: int, step: float, every: int) -> tuple[np.ndarray, np.ndarray]:
+    def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
         """States and contacts of a path that are kept; ``state`` (10,) is moved."""
         kept = count // every + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
@@ -303,7 +303,7 @@ class Equations:
             inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
             check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
-    def _steps(self, state: np.ndarray, duration: float, step: float, every: int) -> int:
+    def _steps(self, state: Array, duration: float, step: float, every: int) -> int:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
@@ -323,7 +323,7 @@ class Equations:
         return count
 
 
-def slopes(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray) -> np.ndarray:
+def slopes(rates: Callable[[Array], Array], state: Array) -> Array:
     """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order."""
     columns = []
     for k in range(STATES):

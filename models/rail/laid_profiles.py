@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
+from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
@@ -83,7 +84,7 @@ def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
 
 
 @cache
-def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
+def profile_numbers(profiles: Profiles, radius: float) -> Array:
     """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
@@ -100,7 +101,7 @@ def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
     return numbers
 
 
-def _even(y: np.ndarray, z: np.ndarray, spacing: float) -> np.ndarray:
+def _even(y: Array, z: Array, spacing: float) -> Array:
     """Places y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
@@ -113,7 +114,7 @@ def _cuts(side: Side) -> list[float]:
     return [cut for cut in cuts if cut is not None]
 
 
-def _first(side: Side, shift: float) -> tuple[float, np.ndarray, np.ndarray] | None:
+def _first(side: Side, shift: float) -> tuple[float, Array, Array] | None:
     """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
         pose = placed(side, shift, 0.0)
@@ -143,7 +144,7 @@ def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) 
     return None
 
 
-def _zones(y: np.ndarray, cuts: list[float]) -> np.ndarray:
+def _zones(y: Array, cuts: list[float]) -> Array:
     """Zone (n,) of places on the wheel: a whole number, but where one passes smoothly into the next."""
     zones = np.zeros(y.size)
     for cut in cuts:

@@ -19,6 +19,7 @@ from typing import Literal
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.core.errors import InputError, RunFailed
 from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
 from models.rail.linear import critical_speed
@@ -69,10 +70,10 @@ class Orbit:
     """
 
     equations: Equations
-    state: np.ndarray
+    state: Array
     period: float
     steps: int
-    slopes: np.ndarray
+    slopes: Array
     error: float = math.nan
     frequency_error: float = math.nan
 
@@ -108,7 +109,7 @@ class Orbit:
         return self.equations.run(self.state, self.period, self.period / self.steps)
 
 
-def near(equations: Equations, state: np.ndarray, period: float, step: float) -> Orbit:
+def near(equations: Equations, state: Array, period: float, step: float) -> Orbit:
     """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
     start = state.copy()
     start[Y_RATE] = 0.0
@@ -199,7 +200,7 @@ def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
     )
 
 
-def _end(equations: Equations, state: np.ndarray, period: float, steps: int) -> np.ndarray:
+def _end(equations: Equations, state: Array, period: float, steps: int) -> Array:
     return equations.run(state, period, period / steps, steps).states[-1]
 
 
@@ -215,7 +216,7 @@ def _linearised(orbit: Orbit) -> Orbit:
     return replace(orbit, slopes=np.array(columns).T)
 
 
-def _corrected(orbit: Orbit, missed: np.ndarray, unknown: Unknown) -> Orbit:
+def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
     """One correction by the slopes; the lateral rate stays zero."""
     returned = orbit.slopes.copy()
     returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
@@ -252,7 +253,7 @@ def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 
-def maxima(values: np.ndarray) -> np.ndarray:
+def maxima(values: Array) -> np.ndarray:
     """Places of the positive maxima."""
     before, here, after = values[:-2], values[1:-1], values[2:]
     return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))

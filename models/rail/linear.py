@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
@@ -54,12 +55,12 @@ class NoCriticalSpeed(InputError):
 class Linear:
     """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
 
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
+    mass: Array
+    damping: Array
+    stiffness: Array
 
     @property
-    def state_matrix(self) -> np.ndarray:
+    def state_matrix(self) -> Array:
         """A (4, 4) of the state (y, psi, y', psi')."""
         rates = -np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
         return np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), rates])
@@ -71,7 +72,7 @@ def klingel(wheelset: Wheelset) -> float:
     return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.slant[0])))
 
 
-def kalker(wheelset: Wheelset) -> np.ndarray:
+def kalker(wheelset: Wheelset) -> Array:
     """Forces (3, 3) by creepages: (-fx, -fy, -mz) of one wheel by (xi_x, xi_y, spin); N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.pair
     c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
@@ -94,7 +95,7 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
     return Linear(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
-def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
+def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
     """Creepages (3) of the right and the left wheel by (y', psi') / V and by (y, psi), (3, 2) each."""
     cosine, b = w.slant[1], w.half_gauge
     across = b / (b - w.conicity * w.radius) / cosine
@@ -107,14 +108,14 @@ def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
     ]
 
 
-def _suspension(w: Wheelset) -> tuple[np.ndarray, np.ndarray]:
+def _suspension(w: Wheelset) -> tuple[Array, Array]:
     """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
     arm = w.half_spacing**2
     damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
     return damping, 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
 
 
-def gravity(w: Wheelset) -> np.ndarray:
+def gravity(w: Wheelset) -> Array:
     """Stiffness of the load, which rises with y and sinks with yaw."""
     b, c = w.half_gauge, w.conicity
     rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import root
 
-from models.contact.inputs import quantity
+from models.contact.inputs import Array, quantity
 from models.core.errors import InputError, RunFailed
 from models.rail.profile_contact import ACROSS, ALONG, DEPTH, N_Z, TOUCH, X_, Z_, pressed
 from models.rail.wheel_forces import MODULUS, contact_points, numbers, patches
@@ -26,10 +26,10 @@ class Held:
 
     z: float
     roll: float
-    touches: np.ndarray
-    loads: np.ndarray
+    touches: Array
+    loads: Array
 
-    def radii(self) -> np.ndarray:
+    def radii(self) -> Array:
         """Rolling radius (2,) of the right and the left wheel, the mean of its patches by their loads (m)."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
         places = self.touches[:, X_ : Z_ + 1]
@@ -48,14 +48,14 @@ def held(wheelset: Wheelset, shift: float) -> Held:
     contact, half = numbers(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
-    def pose(unknown: np.ndarray) -> Held:
+    def pose(unknown: Array) -> Held:
         touches = np.zeros((patches(contact), TOUCH))
         here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
         contact_points(shift, *here, 0.0, contact, touches)
         loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], contact[MODULUS])[0] for touch in touches])
         return Held(*here, touches, loads)
 
-    def off(unknown: np.ndarray) -> np.ndarray:
+    def off(unknown: Array) -> Array:
         now = pose(unknown)
         return (now.loads * now.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
 
@@ -72,7 +72,7 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     return wheelset.coned(equivalent_conicity(shifts, differences, amplitude)).changed(profiles=None)
 
 
-def equivalent_conicity(shifts: np.ndarray, differences: np.ndarray, amplitude: float) -> float:
+def equivalent_conicity(shifts: Array, differences: Array, amplitude: float) -> float:
     """Conicity of the cones whose first harmonic is that of profiles moving sideways as amplitude (m) times a sine.
 
     shifts : (n,) m, ascending, from -amplitude to amplitude at least, or from 0 on for profiles alike on both sides;

@@ -25,6 +25,7 @@ import numpy as np
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
 from models.contact.fastsim_many import SPIN, XI_X, forces
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean, njit
@@ -76,9 +77,9 @@ class Rails(NamedTuple):
     """What wheels roll on, and by which law: ``numbers`` of the contact; strips, cells and middle of FASTSIM's ``net``;
     law : LINEAR or FASTSIM."""
 
-    numbers: np.ndarray
-    strips: np.ndarray
-    cells: np.ndarray
+    numbers: Array
+    strips: Array
+    cells: Array
     middle: float
     law: int
 
@@ -90,12 +91,12 @@ class Room(NamedTuple):
     first to last, contacts (patches, 10), motion (patches, MOVED), creep forces found (patches, 4) and other ones.
     """
 
-    vectors: np.ndarray
-    touches: np.ndarray
-    contacts: np.ndarray
-    motion: np.ndarray
-    other: np.ndarray
-    found: np.ndarray
+    vectors: Array
+    touches: Array
+    contacts: Array
+    motion: Array
+    other: Array
+    found: Array
 
 
 class Place(NamedTuple):
@@ -131,7 +132,7 @@ class Pressed(NamedTuple):
     push: float
 
 
-def numbers(wheelset: Wheelset) -> np.ndarray:
+def numbers(wheelset: Wheelset) -> Array:
     """The contact's numbers, in the order above: (11,), or more for profiles."""
     w, pair = wheelset, wheelset.pair
     shape = [w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu]

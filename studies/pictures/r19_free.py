@@ -75,38 +75,33 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
     places, turns = of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
-    own = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
-    return places, {name: turn @ own[name] for name, turn in turns.items()}  # a mass that slides has other axes
+    axes = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
+    return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
 
 
 def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
-    own = linearise(vehicle, SPEED).outputs
-    found = [
+    forces = [
         run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
-        for one in own
+        for one in linearise(vehicle, SPEED).outputs
     ]
-    held = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    loads = [
-        _arrow("wheel load", vehicle, tyre.name, tyre.body, tyre.point, held[tyre.name] + force, 2, poses)
-        for tyre, force in zip(vehicle.tyres, found, strict=False)
+    held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
+    arrows = [
+        _arrow("wheel load", vehicle, tyre, held[tyre.name] + force, 2, poses)
+        for tyre, force in zip(vehicle.tyres, forces, strict=False)
     ]
-    names = vehicle.coordinates()
-    sides = []
-    for side, speed in zip(vehicle.side_forces, found[len(vehicle.tyres) :], strict=True):
+    for side, speed in zip(vehicle.side_forces, forces[len(vehicle.tyres) :], strict=True):
         roll, yaw = (run.positions[:, names.index((side.chassis, freedom))] for freedom in ("rx", "rz"))
         force = side.stiffness * (side.roll_steer * roll + yaw - speed / SPEED)
-        sides.append(_arrow("side force", vehicle, side.name, side.body, side.point, force, 1, poses))
-    return (*loads, *sides)
+        arrows.append(_arrow("side force", vehicle, side, force, 1, poses))
+    return tuple(arrows)
 
 
-def _arrow(
-    kind: str, vehicle: SpatialVehicle, name: str, body: str, point: Any, force: np.ndarray, axis: int, poses: Poses
-) -> Arrow:
-    """A force along an axis of the space, at the road under a point of a body."""
-    arm = np.subtract((point[0], point[1], 0.0), vehicle.body(body).position)
-    points = poses[0][body] + poses[1][body] @ arm
-    return Arrow(f"{kind}, {name}", kind, body, points, force[:, None] * np.eye(3)[axis])
+def _arrow(kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses) -> Arrow:
+    """A force along an axis of the space, at the road under the point of a body where a tyre or side force is."""
+    (x, y, _), body = place.point, place.body
+    points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
+    return Arrow(f"{kind}, {place.name}", kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
@@ -125,14 +120,14 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
-    found = {tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
-    found["engine"] = [box(0.5, 0.7, 0.45, ENGINE)]
-    found |= {
-        f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
-        for side in ("left", "right")
+    person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
+    return {
+        **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
+        "engine": [box(0.5, 0.7, 0.45, ENGINE)],
+        "left seat": person,
+        "right seat": person,
+        "body": _car(vehicle),
     }
-    found["body"] = _car(vehicle)
-    return found
 
 
 def _car(vehicle: SpatialVehicle) -> list[Surface]:

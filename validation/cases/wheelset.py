@@ -246,7 +246,8 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     pairs = {("reference", engine): 0.0 for engine in ENGINES} | {ENGINES: 0.0}
     positive = steps = 0
     for name, wheelset in wheelsets.items():
-        setup, paths = (wheelset, _usual(speeds, name), "fastsim", cells), {}
+        paths: dict[str, Any] = {}
+        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", cells)
         step = _step(Equations(*setup))
         for engine in IMPLEMENTATIONS:
             equations = implementation(engine)(*setup)
@@ -303,7 +304,7 @@ def _cycles(wheelsets: dict[str, Wheelset], speeds: Speeds, engines: tuple[str, 
     for name, wheelset in wheelsets.items():
         if name != "chosen" and not 20.0 < (speeds[name]["reference"] or 0.0) < 160.0:
             continue
-        setup = wheelset, _usual(speeds, name), "fastsim", 11
+        setup: tuple[Any, ...] = (wheelset, _usual(speeds, name), "fastsim", 11)
         first = attained(Equations(*setup), step=_step(Equations(*setup)))
         if first is not None:
             guesses = {engine: beside(first, implementation(engine)(*setup)) for engine in engines}

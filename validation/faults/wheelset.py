@@ -8,6 +8,7 @@ from unittest import mock
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.linear_theory import forces as kalker
 from models.engines.wheelset_mujoco import MujocoWheelset
 from models.rail import equations as eq
@@ -41,13 +42,13 @@ def equations(law: Law = "fastsim") -> Equations:
 
 
 @cache
-def states() -> np.ndarray:
+def states() -> Array:
     """States (2, 10) about rest."""
     return equations().rest + STATES
 
 
 @cache
-def by_engine() -> np.ndarray:
+def by_engine() -> Array:
     """Rates (2, 10) by MuJoCo."""
     built = MujocoWheelset(CHOSEN, SPEED, cells=7)
     return np.array([built.rates(state) for state in states()])
@@ -72,7 +73,7 @@ def _balance() -> float:
     return float(np.abs(missing).max() / np.abs(powers).max())
 
 
-def _report(state: np.ndarray, law: Law = "fastsim") -> np.ndarray:
+def _report(state: Array, law: Law = "fastsim") -> Array:
     return equations(law).at(state[None])[1][0]
 
 

@@ -209,7 +209,7 @@ def ran(
     return wheelset.run(off(wheelset, **moved), duration, step, every)
 
 
-def fails(implementation: str, folder: Path, **moved: float) -> float:
+def fails(implementation: str, folder: Path, **moved: Any) -> float:
     """A case that fails, and says when: in its first half."""
     try:
         ran(implementation, duration=0.1, **moved)
@@ -219,7 +219,7 @@ def fails(implementation: str, folder: Path, **moved: float) -> float:
     return np.inf
 
 
-LANDING = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
+LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 
 def too_large_naive(folder: Path) -> str:

@@ -150,9 +150,11 @@ def cycles(scene: WheelsetScene, engines: Sequence[str], speed: float) -> tuple[
     """
     results, failed = dict[str, Result](), dict[str, str]()
     first = _attained(scene, speed)
-    for engine in engines if first is not None else ():
-        guess = beside(first, equations_of(scene, engine, speed))
+    if first is None:
+        return results, failed
+    for engine in engines:
         try:
+            guess = beside(first, equations_of(scene, engine, speed))
             orbit = refined(solved(guess, "amplitude", precise=False), "amplitude")
         except RunFailed as error:
             failed[engine] = str(error)
