@@ -70,16 +70,15 @@ def _timed(contact: Contact, yaw: float, shifts: np.ndarray) -> tuple[list[Place
 
 
 def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
-    own = np.array([sums(one, wheel) for one in placed])
-    theirs = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
-    off = np.abs(own - theirs)
-    force = 100.0 * off / theirs
+    published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
+    off = np.abs(np.array([sums(position, wheel) for position in placed]) - published_sums)
+    place, force, peak = off[:, 0].max(), *(100.0 * off / published_sums)[:, 1:].max(axis=0)
     rows = [
         at_most(
             f"manchester.places.{wheel}",
             SYSTEM,
             f"mean place of contact of the {wheel} wheel, largest difference",
-            float(off[:, 0].max()),
+            float(place),
             "mm",
             PLACE,
             PUBLISHED,
@@ -89,7 +88,7 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.forces.{wheel}",
             SYSTEM,
             f"normal force of the {wheel} wheel, largest difference",
-            float(force[:, 1].max()),
+            float(force),
             "%",
             FORCE,
             PUBLISHED,
@@ -99,34 +98,27 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.peaks.{wheel}",
             SYSTEM,
             f"largest pressure of the {wheel} wheel, largest difference",
-            float(force[:, 2].max()),
+            float(peak),
             "%",
             0.0,
             "CONTACT's cells of 0.2 mm; a flange's patch has four of them",
         ),
     ]
-    roll = np.abs(np.array([1e3 * one.roll for one in placed]) - published[:, 1])
-    return (
-        rows
-        if wheel == "left"
-        else [
-            *rows,
-            finding(
-                "manchester.roll",
-                SYSTEM,
-                "roll, largest difference",
-                float(roll.max()),
-                "mrad",
-                0.0,
-                "CONTACT's input, which another code found; on the flange its wheels do not stand equally low",
-            ),
-        ]
-    )
+    if wheel == "right":
+        why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
+        roll = np.abs(np.array([1e3 * position.roll for position in placed]) - published[:, 1])
+        rows.append(finding("manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad", 0.0, why))
+    return rows
 
 
 def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
     """Touching places by search, and the mirror image."""
-    off = np.array([gap for one in placed for gap in _searched_off(contact, one)])
+    gaps = []
+    for position in placed:
+        for sign, places in ((1.0, position.right), (-1.0, position.left)):
+            for place in places:
+                y, u, angle = searched(contact.side, position, sign, place.wheel_y)
+                gaps.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
     one, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
     mirror = max(
         abs(a / b - 1.0)
@@ -135,36 +127,25 @@ def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
         for a, b in ((x.y, y.y), (x.normal, y.normal))
     )
     why = "search over points of the wheel's surface, straight between points of both profiles"
+    asked, corner = f"{why}; the bound asked for", f"{why}, as far as an angle changes in 0.3 mm of the gauge corner"
+    told = (
+        ("rail", "first touch on the rail, case A-1", "mm", PLACE, asked),
+        ("wheel", "first touch on the wheel, case A-1", "mm", PLACE, asked),
+        ("angle", "angle there", "rad", 0.02, corner),
+    )
     return [
-        at_most(
-            "manchester.search.rail",
-            SYSTEM,
-            "first touch on the rail, case A-1, largest difference",
-            float(off[:, 0].max()),
-            "mm",
-            PLACE,
-            f"{why}; the bound asked for",
-            "closed form",
-        ),
-        at_most(
-            "manchester.search.wheel",
-            SYSTEM,
-            "first touch on the wheel, case A-1, largest difference",
-            float(off[:, 1].max()),
-            "mm",
-            PLACE,
-            f"{why}; the bound asked for",
-            "closed form",
-        ),
-        at_most(
-            "manchester.search.angle",
-            SYSTEM,
-            "angle there, largest difference",
-            float(off[:, 2].max()),
-            "rad",
-            0.02,
-            f"{why}, as far as an angle changes in 0.3 mm of the gauge corner",
-            "closed form",
+        *(
+            at_most(
+                f"manchester.search.{name}",
+                SYSTEM,
+                f"{what}, largest difference",
+                float(gap),
+                unit,
+                bound,
+                why,
+                "closed form",
+            )
+            for (name, what, unit, bound, why), gap in zip(told, np.max(gaps, axis=0), strict=True)
         ),
         at_most(
             "manchester.mirror",
@@ -195,15 +176,6 @@ def _axle_row(placed: Placed) -> Row:
         "patches that have grown together lean by some mrad, which leaves a part of their levers out",
         "closed form",
     )
-
-
-def _searched_off(contact: Contact, placed: Placed) -> list[tuple[float, float, float]]:
-    found = []
-    for sign, places in ((1.0, placed.right), (-1.0, placed.left)):
-        for place in places:
-            y, u, angle = searched(contact.side, placed, sign, place.wheel_y)
-            found.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
-    return found
 
 
 def _split_rows(contact: Contact, placed: Placed) -> list[Row]:
