@@ -144,4 +144,5 @@ def _car(vehicle: SpatialVehicle) -> list[Surface]:
         (rear - 0.6, 0.92),
     ]
     upper = [(rear - 0.45, 0.92), (front - 0.38, 0.88), (front - 1.05, 1.38), (rear + 0.15, 1.4)]
-    return [extruded(np.array(lower) - [x, z], 1.66, PAINT, 0.42), extruded(np.array(upper) - [x, z], 1.4, PAINT, 0.3)]
+    outlines = ((lower, 1.66, 0.42), (upper, 1.4, 0.3))
+    return [replace(extruded(np.array(line) - [x, z], wide, PAINT), alpha=alpha) for line, wide, alpha in outlines]
