@@ -25,18 +25,18 @@ from scipy.optimize import brentq
 from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance
-from models.contact.wheel_on_rail import Pose, Side, Touch, Track, Wheelset, laid, placed, touches_of
+from models.contact.wheel_on_rail import Pose, Side, Touch, placed, touches_of
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
+from models.rail.laid_profiles import Profiles
 
 BENCHMARK_SHIFTS = tuple(0.5e-3 * k for k in range(21))
 """m"""
 BENCHMARK_YAW = 2.4
 """rad of yaw for each m of lateral displacement in case A-2."""
-BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION = 1.0e4, 2.0, 0.3
-"""N on each wheel; m/s; coefficient of friction."""
+BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION, BENCHMARK_RADIUS = 1.0e4, 2.0, 0.3, 0.46
+"""N on each wheel; m/s; coefficient of friction; m at the taping line."""
 Triple = tuple[float, float, float]
 SIGNS = (1.0, -1.0)
 """Of the right wheel, and of the left one seen in a mirror."""
@@ -335,7 +335,7 @@ class Contact:
 @cache
 def benchmark_side() -> Side:
     """The benchmark's right wheel on its rail, with the built-in profiles."""
-    return Side(s1002(), laid(uic60(), Track()), Wheelset())
+    return Profiles().side(BENCHMARK_RADIUS)
 
 
 def manchester(*, yaw: bool = False, rolling: bool = False, shifts: Iterable[float] = BENCHMARK_SHIFTS) -> list[Placed]:

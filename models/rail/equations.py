@@ -34,7 +34,7 @@ from models.rail.wheel_forces import (
     LOAD,
     REPORTED,
     Rails,
-    carried,
+    carries,
     numbers,
     patches,
     rails_of,
@@ -187,7 +187,10 @@ class Equations:
         """Numbers of the body and its suspension (14,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
-        sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
+        sunk = float(w.ellipse.approach) / w.slant[1]
+        if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
+            contact = numbers(w)
+            sunk = float(brentq(lambda z: carries(z, contact) - w.load, 0.0, DEEPEST, xtol=1e-15))
         held = [w.stiffness_x, w.stiffness_y, w.stiffness_z, w.damping_x, w.damping_y, w.damping_z]
         return np.array(
             [w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean, any(held)]
@@ -197,11 +200,6 @@ class Equations:
     def parameters(self) -> tuple[float, Array, Rails]:
         """What the compiled functions take after the state: speed, body and rails."""
         return float(self.speed), self.body, rails_of(self.wheelset, self.law, self.cells)
-
-    def _static_height(self) -> float:
-        """Height z (m) in the middle of the track at which smooth rails carry the load."""
-        contact = numbers(self.wheelset)
-        return float(brentq(lambda z: carried(z, contact) - self.wheelset.load, 0.0, DEEPEST, xtol=1e-15))
 
     def blank(self, *shape: int) -> Array:
         """Contacts (*shape, patches, REPORTED) that are not known yet."""

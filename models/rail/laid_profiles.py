@@ -90,7 +90,9 @@ def profile_numbers(profiles: Profiles, radius: float) -> Array:
     tip = int(np.argmax(side.wheel.z))
     y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
     curve = side.wheel.curve
-    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, _cuts(side))])
+    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first(side, shift)) is not None]
+    cuts = [cut for cut in (_ridge(side, *pair) for pair in pairwise(touched)) if cut is not None]
+    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, cuts)])
     knots = _even(side.rail.y, side.rail.z, OF_KNOTS)
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
@@ -105,13 +107,6 @@ def _even(y: Array, z: Array, spacing: float) -> Array:
     """Places y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
-
-
-def _cuts(side: Side) -> list[float]:
-    """Places (m from the taping line) on the wheel that first contact jumps across, over a ridge of the gap."""
-    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first(side, shift)) is not None]
-    cuts = [_ridge(side, before, after) for before, after in pairwise(touched)]
-    return [cut for cut in cuts if cut is not None]
 
 
 def _first(side: Side, shift: float) -> tuple[float, Array, Array] | None:

@@ -266,7 +266,13 @@ def bifurcation(equations: Equations, slowest: float, fastest: float, step: floa
     NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.
     """
     clearance = equations.wheelset.flange_clearance
-    first = _first(equations, clearance, step)
+    for share in FIRST:
+        try:
+            first = beginning(equations, share * clearance, step)
+            break
+        except RunFailed:
+            if share == FIRST[-1]:
+                raise
     inner = np.linspace(first.amplitude, clearance, INNER)[1:]
     outer = (clearance * (1.0 + OUTER * k) for k in count(1))
     yield refined(first, "speed")
@@ -276,12 +282,3 @@ def bifurcation(equations: Equations, slowest: float, fastest: float, step: floa
                 return
             first = orbit
             yield refined(orbit, "speed")
-
-
-def _first(equations: Equations, clearance: float, step: float) -> Orbit:
-    for share in FIRST:
-        try:
-            return beginning(equations, share * clearance, step)
-        except RunFailed as error:
-            failed = error
-    raise failed

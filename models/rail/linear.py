@@ -86,7 +86,9 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker(wheelset)
     gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
-    damping, stiffness = _suspension(w)
+    arm = w.half_spacing**2  # of the suspension; roll goes with the lateral displacement
+    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
+    stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
     stiffness += gravity(w)
     for motion, place in _contacts(w):
@@ -106,13 +108,6 @@ def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
         )
         for side in (1.0, -1.0)
     ]
-
-
-def _suspension(w: Wheelset) -> tuple[Array, Array]:
-    """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
-    arm = w.half_spacing**2
-    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
-    return damping, 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
 
 
 def gravity(w: Wheelset) -> Array:

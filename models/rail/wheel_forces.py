@@ -187,7 +187,7 @@ def contact_points(y, z, roll, yaw, p, touches):
 
 
 @njit(cache=True, error_model="numpy")
-def carried(z, p):
+def carries(z, p):
     """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
     touches, whole = np.zeros((patches(p), TOUCH)), 0.0
     contact_points(0.0, z, 0.0, 0.0, p, touches)

@@ -55,19 +55,18 @@ def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
 
 def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> Motion:
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
-    model = build(engine, vehicle, settings, SPEED, table)
+    model: Any = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
     gust = np.array([GUST if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
     run = model.run(zero, gust)
     kept = SpatialRun(run.times[rows], run.positions[rows], run.rates[rows])
-    poses = (_exudyn if engine == "exudyn" else _mujoco)(model, kept.positions)
+    if engine == "exudyn":
+        poses = _exudyn(model, kept.positions)
+    else:
+        joints = np.empty_like(kept.positions)
+        joints[:, model.numbers.columns] = kept.positions
+        poses = of_mujoco(model.model, model.numbers.bodies, joints)
     return Motion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
-
-
-def _mujoco(model: Any, positions: np.ndarray) -> Poses:
-    joints = np.empty_like(positions)
-    joints[:, model.numbers.columns] = positions
-    return of_mujoco(model.model, model.numbers.bodies, joints)
 
 
 def _exudyn(model: Any, positions: np.ndarray) -> Poses:

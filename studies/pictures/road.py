@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.pictures.shapes import Colour, Surface, box, faceted, floor
+from studies.pictures.shapes import Colour, Surface, box, faceted, floor, patches
 
 LIGHT: Colour = (0.60, 0.61, 0.63)
 DARK: Colour = (0.54, 0.55, 0.57)
@@ -58,6 +58,4 @@ class PassingRoad:
 
 def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> Surface:
     """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
-    one, two, three, four = (part[chosen] for part in (net[:-1, :-1], net[1:, :-1], net[1:, 1:], net[:-1, 1:]))
-    corners = np.concatenate([np.stack([one, two, three], 1), np.stack([one, three, four], 1)])
-    return faceted(corners, colour)
+    return faceted(patches(net)[np.tile(chosen.ravel(), 2)], colour)

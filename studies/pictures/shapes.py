@@ -42,7 +42,7 @@ def faceted(corners: np.ndarray, colour: Colour) -> Surface:
     return Surface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
 
-def _patches(points: np.ndarray) -> np.ndarray:
+def patches(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
     one, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
@@ -59,8 +59,8 @@ def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 4
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
     length = np.linalg.norm(slopes, axis=1, keepdims=True)
     slopes /= np.where(length > 0, length, 1.0)
-    corners = [_patches(net[i : i + 2]) for i in range(len(slopes))]
-    normals = [_patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
+    corners = [patches(net[i : i + 2]) for i in range(len(slopes))]
+    normals = [patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
     return Surface(np.concatenate(corners), np.concatenate(normals), colour)
 
 
@@ -84,7 +84,7 @@ def extruded(outline: np.ndarray, width: float, colour: Colour) -> Surface:
         np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1) for side in (front, back[::-1])
     ]
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
-    return faceted(np.concatenate([*fan, _patches(closed)]), colour)
+    return faceted(np.concatenate([*fan, patches(closed)]), colour)
 
 
 def floor(z: float, colour: Colour, up: float) -> Surface:
@@ -94,7 +94,7 @@ def floor(z: float, colour: Colour, up: float) -> Surface:
     """
     lines = FAR * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
     x, y = np.meshgrid(up * lines, lines, indexing="ij")
-    return faceted(_patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
+    return faceted(patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 
 
 def ball(radius: float, colour: Colour) -> Surface:
