@@ -209,6 +209,7 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
         pressed: Any
+        creep: Any
         for k in range(0, wheels.size, FREEDOMS):
             approach, mu, speed = numbers[SUNK] + q[k + Z], wheels.mu, wheels.speed
             slip = v[k + X] / speed, v[k + Y] / speed - q[k + YAW], v[k + YAW] / speed

@@ -72,13 +72,14 @@ def _timed(contact: Contact, yaw: float, shifts: np.ndarray) -> tuple[list[Place
 def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
     published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
     off = np.abs(np.array([sums(position, wheel) for position in placed]) - published_sums)
-    place, force, peak = off[:, 0].max(), *(100.0 * off / published_sums)[:, 1:].max(axis=0)
+    place, _, _ = off.max(axis=0).tolist()
+    _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
         at_most(
             f"manchester.places.{wheel}",
             SYSTEM,
             f"mean place of contact of the {wheel} wheel, largest difference",
-            float(place),
+            place,
             "mm",
             PLACE,
             PUBLISHED,
@@ -88,7 +89,7 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.forces.{wheel}",
             SYSTEM,
             f"normal force of the {wheel} wheel, largest difference",
-            float(force),
+            force,
             "%",
             FORCE,
             PUBLISHED,
@@ -98,7 +99,7 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.peaks.{wheel}",
             SYSTEM,
             f"largest pressure of the {wheel} wheel, largest difference",
-            float(peak),
+            peak,
             "%",
             0.0,
             "CONTACT's cells of 0.2 mm; a flange's patch has four of them",
