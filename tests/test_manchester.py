@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import RunFailed
-from models.rail.contact_table import Contact, benchmark_side
-from validation.contact.manchester_references import searched
+from validation.contact.manchester_references import contact_of, searched
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -53,11 +52,11 @@ def test_position_that_fails_is_named(twinrig, capsys):
 
 def test_wheel_that_has_climbed_its_flange_is_told():
     with pytest.raises(RunFailed, match="right wheel has climbed its flange"):
-        Contact(benchmark_side(), 1e4).at(18e-3)
+        contact_of("A-1").at(18e-3)
 
 
 def test_search_finds_the_places():
-    contact = Contact(benchmark_side(), 1e4)
+    contact = contact_of("A-1")
     placed = contact.at(6.5e-3, 0.0156)  # the yaw moves the flange's place 17 mm ahead
     for sign, (place,) in ((1.0, placed.right), (-1.0, placed.left)):
         y, u, angle = searched(contact.side, placed, sign, place.wheel_y + 1e-3)

@@ -15,9 +15,8 @@ for each mm. The load of 10 kN on each wheel and the steps of 0.5 mm are those t
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -29,14 +28,7 @@ from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, Side, Touch, placed, touches_of
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
-from models.rail.laid_profiles import Profiles
 
-BENCHMARK_SHIFTS = tuple(0.5e-3 * k for k in range(21))
-"""m"""
-BENCHMARK_YAW = 2.4
-"""rad of yaw for each m of lateral displacement in case A-2."""
-BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION, BENCHMARK_RADIUS = 1.0e4, 2.0, 0.3, 0.46
-"""N on each wheel; m/s; coefficient of friction; m at the taping line."""
 Triple = tuple[float, float, float]
 SIGNS = (1.0, -1.0)
 """Of the right wheel, and of the left one seen in a mirror."""
@@ -166,7 +158,7 @@ class Contact:
 
     side: Side
     load: float
-    speed: float = BENCHMARK_SPEED
+    speed: float
     friction: float = 0.0
     pair: Pair = Pair()  # noqa: RUF009 - a frozen value
 
@@ -330,18 +322,6 @@ class Contact:
             width,
             wheel.approach,
         )
-
-
-@cache
-def benchmark_side() -> Side:
-    """The benchmark's right wheel on its rail, with the built-in profiles."""
-    return Profiles().side(BENCHMARK_RADIUS)
-
-
-def manchester(*, yaw: bool = False, rolling: bool = False, shifts: Iterable[float] = BENCHMARK_SHIFTS) -> list[Placed]:
-    """The benchmark's case A-1 (``yaw``: A-2), without friction or rolling with it, at lateral displacements in m."""
-    contact = Contact(benchmark_side(), BENCHMARK_LOAD, friction=BENCHMARK_FRICTION if rolling else 0.0)
-    return [contact.at(shift, BENCHMARK_YAW * shift if yaw else 0.0) for shift in shifts]
 
 
 def _standing(found: Placed) -> Placed:

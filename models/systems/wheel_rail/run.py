@@ -49,7 +49,7 @@ PATCH: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contact at every position that has one, why others (mm) have none, and seconds that each of all took."""
+    """Contact at every position that has one, why others (mm) have none, seconds of the processor that each took."""
 
     placed: list[Placed] = field(default_factory=list)
     failed: dict[float, str] = field(default_factory=dict)
@@ -72,7 +72,7 @@ def run(
     held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
     for i, shift in enumerate(scene.positions.values().tolist()):
         told(1e3 * shift, i / scene.positions.count)
-        begun = time.perf_counter()
+        begun = time.process_time()
         try:
             contacts.placed.append(held.at(shift, yaw * shift))
         except (InputError, RunFailed) as error:
@@ -82,7 +82,7 @@ def run(
                 if deep
                 else str(error)
             )
-        contacts.seconds.append(time.perf_counter() - begun)
+        contacts.seconds.append(time.process_time() - begun)
     return _labelled(scene, name, contacts)
 
 
