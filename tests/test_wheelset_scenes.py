@@ -121,6 +121,7 @@ def test_the_study_saves_what_it_says(tmp_path):
     with xr.open_dataset(tmp_path / "paths.nc") as data:
         assert data["y"].dims == ("engine", "speed", "time") and data["y"].units == "m"
         assert float(data["y"][0, 0, 0]) == 5e-3
+        assert json.loads(data.attrs["scene_table"])["run"]["speeds"] == [60.0] and "provenance" in data.attrs
     with xr.open_dataset(tmp_path / "eigenvalues.nc") as data:
         assert data["real"].shape == (1, 4, 9)
     assert (tmp_path / "over_speed.csv").read_text().startswith("speed [m/s],reference growth [1/s]")
