@@ -283,10 +283,15 @@ class Equations:
         return states, contacts
 
     def check(self, path: Path, step: float, every: int) -> None:
-        """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then.
+        """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
+        self.check_loads(path, step)
+        if every == 1:
+            w = self.wheelset
+            inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
+            check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
-        Or, where every step was kept, if it was too large for the motion.
-        """
+    def check_loads(self, path: Path, step: float) -> None:
+        """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
         for k in sorted(set(path.contacts[:, :, LOAD].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
@@ -296,10 +301,6 @@ class Equations:
                     f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
                     path.times[k],
                 )
-        if every == 1:
-            w = self.wheelset
-            inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
-            check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
     def _steps(self, state: Array, duration: float, step: float, every: int) -> int:
         """Number of steps of a run that is possible."""

@@ -1,52 +1,28 @@
 """A wheelset on straight track in three implementations: wave, critical speed, paths, limit cycles, power, faults."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.eigenvalues import free, growth, wavelength
+from models.rail.eigenvalues import growth, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.limit_cycle import Orbit, attained, beside, refined, solved
-from models.rail.linear import LOWEST_SPEED, NoCriticalSpeed, critical_or_why, critical_speed, klingel
-from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
 from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.contact.drawn_wheelsets import HEAVY, SEED, STIFF, Speeds, criticals, drawn
 from validation.faults import wheelset as faults
 from validation.faults.campaign import off
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"
-SEED = 2026
-DRAWN = 6
-"""Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
-RANGES = {
-    "mass": (800.0, 2000.0),
-    "spin_inertia": (50.0, 200.0),
-    "yaw_inertia": (500.0, 1500.0),
-    "radius": (0.35, 0.55),
-    "half_gauge": (0.7, 0.8),
-    "conicity": (0.02, 0.3),
-    "head_radius": (0.15, 0.4),
-    "load": (6e4, 2e5),
-    "half_spacing": (0.8, 1.2),
-    "stiffness_x": (1e5, 3e6),
-    "stiffness_y": (1e5, 3e6),
-    "stiffness_z": (3e5, 2e6),
-    "damping_x": (5e2, 1e4),
-    "damping_y": (5e2, 1e4),
-    "damping_z": (1e3, 2e4),
-    "friction": (0.1, 0.5),
-}
-STIFF = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
-HEAVY = free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
-"""So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
 EDGE = 2e-3
 """Radius (m) of rails that are edges: Klingel's own wheelset."""
 STEP, DURATION = 5e-4, 1.0
@@ -55,8 +31,6 @@ LIVELY = np.array([6e-3, 5e-5, 2e-3, 2e-2, 3.0, 0.3, 0.05, 1.0, 1.0, 10.0])
 ABOVE = 1.1
 """Speed of paths and cycles by the critical one."""
 ENGINES = tuple(name for name in IMPLEMENTATIONS if name != "reference")
-AROUND, BELOW = 0.02, 5
-"""Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
@@ -77,34 +51,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             for name, own in cycles.items()
         },
     }
-
-
-def drawn() -> dict[str, Wheelset]:
-    """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
-    draw, found = np.random.default_rng(SEED), dict[str, Wheelset]()
-    while len(found) < DRAWN:
-        values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
-        if values["load"] > 1.5 * GRAVITY * values["mass"]:
-            found[f"drawn {len(found) + 1}"] = CHOSEN.changed(**values)
-    return found
-
-
-def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
-    """Critical speed (m/s) of each implementation; None where there is none. near : engines look about the first."""
-    speeds: dict[str, float | None] = {}
-    for engine in IMPLEMENTATIONS:
-        of, first = partial(growth, implementation(engine)), speeds.get("reference")
-        speeds[engine] = _near(partial(of, wheelset), first) if near and first else critical_or_why(wheelset, of)[0]
-    return speeds
-
-
-def _near(growth: Callable[[float], float], speed: float) -> float:
-    """The critical speed (m/s) within AROUND of another; an end of that, or a lower speed, where it is not in it."""
-    low, high = (1.0 - AROUND) * speed, (1.0 + AROUND) * speed
-    for below in np.geomspace(LOWEST_SPEED, low, BELOW):
-        if growth(float(below)) >= 0.0:
-            return float(below)
-    return high if growth(high) < 0.0 else float(brentq(growth, low, high, xtol=1e-12 * speed, rtol=1e-12))
 
 
 def _spread(values: Iterable[float]) -> float:
@@ -158,7 +104,7 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
     ]
 
 
-def _critical_rows(speeds: dict[str, dict[str, float | None]]) -> list[Row]:
+def _critical_rows(speeds: Speeds) -> list[Row]:
     """Critical speeds among each other: of those that have one, and whether all agree which those are."""
     there = [[speed for speed in own.values() if speed is not None] for own in speeds.values()]
     agreed = all(len(own) in (0, len(IMPLEMENTATIONS)) for own in there)
@@ -230,9 +176,6 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
             )
         )
     return rows
-
-
-Speeds = dict[str, dict[str, float | None]]
 
 
 def _usual(speeds: Speeds, name: str) -> float:

@@ -85,8 +85,7 @@ def through_zero(implementation: str, folder: Path) -> float:
         motion = own.run(state, 0.002, 8e-5)
         if beyond_friction(motion, HEAVY.friction) > 1e-12:
             return np.inf
-        moving = motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia]
-        found.append(moving)
+        found.append(motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia])
         state = motion.states[-1].copy()
     return float(np.max(found) / found[0][0] - 1.0)
 
@@ -164,11 +163,10 @@ def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, 
 
 def crawling(implementation: str, folder: Path) -> float:
     """Displacement at 1e-6 m/s against that of a wheelset that stands, by it."""
-    ends = []
-    for speed in (0.0, 1e-6):
-        own = built(implementation, HEAVY, speed, lean=0.1)
-        ends.append(own.run(built(implementation, HEAVY, 0.0).rest, 0.01, 8e-5).states[-1, eq.Y])
-    return float(abs(ends[1] / ends[0] - 1.0))
+    rest = built(implementation, HEAVY, 0.0).rest
+    runs = (built(implementation, HEAVY, speed, lean=0.1).run(rest, 0.01, 8e-5) for speed in (0.0, 1e-6))
+    still, slow = (motion.states[-1, eq.Y] for motion in runs)
+    return float(abs(slow / still - 1.0))
 
 
 def symmetric(implementation: str, folder: Path) -> float:
@@ -235,7 +233,6 @@ def too_large_naive(folder: Path) -> str:
 
 REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
-NAN = float("nan")
 CASES = (
     Case(
         "wheelset that stands on a slope",
@@ -265,23 +262,22 @@ CASES = (
         "creep forces have no power",
         through_zero,
     ),
-    Case(
-        "wheelset dropped on its rails",
-        "contact begins and ends within steps",
-        "gains no energy",
-        "of 1 mm",
-        1e-3,
-        "error of the step, 3e-4 at twice the step",
-        partial(falling, Z=-1e-3),
-    ),
-    Case(
-        "one wheel lifted",
-        "the wheelset lands on one wheel, then on the other",
-        "gains no energy",
-        "of 1 mm",
-        1e-3,
-        "Hertz' energy changes with the place of contact",
-        partial(falling, Z=-1e-3, ROLL=2e-3),
+    *(
+        Case(name, hard, "gains no energy", "of 1 mm", 1e-3, why, partial(falling, Z=-1e-3, ROLL=roll))
+        for name, hard, why, roll in (
+            (
+                "wheelset dropped on its rails",
+                "contact begins and ends within steps",
+                "error of the step, 3e-4 at twice the step",
+                0.0,
+            ),
+            (
+                "one wheel lifted",
+                "the wheelset lands on one wheel, then on the other",
+                "Hertz' energy changes with the place of contact",
+                2e-3,
+            ),
+        )
     ),
     Case(
         "wheelset that bounces and rolls",
@@ -329,23 +325,12 @@ CASES = (
         "rounding of the height of rest",
         pure_spin,
     ),
-    Case(
-        "wheelset at 200 m/s",
-        "far above its critical speed",
-        "half the step",
-        "m",
-        1e-8,
-        "error of the step",
-        partial(halved, wheelset=CHOSEN, speed=200.0, step=2e-4),
-    ),
-    Case(
-        "conicity of 0.5",
-        "geometry far from linear",
-        "half the step",
-        "m",
-        1e-8,
-        "error of the step",
-        partial(halved, wheelset=CHOSEN.changed(conicity=0.5), speed=20.0, step=1e-4),
+    *(
+        Case(name, hard, "half the step", "m", 1e-8, "error of the step", partial(halved, wheelset=w, speed=v, step=h))
+        for name, hard, w, v, h in (
+            ("wheelset at 200 m/s", "far above its critical speed", CHOSEN, 200.0, 2e-4),
+            ("conicity of 0.5", "geometry far from linear", CHOSEN.changed(conicity=0.5), 20.0, 1e-4),
+        )
     ),
     Case(
         "wheelset at 1 micrometre per second",
@@ -401,13 +386,13 @@ CASES = (
         for name, place, run in (
             ("step of 4 ms on rails", "step", partial(ran, step=4e-3, duration=0.04)),
             ("step of 0.5 ms at standstill", "step", partial(ran, speed=0.0)),
-            ("wheelset somewhere unknown", "state[0]", partial(ran, Y=NAN)),
+            ("wheelset somewhere unknown", "state[0]", partial(ran, Y=np.nan)),
             ("spin that is infinite", "state[9]", partial(ran, SPIN=np.inf)),
             ("duration between two steps on rails", "duration", partial(ran, duration=0.0013)),
             ("wheelset that runs for no time", "duration", partial(ran, duration=0.0)),
             ("every third of twenty steps", "every", partial(ran, every=3)),
             ("wheelset at 300 m/s", "speed", partial(ran, speed=300.0)),
-            ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=NAN)),
+            ("wheelset without a mass", "mass", lambda _: CHOSEN.changed(mass=np.nan)),
             ("strips of two cells", "cells", lambda name: built(name, cells=2).rest),
             ("strips of 2000 cells in an engine", "cells", lambda name: built(name, cells=2000).rest),
         )
