@@ -30,7 +30,6 @@ NOT_STUDIES = (
     "handling_figures",
     "hub_forces_figures",
     "log_axis",
-    "manchester_figure",
     "recording_figures",
     "recording_page",
     "recording_runs",

@@ -1,19 +1,19 @@
 """Limit cycles of a wheelset on straight track: amplitude and frequency over speed, those that repel as well."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from models.core.errors import InputError, RunFailed
+from models.core.errors import InputError
 from models.core.strict import Strict, quantity, read
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW
-from models.rail.limit_cycle import attained, bifurcation
-from models.rail.linear import NoCriticalSpeed
-from models.rail.orbit import Orbit, beside, refined, solved
-from models.systems.wheelset.of_scene import BESIDE, equations_of
+from models.rail.limit_cycle import Orbit
+from models.systems.wheelset.of_scene import wheelset_of
+from models.systems.wheelset.run import ORBIT, branch, cycle_speed, cycles
 from models.systems.wheelset.scene import WheelsetScene
 
 SYSTEM = "wheelset"
@@ -38,109 +38,47 @@ def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
 
 
 def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Follow the branch, close the cycle in every engine; saves ``branch.csv``, ``cycle.nc`` and figures."""
+    """Follow the branch, close the cycle in every engine; saves ``branch`` and ``cycle_ENGINE.nc``, and figures.
+
+    The branch is a table (CSV) and a result (netCDF).
+    """
     from studies.wheelset_figures import branch_figure, cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    orbits, notes = _branch(scene, progress)
-    speed = options.speed or _usual(scene, orbits)
+    found = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)))
+    orbits, notes = found.detail, json.loads(found.data.attrs["doubts"])
+    speed = options.speed or cycle_speed(scene, orbits)
     progress(f"cycle at {speed:g} m/s", 0.6)
-    cycles, failed = _cycles(scene, engines, speed)
-    _save(scene, orbits, cycles, folder)
+    results, failed = cycles(scene, engines, speed)
+    by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
+    for engine, result in results.items():
+        result.save(folder / f"cycle_{engine}.nc")
     if orbits:
-        branch_figure(orbits, equations_of(scene, "reference", speed).wheelset, scene.title, folder / "branch.png")
-    if cycles:
-        cycle_figure(cycles, scene.title, folder / "cycle.png")
+        found.save(folder / "branch.nc")
+        found.save_table(folder / "branch.csv", *ORBIT)
+        branch_figure(orbits, wheelset_of(scene), scene.title, folder / "branch.png")
+    if by_engine:
+        cycle_figure(by_engine, scene.title, folder / "cycle.png")
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
-    table = [*_branch_lines(orbits), *_cycle_lines(cycles), *(f"  {note}" for note in notes)]
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
-        "answer": _answer(orbits, cycles),
-        "table": table,
+        "answer": {
+            "branch": [_numbers(orbit, *ORBIT) for orbit in orbits],
+            "cycles": {
+                engine: _numbers(orbit, *(name for name in ORBIT if name != "multiplier"))
+                for engine, orbit in by_engine.items()
+            },
+        },
+        "table": [*_branch_lines(orbits), *_cycle_lines(by_engine), *(f"  {note}" for note in notes)],
     }
 
 
-def _branch(scene: WheelsetScene, progress: Progress) -> tuple[list[Orbit], list[str]]:
-    """Orbits of the branch within the scene's speeds, and why it ends or never begins."""
-    speeds, orbits = scene.speeds.all(), list[Orbit]()
-    equations = equations_of(scene, "reference", float(speeds[-1]))
-    try:
-        for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step):
-            orbits.append(orbit)
-            progress("branch of cycles", 0.6 * len(orbits) / (len(orbits) + 10))
-    except NoCriticalSpeed as error:
-        return _at_speeds(scene) if error.unstable else [], [f"no branch begins: the wheelset {error.allowed}"]
-    except RunFailed as error:
-        return orbits, [f"the branch is followed no further: {error.reason}"]
-    return orbits, []
-
-
-def _at_speeds(scene: WheelsetScene) -> list[Orbit]:
-    """Cycles that motions reach at the scene's speeds, where no branch begins because nothing is stable."""
-    found = (
-        attained(equations_of(scene, "reference", float(speed)), start=scene.run.displacement, step=scene.run.step)
-        for speed in scene.speeds.all()
-    )
-    return [refined(orbit, "amplitude") for orbit in found if orbit is not None]
-
-
-def _usual(scene: WheelsetScene, orbits: list[Orbit]) -> float:
-    """A speed (m/s) above that at which the branch begins, the scene's last where there is none."""
-    last = float(scene.speeds.all().max())
-    return min(last, round(BESIDE[1] * orbits[0].speed, 2)) if orbits else last
-
-
-def _cycles(scene: WheelsetScene, engines: tuple[str, ...], speed: float) -> tuple[dict[str, Orbit], dict[str, str]]:
-    """The refined cycle of every engine at a speed (m/s); each finds it from a guess that is off."""
-    found, failed = dict[str, Orbit](), dict[str, str]()
-    first = attained(equations_of(scene, "reference", speed), start=scene.run.displacement, step=scene.run.step)
-    if first is None:
-        return found, failed
-    for engine in engines:
-        guess = beside(first, equations_of(scene, engine, speed))
-        try:
-            found[engine] = refined(solved(guess, "amplitude", precise=False), "amplitude")
-        except RunFailed as error:
-            failed[engine] = str(error)
-    return found, failed
-
-
-def _save(scene: WheelsetScene, orbits: list[Orbit], cycles: dict[str, Orbit], folder: Path) -> None:
-    """The branch as a table, one period of every engine's cycle as netCDF."""
-    from models.core.result import provenance, write
-    from models.core.tables import write_table
-    from studies.wheelset import dataset
-
-    if orbits:
-        columns = {
-            "speed": "m/s",
-            "amplitude": "m",
-            "frequency": "Hz",
-            "multiplier": "-",
-            "error": "m/s or m",
-            "frequency_error": "Hz",
-        }
-        write_table(
-            folder / "branch.csv",
-            {name: (unit, np.array([getattr(orbit, name) for orbit in orbits])) for name, unit in columns.items()},
-        )
-    origin = {"title": scene.title, **{key: str(value) for key, value in provenance().items()}}
-    for engine, orbit in cycles.items():
-        data = dataset({engine: {orbit.speed: orbit.path()}}).assign_attrs(origin)
-        write(data, folder / f"cycle_{engine}.nc")
-
-
-def _answer(orbits: list[Orbit], cycles: dict[str, Orbit]) -> dict[str, Any]:
-    """What was found, as plain numbers in SI."""
-    names = ("speed", "amplitude", "frequency", "multiplier", "error", "frequency_error")
-    numbers = {
-        engine: {name: float(getattr(orbit, name)) for name in names if name != "multiplier"}
-        for engine, orbit in cycles.items()
-    }
-    return {"branch": [{name: float(getattr(orbit, name)) for name in names} for orbit in orbits], "cycles": numbers}
+def _numbers(orbit: Orbit, *names: str) -> dict[str, float]:
+    """Plain numbers in SI."""
+    return {name: float(getattr(orbit, name)) for name in names}
 
 
 def _branch_lines(orbits: list[Orbit]) -> list[str]:

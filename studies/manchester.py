@@ -1,141 +1,34 @@
 """Where a held wheelset touches its rails, and with which forces, at every lateral displacement: both wheels."""
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from models.contact.wheel_on_rail import DEEP
-from models.core.errors import InputError, RunFailed
+from models.core.result import Result
 from models.core.tables import write_table
 from models.machine.seconds import cost
-from models.rail.contact_table import Contact, Place, Placed, rolling_radius_difference
+from models.rail.contact_table import Placed
+from models.systems.wheel_rail import run as system
 from models.systems.wheel_rail.plan import case_text
+from models.systems.wheel_rail.run import PATCH, POSITION, WHEELS, numbers, patches
 from models.systems.wheel_rail.scene import WheelRailScene
 
 SYSTEM = "wheel-rail"
 Progress = Callable[[str, float], None]
-WHEELS = ("right", "left")
 FLANGE = 0.8
 """Contact angle (rad) from which on a patch is called one of the flange."""
-TOO_DEEP = ("distance", "load")
-"""What the theories complain of where the contact grows out of its surroundings."""
-COLUMNS: dict[str, tuple[str, Callable[[Place], float]]] = {
-    "on_rail": ("mm", lambda p: 1e3 * (p.y - p.top)),
-    "in_track": ("mm", lambda p: 1e3 * p.y),
-    "on_wheel": ("mm", lambda p: 1e3 * p.wheel_centre),
-    "ahead": ("mm", lambda p: 1e3 * p.x),
-    "angle": ("deg", lambda p: float(np.degrees(-p.centre_angle))),
-    "normal": ("kN", lambda p: 1e-3 * p.normal),
-    "peak": ("MPa", lambda p: 1e-6 * p.peak),
-    "area": ("mm^2", lambda p: 1e6 * p.area),
-    "half_length": ("mm", lambda p: 5e2 * p.length),
-    "half_width": ("mm", lambda p: 5e2 * p.width),
-    "rolling_radius": ("mm", lambda p: 1e3 * p.rolling_radius),
-    "touch_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
-    "touch_on_wheel": ("mm", lambda p: 1e3 * p.wheel_y),
-    "touch_angle": ("deg", lambda p: float(np.degrees(-p.angle))),
-    "fx": ("kN", lambda p: 1e-3 * p.fx),
-    "fy": ("kN", lambda p: 1e-3 * p.fy),
-    "mz": ("N m", lambda p: p.mz),
-    "mz_on_rail": ("mm", lambda p: 1e3 * (p.touch_y - p.top)),
-    "mz_ahead": ("mm", lambda p: 1e3 * p.touch_x),
-    "xi_x": ("-", lambda p: p.xi_x),
-    "xi_y": ("-", lambda p: p.xi_y),
-    "spin": ("1/m", lambda p: p.spin),
-    "approach": ("um", lambda p: 1e6 * p.approach),
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222")
+PANELS = {
+    "on_rail": "on the rail, from its top [mm]",
+    "on_wheel": "on the wheel [mm]",
+    "angle": "contact angle [deg]",
+    "normal": "normal force [kN]",
+    "peak": "largest pressure [MPa]",
 }
-"""Unit and value of every column of a patch."""
-
-
-def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Every case at every position; saves a CSV of patches for each case and wheel, one of positions, a figure."""
-    from studies.manchester_figure import figure
-
-    found: dict[str, list[Placed]] = {}
-    failed: dict[str, str] = {}
-    table: list[str] = []
-    for k, (name, case) in enumerate(scene.cases.items()):
-        contact, shifts, marks = scene.contact(case), scene.positions.values(), [time.perf_counter()]
-        found[name] = []
-        for i, shift in enumerate(shifts):
-            progress(f"{name} at {1e3 * shift:g} mm", (k + i / shifts.size) / len(scene.cases))
-            _try(contact, float(shift), case.yaw, name, found[name], failed)
-            marks.append(time.perf_counter())
-        table += [
-            f"  {name}: {case_text(case.yaw, case.friction)}; {cost(np.diff(marks))} a position",
-            *_table(found[name]),
-        ]
-        _save(name, found[name], folder)
-    if any(found.values()):
-        figure(
-            scene.title,
-            {name: (scene.cases[name], placed) for name, placed in found.items()},
-            folder / "manchester.png",
-        )
-    answer = {name: [_answer(one) for one in placed] for name, placed in found.items()}
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [*table, *NOTES]}
-
-
-def _try(contact: Contact, shift: float, yaw: float, name: str, found: list[Placed], failed: dict[str, str]) -> None:
-    """One position; what prevents it is told, and the others go on."""
-    try:
-        found.append(contact.at(shift, yaw * shift))
-    except (InputError, RunFailed) as error:
-        deep = isinstance(error, InputError) and error.place in TOO_DEEP
-        failed[f"{name}, {1e3 * shift:g} mm"] = (
-            f"a load of {contact.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
-            if deep
-            else str(error)
-        )
-
-
-def patches(placed: Placed, wheel: str) -> tuple[Place, ...]:
-    """The patches of one wheel, the one that carries most first."""
-    return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
-
-
-def rows(placed: Placed, wheel: str) -> list[dict[str, float]]:
-    """Every column of every patch of one wheel."""
-    return [{name: value(place) for name, (_, value) in COLUMNS.items()} for place in patches(placed, wheel)]
-
-
-def _answer(placed: Placed) -> dict[str, Any]:
-    return {
-        "shift": 1e3 * placed.shift,
-        "yaw": 1e3 * placed.yaw,
-        "roll": 1e3 * placed.roll,
-        "spin_speed": placed.spin_speed,
-        "radius_difference": 1e3 * rolling_radius_difference(placed),
-        **{wheel: rows(placed, wheel) for wheel in WHEELS},
-    }
-
-
-POSITION = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
-"""Columns of a position, with their units."""
-
-
-def _save(name: str, found: list[Placed], folder: Path) -> None:
-    """A row for each patch and wheel, and a row for each position."""
-    if not found:
-        return
-    answers = [_answer(one) for one in found]
-    write_table(
-        folder / f"{name}.csv", {key: (unit, np.array([one[key] for one in answers])) for key, unit in POSITION.items()}
-    )
-    for wheel in WHEELS:
-        lines = [
-            {"shift": one["shift"], "patch": k, **patch} for one in answers for k, patch in enumerate(one[wheel], 1)
-        ]
-        units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _) in COLUMNS.items()}}
-        write_table(
-            folder / f"{name}_{wheel}.csv",
-            {key: (unit, np.array([line[key] for line in lines])) for key, unit in units.items()},
-        )
-
-
+"""What is drawn, a row each."""
 HEADS = {
     "on_rail": "8.2f",
     "on_wheel": "8.2f",
@@ -156,34 +49,103 @@ NOTES = [
 ]
 
 
-def _table(found: list[Placed]) -> list[str]:
-    """A line for each patch, and what stands out."""
+def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Every case at every position; saves each as a result and as CSV of positions and of patches, and a figure."""
+    results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
+    for k, (name, case) in enumerate(scene.cases.items()):
+        found = results[name] = system.run(scene, case=name, told=partial(_told, progress, scene, k))
+        contacts = found.detail
+        failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
+        text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
+        table += [f"  {name}: {text}", *_table(contacts.placed)]
+        if contacts.placed:
+            _save(name, found, folder)
+    if drawn := {name: found for name, found in results.items() if found.detail.placed}:
+        _figure(scene, drawn, folder / "manchester.png")
+    answer = {name: [numbers(placed) for placed in found.detail.placed] for name, found in results.items()}
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [*table, *NOTES]}
+
+
+def _told(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
+    progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
+
+
+def _save(name: str, found: Result, folder: Path) -> None:
+    """The result, a row for each position, and a row for each patch of each wheel."""
+    found.save(folder / f"{name}.nc")
+    found.save_table(folder / f"{name}.csv", *POSITION)
+    units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH.items()}}
+    positions = [numbers(placed) for placed in found.detail.placed]
+    for wheel in WHEELS:
+        rows = [
+            {"shift": position["shift"], "patch": k, **patch}
+            for position in positions
+            for k, patch in enumerate(position[wheel], 1)
+        ]
+        columns = {key: (unit, np.array([row[key] for row in rows])) for key, unit in units.items()}
+        write_table(folder / f"{name}_{wheel}.csv", columns)
+
+
+def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
+    """A column for each wheel; the bars in the first row are the patches' widths."""
+    from models.drawing.figures import plt, save
+
+    drawn, axes = plt.subplots(len(PANELS), 2, figsize=(10.5, 12.5), sharex=True, sharey="row")
+    for column, wheel in enumerate(WHEELS[::-1]):
+        for axis, (quantity, label) in zip(axes[:, column], PANELS.items(), strict=True):
+            for k, (name, found) in enumerate(results.items()):
+                case, data = scene.cases[name], found.data.sel(wheel=wheel)
+                # later cases hollow and beside, so that equal ones show
+                shift = np.repeat(data["shift"].values + 0.08 * k, data.sizes["patch"])
+                half = data["half_width"] * np.cos(np.radians(data["touch_angle"]))
+                axis.errorbar(
+                    shift,
+                    data[quantity].values.ravel(),
+                    yerr=half.values.ravel() if quantity == "on_rail" else None,
+                    fmt="os"[k % 2],
+                    markersize=4,
+                    color=COLOURS[k % len(COLOURS)],
+                    linewidth=1.6,
+                    markerfacecolor=COLOURS[0] if k == 0 else "white",
+                    label=f"{name}: {case_text(case.yaw, case.friction)}",
+                )
+            if column == 0:
+                axis.set_ylabel(label)
+        axes[0, column].set_title(f"{wheel} wheel")
+        axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
+    drawn.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    title = f"{scene.title}\nevery patch: bars in the first row are its width"
+    drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    save(drawn, path)
+
+
+def _table(placed: list[Placed]) -> list[str]:
+    """A line for each patch, positions with several patches on a wheel, and the first on a flange."""
     heads = (
         f"    {'shift':>6} {'wheel':<5}{'rail':>8}{'wheel':>8}{'angle':>7}{'N':>8}{'peak':>7}{'area':>7}{'a':>6}"
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
     )
-    lines = [heads]
-    for placed in found:
-        for wheel in WHEELS:
-            for k, patch in enumerate(rows(placed, wheel)):
-                lead = f"{1e3 * placed.shift:6.2f} {wheel:<5}" if k == 0 else " " * 12
-                values = "".join(f"{patch[key]:{form}}" for key, form in HEADS.items())
-                end = f"{1e3 * rolling_radius_difference(placed):8.3f}" if k == 0 and wheel == "right" else ""
-                lines.append(f"    {lead}{values}{end}")
-    return [*lines, *_remarks(found)]
-
-
-def _remarks(found: list[Placed]) -> list[str]:
-    """Positions with several patches on a wheel, and the first on a flange."""
-    several = [
-        f"{1e3 * placed.shift:g} ({wheel})" for placed in found for wheel in WHEELS if len(getattr(placed, wheel)) > 1
-    ]
-    flange = [placed for placed in found for wheel in WHEELS if patches(placed, wheel)[0].angle < -FLANGE]
-    lines = [f"    several patches on one wheel at, in mm: {', '.join(several)}"] if several else []
+    each = [(position, wheel) for position in placed for wheel in WHEELS]
+    several = [f"{1e3 * one.shift:g} ({wheel})" for one, wheel in each if len(getattr(one, wheel)) > 1]
+    flange = [one.shift for one, wheel in each if patches(one, wheel)[0].angle < -FLANGE]
+    lines = [heads, *(line for position in map(numbers, placed) for line in _lines(position))]
+    if several:
+        lines.append(f"    several patches on one wheel at, in mm: {', '.join(several)}")
     if flange:
-        nearest = min(flange, key=lambda placed: abs(placed.shift))
-        lines.append(f"    a flange carries its wheel from {1e3 * nearest.shift:g} mm on; beyond, the wheel climbs it")
+        lines.append(
+            f"    a flange carries its wheel from {1e3 * min(flange, key=abs):g} mm on; beyond, the wheel climbs it"
+        )
     return lines
+
+
+def _lines(position: dict[str, Any]) -> Iterator[str]:
+    """A line for each patch of a position."""
+    for wheel in WHEELS:
+        for k, patch in enumerate(position[wheel]):
+            lead = f"{position['shift']:6.2f} {wheel:<5}" if k == 0 else " " * 12
+            values = "".join(f"{patch[key]:{form}}" for key, form in HEADS.items())
+            end = f"{position['radius_difference']:8.3f}" if k == 0 and wheel == "right" else ""
+            yield f"    {lead}{values}{end}"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Figures of a wheelset on straight track: eigenvalues over speed, paths, creep forces and their power."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,10 @@ from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
+from models.rail.limit_cycle import Orbit
 from models.rail.linear import klingel
-from models.rail.orbit import Orbit
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset.run import Linear
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""
@@ -20,42 +21,39 @@ SHOWN = 1.0
 """Seconds of creep forces that are drawn, the last ones."""
 
 
-def stability_figure(linear: Mapping[str, Any], wheelset: Wheelset, title: str, path: Path) -> None:
+def _note(axis: plt.Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **style: Any) -> None:
+    """Text that ends so many points beside a place."""
+    axis.annotate(text, place, shift, textcoords="offset points", ha="right", **style)
+
+
+def _wheels(contacts: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Name and colour of each wheel, and the sums (n, REPORTED) over its patches."""
+    each = contacts.shape[1] // 2
+    yield "right wheel", "#0072b2", contacts[:, :each].sum(axis=1)
+    yield "left wheel", "#d55e00", contacts[:, each:].sum(axis=1)
+
+
+def stability_figure(linear: Mapping[str, Linear], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.2))
     for engine, one in linear.items():
-        style, hunting = {"color": COLOURS[engine], "label": LABELS[engine]}, one.hunting
+        style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(one.speeds, one.values.real.max(axis=1), MARKS[engine], **style)
-        middle.plot(one.speeds, 2.0 * np.pi * one.speeds / hunting.imag, MARKS[engine], **style)
-        right.plot(hunting.real, hunting.imag / (2.0 * np.pi), MARKS[engine], **style)
+        middle.plot(one.speeds, 2.0 * np.pi * one.speeds / one.hunting.imag, MARKS[engine], **style)
+        right.plot(one.hunting.real, one.hunting.imag / (2.0 * np.pi), MARKS[engine], **style)
     first = next(iter(linear.values()))
-    left.axhline(0.0, color="0.6", linewidth=0.8)
+    for line in (left.axhline, right.axvline):
+        line(0.0, color="0.6", linewidth=0.8)
     if first.critical is not None:
         left.axvline(first.critical, color="0.6", linestyle=":")
-        left.annotate(
-            f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8), textcoords="offset points", ha="right"
-        )
+        _note(left, f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8))
     middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    middle.annotate(
-        "Klingel's, without suspension",
-        (first.speeds[-1], klingel(wheelset)),
-        (0, -12),
-        textcoords="offset points",
-        ha="right",
-    )
-    right.axvline(0.0, color="0.6", linewidth=0.8)
+    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12))
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
-            right.annotate(
-                f"{first.speeds[i]:g} m/s",
-                (at.real, at.imag / (2.0 * np.pi)),
-                (-6, 0),
-                textcoords="offset points",
-                ha="right",
-                va="center",
-                fontsize=8,
-            )
+            place = at.real, at.imag / (2.0 * np.pi)
+            _note(right, f"{first.speeds[i]:g} m/s", place, (-6, 0), va="center", fontsize=8)
     left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Growth of the least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
     right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting over the speed")
@@ -72,23 +70,16 @@ def paths_figure(paths: Mapping[str, Mapping[float, Motion]], title: str, path: 
     figure, axes = plt.subplots(
         2, len(first), figsize=(6.2 * len(first), 5.6), squeeze=False, sharex="col", height_ratios=(2, 1)
     )
-    for k, (speed, own) in enumerate(first.items()):
-        top, below = axes[:, k]
-        for engine, other in paths.items():
-            every = slice(None) if engine == name else slice(40 * (1 + list(paths).index(engine)), None, 150)
-            mark = "-" if engine == name else MARKS[engine]
-            top.plot(
-                own.times[every], 1e3 * other[speed].states[every, Y], mark, color=COLOURS[engine], label=LABELS[engine]
-            )
-            if engine != name:
-                gap = np.abs(other[speed].states - own.states).max(axis=1)
-                below.semilogy(
-                    own.times,
-                    np.maximum(gap, 1e-17),
-                    color=COLOURS[engine],
-                    linewidth=0.7,
-                    label=f"{LABELS[engine]} from {LABELS[name]}",
-                )
+    for (top, below), (speed, own) in zip(axes.T, first.items(), strict=True):
+        for i, (engine, motions) in enumerate(paths.items()):
+            states, colour = motions[speed].states, COLOURS[engine]
+            every = slice(40 * (1 + i), None, 150) if i else slice(None)
+            mark = MARKS[engine] if i else "-"
+            top.plot(own.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
+            if i:
+                gap = np.maximum(np.abs(states - own.states).max(axis=1), 1e-17)
+                label = f"{LABELS[engine]} from {LABELS[name]}"
+                below.semilogy(own.times, gap, color=colour, linewidth=0.7, label=label)
         top.set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
         below.set(xlabel="time [s]", ylabel="largest difference\nof a state [SI]")
     axes[0, 0].legend(loc="upper right", ncols=3)
@@ -103,42 +94,33 @@ def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
     figure, axes = plt.subplots(3, len(paths), figsize=(6.2 * len(paths), 7.0), squeeze=False, sharex="col")
     for k, (speed, own) in enumerate(paths.items()):
         last = own.times >= own.times[-1] - SHOWN
-        times, contacts = own.times[last], own.contacts[last]
-        each = contacts.shape[1] // 2
-        for wheel, (side, colour) in enumerate((("right wheel", "#0072b2"), ("left wheel", "#d55e00"))):
-            of = contacts[:, wheel * each : (wheel + 1) * each].sum(axis=1)
+        for side, colour, sums in _wheels(own.contacts[last]):
             for axis, column in zip(axes[:, k], (wf.FX, wf.FY, wf.POWER), strict=True):
-                axis.plot(times, of[:, column], color=colour, label=side)
+                axis.plot(own.times[last], sums[:, column], color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
         axes[1, k].set(ylabel="across [N]")
         axes[2, k].set(ylabel="power [W]", xlabel="time [s]")
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
     axes[0, 0].legend(loc="upper right", ncols=2)
     largest = max(float(own.contacts[:, :, wf.POWER].max()) for own in paths.values())
-    figure.suptitle(
-        f"{title}\ncreep forces on the wheels and their power, at any time {largest:.3g} W or less", fontsize=11
-    )
+    told = f"creep forces on the wheels and their power, at any time {largest:.3g} W or less"
+    figure.suptitle(f"{title}\n{told}", fontsize=11)
     save(figure, path)
 
 
 def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.4))
-    speeds, amplitudes = (np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude"))
-    frequencies, clearance = np.array([orbit.frequency for orbit in orbits]), 1e3 * wheelset.flange_clearance
+    speeds, amplitudes, frequencies = (
+        np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
+    )
+    stable, clearance = np.array([orbit.stable for orbit in orbits]), 1e3 * wheelset.flange_clearance
     for axis, values in ((left, 1e3 * amplitudes), (middle, 1e3 * amplitudes), (right, frequencies)):
         axis.plot(speeds, values, color="0.7", zorder=1)
-        for stable, face, label in ((True, "#0072b2", "attracts"), (False, "white", "repels")):
-            chosen = [i for i, orbit in enumerate(orbits) if orbit.stable == stable]
-            axis.scatter(
-                speeds[chosen],
-                values[chosen],
-                s=22,
-                facecolor=face,
-                edgecolor="#0072b2",
-                zorder=2,
-                label=f"cycle that {label}" if chosen else None,
-            )
+        for chosen, face, label in ((stable, "#0072b2", "attracts"), (~stable, "white", "repels")):
+            label = f"cycle that {label}" if chosen.any() else ""
+            style: Any = {"s": 22, "facecolor": face, "edgecolor": "#0072b2", "zorder": 2}
+            axis.scatter(speeds[chosen], values[chosen], label=label or None, **style)
         axis.set_xlabel("speed [m/s]")
     for axis in (left, middle):
         axis.axhline(clearance, color="0.6", linestyle=":")
@@ -146,9 +128,7 @@ def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path:
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    left.annotate(
-        "flanges touch", (speeds.max(), clearance), (0, -11), textcoords="offset points", ha="right", fontsize=8
-    )
+    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=8)
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
     left.set_title("Amplitude")
@@ -167,11 +147,9 @@ def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
     first = next(iter(cycles.values()))
     own = first.path()
-    each = own.contacts.shape[1] // 2
-    for column, name, style in ((wf.FX, "along", "-"), (wf.FY, "across", "--")):
-        for wheel, side, colour in ((0, "right", "#0072b2"), (1, "left", "#d55e00")):
-            values = own.contacts[:, wheel * each : (wheel + 1) * each, column].sum(axis=1)
-            right.plot(own.times, 1e-3 * values, style, color=colour, label=f"{side} wheel, {name}")
+    for side, colour, sums in _wheels(own.contacts):
+        for column, name, line in ((wf.FX, "along", "-"), (wf.FY, "across", "--")):
+            right.plot(own.times, 1e-3 * sums[:, column], line, color=colour, label=f"{side}, {name}")
     left.set(
         xlabel="lateral displacement [mm]",
         ylabel="yaw [mrad]",

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from models.core.errors import RunFailed
-from models.rail.contact_table import Contact, benchmark_side
-from validation.contact.manchester_references import searched
+from models.core.result import load
+from validation.contact.manchester_references import contact_of, searched
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 
@@ -25,11 +25,14 @@ def test_study_saves_patches_of_both_wheels_and_a_figure(twinrig, capsys):
     assert twinrig("run", "manchester", *args, "--out", "out", "--json") == 0
     (found,) = json.loads(capsys.readouterr().out)["answer"]["A-1"]
     names = {path.name for path in Path("out").iterdir()}
-    assert names == {"command.txt", "A-1.csv", "A-1_right.csv", "A-1_left.csv", "manchester.png"}
+    assert names == {"command.txt", "A-1.csv", "A-1.nc", "A-1_right.csv", "A-1_left.csv", "manchester.png"}
     assert (len(found["right"]), len(found["left"])) == (2, 1)
     right = np.genfromtxt("out/A-1_right.csv", delimiter=",", skip_header=1)
     heads = Path("out/A-1_right.csv").read_text().splitlines()[0].split(",")
     assert right[:, heads.index("normal [kN]")].tolist() == [patch["normal"] for patch in found["right"]]
+    saved = load(Path("out/A-1.nc")).data
+    assert saved["normal"].sel(wheel="right").values.ravel().tolist() == [patch["normal"] for patch in found["right"]]
+    assert np.isnan(saved["normal"].values[0, 1, 1])  # the left wheel has one patch
     # Without friction the vertical parts of the forces are the load; the angle is that at the centre, not of the patch.
     upright = sum(patch["normal"] * np.cos(np.radians(patch["touch_angle"])) for patch in found["right"])
     assert upright == pytest.approx(10.0, rel=1e-5)
@@ -53,11 +56,11 @@ def test_position_that_fails_is_named(twinrig, capsys):
 
 def test_wheel_that_has_climbed_its_flange_is_told():
     with pytest.raises(RunFailed, match="right wheel has climbed its flange"):
-        Contact(benchmark_side(), 1e4).at(18e-3)
+        contact_of("A-1").at(18e-3)
 
 
 def test_search_finds_the_places():
-    contact = Contact(benchmark_side(), 1e4)
+    contact = contact_of("A-1")
     placed = contact.at(6.5e-3, 0.0156)  # the yaw moves the flange's place 17 mm ahead
     for sign, (place,) in ((1.0, placed.right), (-1.0, placed.left)):
         y, u, angle = searched(contact.side, placed, sign, place.wheel_y + 1e-3)

@@ -9,10 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.core.errors import InputError
-from models.core.systems import load
 from models.rail.wheelset import CHOSEN
 from studies import animation
-from studies.asked import SCENES
+from studies.asked import load_scene
 from studies.pictures import video
 from studies.pictures.camera import Camera, picture
 from studies.pictures.drawing import lines, pose
@@ -109,7 +108,7 @@ def test_a_film_has_as_many_frames_as_its_duration_and_rate_say(hunting, tmp_pat
 
 
 def changed(*changes):
-    return load(SCENES / "animation.toml", changes)
+    return load_scene("animation", list(changes))
 
 
 def test_without_the_extra_the_stills_are_kept_and_one_sentence_names_it(hunting, monkeypatch, tmp_path):

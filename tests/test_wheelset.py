@@ -11,20 +11,14 @@ from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
-from models.rail.contact_table import (
-    Contact,
-    benchmark_side,
-    equivalent_conicity,
-    manchester,
-    rolling_radius_difference,
-)
+from models.rail.contact_table import rolling_radius_difference
 from models.rail.eigenvalues import growth as of_all
 from models.rail.equations import Equations
-from models.rail.limit_cycle import attained
-from models.rail.linear import _gravity, critical_speed, growth, kinematic_wavelength, klingel, matrices
-from models.rail.orbit import refined
+from models.rail.limit_cycle import attained, refined
+from models.rail.linear import critical_speed, gravity, growth, kinematic_wavelength, klingel, matrices
+from models.rail.profile_statics import equivalent_conicity
 from models.rail.wheelset import CHOSEN
-from validation.contact.manchester_references import CONTACT, sums
+from validation.contact.manchester_references import CONTACT, contact_of, placed_at, sums
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 FREE = CHOSEN.changed(**SPRINGS)
@@ -111,7 +105,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     h = 2e-3
     measured = [-CHOSEN.load * (fall(h * (k == 0), h * (k == 1)) * 2 - 2 * fall(0, 0)) / h**2 for k in (0, 1)]
     heavier = matrices(FREE.changed(load=2 * FREE.load), 10.0).stiffness
-    assert np.diag(_gravity(CHOSEN)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
+    assert np.diag(gravity(CHOSEN)) == pytest.approx(measured, rel=1e-4)  # the fourth order in h is 1e-5
     assert heavier[0, 0] == pytest.approx(2 * measured[0], rel=1e-4)  # creep forces do not follow y in the first row
 
 
@@ -229,7 +223,7 @@ def test_conicity_of_a_table():
 
 def against_contact(rows):
     """Mean places, forces and peaks of both wheels against CONTACT's, with yaw and rolling."""
-    found = manchester(yaw=True, rolling=True, shifts=rows[:, 0] * 1e-3)
+    found = [placed_at("A-2", float(shift)) for shift in rows[:, 0] * 1e-3]
     for (_, _, *right_left), one in zip(rows, found, strict=True):
         for wheel, (y, normal, peak) in (("right", right_left[:3]), ("left", right_left[3:])):
             own = sums(one, wheel)
@@ -248,7 +242,7 @@ def test_manchester():
 
 
 def test_two_patches_at_five_millimetres():
-    (one,) = manchester(shifts=[5e-3])
+    one = placed_at("A-1", 5e-3)
     assert [round(1e3 * place.touch_y) for place in one.right] == [727, 737]
     assert len(one.left) == 1
     assert rolling_radius_difference(one) > 2e-3
@@ -258,7 +252,7 @@ def test_two_patches_at_five_millimetres():
 
 
 def test_table_mirrors():
-    contact = Contact(benchmark_side(), 1e4)
+    contact = contact_of("A-1")
     one, two = contact.at(2e-3, 0.004), contact.at(-2e-3, -0.004)
     assert one.roll == pytest.approx(-two.roll, abs=1e-12)
     assert one.right[0].normal == pytest.approx(two.left[0].normal, rel=1e-9)

@@ -16,9 +16,8 @@ from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.equations import Equations
 from models.rail.joint_forces import from_joints, to_joints
-from models.rail.limit_cycle import attained
+from models.rail.limit_cycle import attained, refined, solved
 from models.rail.linear import critical_speed
-from models.rail.orbit import refined, solved
 from models.rail.wheelset import CHOSEN
 
 ENGINES = (MujocoWheelset, ExudynWheelset)

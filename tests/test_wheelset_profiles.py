@@ -10,7 +10,6 @@ from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.contact_table import BENCHMARK_SHIFTS, manchester
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
@@ -18,6 +17,7 @@ from models.rail.linear import klingel
 from models.rail.profile_contact import N_Y, N_Z, TOUCH, Y_, Z_, pressed
 from models.rail.profile_statics import held, steering_cones
 from models.rail.wheelset import CHOSEN
+from validation.contact.manchester_references import SCENE, placed_at
 
 ON_PROFILES = CHOSEN.changed(profiles=Profiles())
 FREE = ON_PROFILES.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
@@ -27,7 +27,8 @@ FLANGE = math.radians(-45.0)
 
 def against_table(shifts):
     """Forces within 2 % and places within 0.3 mm of the exact contact, wheel by wheel."""
-    for shift, one in zip(shifts, manchester(shifts=shifts), strict=True):
+    for shift in shifts:
+        one = placed_at("A-1", shift)
         found = held(ON_PROFILES.changed(load=2e4), shift)
         loads, places = found.loads.reshape(2, -1), found.touches[:, Y_].reshape(2, -1)
         for k, wheel, side in ((0, one.right, 1), (1, one.left, -1)):
@@ -46,7 +47,7 @@ def test_two_patches_as_in_the_table():
 
 @pytest.mark.full
 def test_manchester_places_and_forces():
-    against_table(BENCHMARK_SHIFTS)
+    against_table(SCENE.positions.values().tolist())
 
 
 def test_lateral_force_is_the_slope_of_the_energy():
@@ -83,7 +84,7 @@ def test_accelerations_are_those_of_the_equations(engine):
     states[::3, [eq.Y, eq.Z, eq.ROLL]] += [6.5e-3, -6e-4, -1e-3]
     contact, out, seen = written.blank(), np.empty(eq.STATES), []
     for state in states:
-        eq.rates(state, *written.given, out, contact)
+        eq.rates(state, *written.parameters, out, contact)
         seen.append(contact.copy())
         expected = out[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
         found = built.rates(state)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
@@ -133,7 +134,7 @@ def test_ledger_with_friction_and_flange():
 
 def test_standstill_reversal_and_lift_off():
     equations = Equations(ON_PROFILES, 50.0)
-    _, *given = equations.given
+    _, *given = equations.parameters
     state, contact = equations.displaced(5e-3), equations.blank()
     state[eq.SPIN] = 0.0
     found = []

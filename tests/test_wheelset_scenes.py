@@ -12,15 +12,15 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import named, without
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
-from models.rail.climbing import flange_share, nadal
+from models.rail.doubts import flange_share, nadal
 from models.rail.eigenvalues import free, growth
 from models.rail.equations import Equations
-from models.rail.limit_cycle import attained
-from models.rail.linear import NoCriticalSpeed, critical_speed
-from models.rail.orbit import beginning, branch, refined, solved
+from models.rail.limit_cycle import attained, beginning, branch, refined, solved
+from models.rail.linear import NoCriticalSpeed, critical_or_why, critical_speed
 from models.rail.wheelset import CHOSEN
 from models.systems.wheelset import plan
 from models.systems.wheelset.of_scene import path_speeds, wheelset_of
+from models.systems.wheelset.run import run
 from models.systems.wheelset.scene import build
 from studies import limit_cycle, wheelset
 from validation.absence import wheelset as absence
@@ -104,7 +104,7 @@ def test_without_a_critical_speed_the_study_says_so(tmp_path):
     stiff = {"stiffness_x": 1e8, "stiffness_y": 1e8, "damping_x": 1e5, "damping_y": 1e5}
     one = scene(wheelset={"override": stiff}, run={"duration": 0.02, "step": 1e-4})
     assert path_speeds(one) == [80.0]
-    assert wheelset.critical(wheelset_of(one), partial(growth, Equations))[0] is None
+    assert critical_or_why(wheelset_of(one), partial(growth, Equations))[0] is None
     assert "none: the wheelset is stable up to 200 m/s" in wheelset._stability(wheelset_of(one), {})[1]
     found = limit_cycle.run(scene(wheelset={"override": stiff}, run={}), ("reference",), tmp_path, lambda *_: None)
     assert found["answer"] == {"branch": [], "cycles": {}}
@@ -121,6 +121,7 @@ def test_the_study_saves_what_it_says(tmp_path):
     with xr.open_dataset(tmp_path / "paths.nc") as data:
         assert data["y"].dims == ("engine", "speed", "time") and data["y"].units == "m"
         assert float(data["y"][0, 0, 0]) == 5e-3
+        assert json.loads(data.attrs["scene_table"])["run"]["speeds"] == [60.0] and "provenance" in data.attrs
     with xr.open_dataset(tmp_path / "eigenvalues.nc") as data:
         assert data["real"].shape == (1, 4, 9)
     assert (tmp_path / "over_speed.csv").read_text().startswith("speed [m/s],reference growth [1/s]")
@@ -205,5 +206,5 @@ def test_profiles_of_a_parameter_file_are_an_effect_that_its_file_has_to_drop(tm
 def test_creep_forces_beyond_friction_are_told(law, friction, doubt) -> None:
     short = {"duration": 0.02, "displacement": 1e-3}
     own = scene(contact={"law": law}, wheelset={"override": {"friction": friction}}, run=short)
-    told = wheelset._slides(own, wheelset.path(own, "reference", 20.0))
+    told = json.loads(run(own, "reference", 20.0).data.attrs["doubts"])
     assert bool(told) == doubt and all("inf times what friction carries" in line for line in told)

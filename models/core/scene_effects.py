@@ -37,7 +37,8 @@ class Entry:
     """A line of a system's table of effects: one that a key of the system's own tables names.
 
     says : what it is, a sentence; place : the key, as "port.teeth"; cost : what it takes, a sentence; counts : what it
-    adds in every engine; needs, excludes, why, after, modules, channels : as of ``Effect``.
+    adds in every engine, in_engines : what more in some; needs, excludes, why, after, modules, channels : as of
+    ``Effect``.
     usual : what the key is where the effect has usual values, None where there are none. An effect that is not the
     presence of that one key has functions of its own: ``there(scene)``, ``leave_out(table, scene)``,
     ``put_in(table, scene)``.
@@ -57,6 +58,7 @@ class Entry:
     there: Callable[[Any], bool] | None = None
     leave_out: Callable[[Table, Any], None] | None = None
     put_in: Callable[[Table, Any], None] | None = None
+    in_engines: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def named(self, scene: Any) -> bool:
         """Whether a scene names the effect."""
@@ -116,7 +118,7 @@ def _of_entry(entry: Entry) -> Effect:
     """An effect of the table, with the names that an effect's file has."""
     said = ("place", "cost", "needs", "excludes", "why", "after", "modules", "channels")
     known = {key.upper(): getattr(entry, key) for key in said}
-    known |= {"COUNTS": {"all": entry.counts}} if entry.counts else {}
+    known |= {"COUNTS": {"all": entry.counts, **entry.in_engines}} if entry.counts else {}
     known |= {"__doc__": entry.says, "named": entry.named, "leave_out": entry.drop}
     return Effect(known if entry.usual is None and entry.put_in is None else known | {"put_in": entry.add})
 

@@ -1,24 +1,22 @@
 """Rolling wheels in Exudyn: the model, and the routes by which a user function gives it creep forces.
 
-Exudyn 1.13 calls Python and nothing else, and hands a user function lists. The route that costs least is one generic
-object over the nodes of all wheels: its force function is called once per stage, packs both lists into one block,
-lets the compiled kernel work on addresses, and returns a list. A load for each coordinate is called more often; a
-function before each step cannot see the stages, so that no integrator keeps its order.
+The route that costs least is one generic object over the nodes of all wheels: its force function is called once per
+stage. A load for each coordinate is called more often; a function before each step cannot see the stages, so that no
+integrator keeps its order.
 """
 
-import struct
 from collections.abc import Callable
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as items
 import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
 from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
+from models.engines.exudyn_coordinates import Listed, add_node, compiled_forces, solve
+from models.engines.exudyn_system import items, quiet_settings, start
 
-exu.config.printToConsole = False
 Law = Callable[[Array, Array, Array, Array], Any]
 CONTRACTIVITY, ITERATIONS = 0.99999, 1000
 ROUTES = ("generic object", "loads", "before each step")
@@ -33,29 +31,20 @@ class Forces:
     """
 
     def __init__(self, wheels: Wheels, law: Law | None = None) -> None:
-        size = wheels.size
-        self._block = np.concatenate((np.zeros(3 * size), wheels.numbers))
-        f, q, v, numbers = np.split(self._block, (size, 2 * size, 3 * size))
-        pack, raw = struct.Struct(f"{2 * size}d").pack_into, self._block.data.cast("B")[8 * size :]
-        answer, address = f.data.tolist, self._block.ctypes.data
-
-        def compiled(positions: Any, rates: Any) -> Any:
-            pack(raw, 0, *positions, *rates)
-            set_forces(address, size)
-            return answer()
+        size, numbers, sticking = wheels.size, wheels.numbers, wheels.sticking
+        jacobian = np.zeros((size, size))
 
         def by_law(positions: Any, rates: Any) -> Any:
-            pack(raw, 0, *positions, *rates)
-            f[:] = 0.0
-            law(numbers, q, v, f)  # type: ignore[misc]
-            return answer()
+            forces = np.zeros(size)
+            law(numbers, np.array(positions), np.array(rates), forces)  # type: ignore[misc]
+            return forces.tolist()
 
         def moved(positions: Any, rates: Any, by_q: float, by_v: float) -> Array:
-            slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, found)
-            return found
+            slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, jacobian)
+            return jacobian
 
-        found, sticking = np.zeros((size, size)), wheels.sticking
-        self.of, self.slopes = compiled if law is None else by_law, moved
+        self.of = by_law if law is not None else compiled_forces(size, numbers, set_forces, size)
+        self.slopes = moved
 
 
 class Rolling:
@@ -68,7 +57,7 @@ class Rolling:
     def __init__(
         self,
         wheels: Wheels,
-        of: Callable[[Any, Any], Any] | None,
+        of: Listed | None,
         route: str = ROUTES[0],
         slopes: Callable[[Any, Any, float, float], Array] | None = None,
     ) -> None:
@@ -78,14 +67,7 @@ class Rolling:
         masses, k, d = wheels.masses[:FREEDOMS], wheels.stiffness, wheels.damping
         self._nodes = []
         for _ in range(wheels.count):
-            node = self.mbs.AddNode(
-                items.NodeGenericODE2(
-                    numberOfODE2Coordinates=FREEDOMS,
-                    referenceCoordinates=[0.0] * FREEDOMS,
-                    initialCoordinates=[0.0] * FREEDOMS,
-                    initialCoordinates_t=[0.0] * FREEDOMS,
-                )
-            )
+            node = add_node(self.mbs, FREEDOMS)
             self.mbs.AddObject(
                 items.ObjectGenericODE2(
                     nodeNumbers=[node], massMatrix=np.diag(masses), stiffnessMatrix=np.diag(k), dampingMatrix=np.diag(d)
@@ -96,7 +78,7 @@ class Rolling:
             {"generic object": self._object, "loads": self._loads, "before each step": self._before}[route](of)
         self.mbs.Assemble()
 
-    def _object(self, of: Callable[[Any, Any], Any]) -> None:
+    def _object(self, of: Listed) -> None:
         slopes, more = self._slopes, dict[str, Any]()
         if slopes is not None:  # those of the left-hand side
             more["jacobianUserFunction"] = lambda mbs, t, item, q, v, by_q, by_v: -slopes(q, v, by_q, by_v)
@@ -116,7 +98,7 @@ class Rolling:
             for i in range(FREEDOMS)
         ]
 
-    def _loads(self, of: Callable[[Any, Any], Any]) -> None:
+    def _loads(self, of: Listed) -> None:
         """The first load computes the forces of all."""
         data, found = self.mbs.systemData, [0.0] * self.wheels.size
 
@@ -128,7 +110,7 @@ class Rolling:
             function = (lambda mbs, t, load, i=i: found[i]) if i else first
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
-    def _before(self, of: Callable[[Any, Any], Any]) -> None:
+    def _before(self, of: Listed) -> None:
         """Forces of the step's start, held over it."""
         loads = [self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker)) for marker in self._markers()]
 
@@ -149,25 +131,15 @@ class Rolling:
         Refused is raised for a step that an explicit solver cannot take; RunFailed where Newton's method gives up.
         """
         check_step("exudyn", self.wheels, solver, step, steps)
-        initial, data = exu.ConfigurationType.Initial, self.mbs.systemData
-        data.SetODE2Coordinates(q, initial)
-        data.SetODE2Coordinates_t(v, initial)
-        options = exu.SimulationSettings()
-        options.solution.file.write = options.solution.sensors.active = False
+        start(self.mbs, q, v)
+        options, data = quiet_settings(), self.mbs.systemData
         ti = options.timeIntegration
-        ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
-        ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
         ti.automaticStepSize = tolerance > 0.0
         ti.relativeTolerance, ti.absoluteTolerance = tolerance, 1e-2 * tolerance
         if self._slopes is not None:  # steep slopes converge slowly but surely: keep the matrix, go on for longer
             ti.newton.useModifiedNewton, ti.newton.modifiedNewtonContractivity = True, CONTRACTIVITY
             ti.newton.maxIterations = ITERATIONS
-        try:
-            done = self.mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver))
-        except (exu.ExudynError, RuntimeError, ValueError) as error:
-            if "KeyboardInterrupt" in str(error):
-                raise KeyboardInterrupt from error
-            raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
+        done = solve(self.mbs, options, steps, step, solver)
         state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
         if not done or not np.isfinite(state).all():
             raise RunFailed("exudyn", "the engine gave up")

@@ -21,7 +21,6 @@ JOINTS = (
     ("slide", (0.0, 0.0, 1.0)),
     ("hinge", (0.0, 0.0, 1.0)),
 )
-INTEGRATORS = ("Euler", "RK4")
 
 
 def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujoco.MjModel:
@@ -30,17 +29,33 @@ def model(wheels: Wheels, step: float = 1e-4, integrator: str = "Euler") -> mujo
     Refused is raised for a step that the integrator cannot take.
     """
     check_step("mujoco", wheels, integrator, step)
+    spec = blank("wheels", wheels.numbers, integrator, [0.0, 0.0, 0.0])
+    spec.option.timestep = step
+    for _ in range(wheels.count):
+        body = spec.worldbody.add_body(mass=wheels.mass, inertia=[wheels.inertia] * 3, explicitinertial=True)
+        for joint, k, d in zip(JOINTS, wheels.stiffness, wheels.damping, strict=True):
+            add_joint(body, *joint, stiffness=k, damping=d)
+    return compiled(spec)
+
+
+def blank(name: str, numbers: Array, integrator: str, gravity: Any) -> Any:
+    """A specification without contacts and constraints; a callback's numbers lie in the model."""
     spec = mujoco.MjSpec()
-    spec.option.timestep, spec.option.gravity = step, [0.0, 0.0, 0.0]
+    spec.option.gravity = gravity
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     spec.compiler.degree = False
-    spec.add_numeric(name="wheels", data=wheels.numbers, size=wheels.numbers.size)
-    for _ in range(wheels.count):
-        body = spec.worldbody.add_body(mass=wheels.mass, inertia=[wheels.inertia] * 3, explicitinertial=True)
-        for (kind, axis), k, d in zip(JOINTS, wheels.stiffness, wheels.damping, strict=True):
-            joint = getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}")
-            body.add_joint(type=joint, axis=axis, stiffness=k, damping=d)
+    spec.add_numeric(name=name, data=numbers, size=numbers.size)
+    return spec
+
+
+def add_joint(body: Any, kind: str, axis: tuple[float, float, float], **springs: float) -> None:
+    """A joint, "slide" or "hinge", along or about an axis."""
+    body.add_joint(type=getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}"), axis=axis, **springs)
+
+
+def compiled(spec: Any) -> mujoco.MjModel:
+    """The model of a specification, its layout checked."""
     built = spec.compile()
     check(built, mujoco.MjData(built))
     return built

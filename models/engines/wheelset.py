@@ -6,16 +6,16 @@ limit cycle) is that of ``rail.equations``, of which this takes the rates and th
 """
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.core.errors import RunFailed
-from models.rail.equations import LEAN, LIMIT, ROLL, STATES, YAW, Equations, Path, Y, Z, rates
+from models.rail.equations import LEAN, LIMIT, ROLL, YAW, Equations, Y, Z
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
 
 
-def leaning(weight: float, body: np.ndarray) -> np.ndarray:
+def leaning(weight: float, body: Array) -> Array:
     """A weight's parts (3,) along the track's axes by its part square to the track, on the track of these numbers."""
     return weight * np.array([0.0, body[LEAN], 1.0])
 
@@ -23,32 +23,24 @@ def leaning(weight: float, body: np.ndarray) -> np.ndarray:
 class EngineWheelset(Equations, ABC):
     """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
 
-    ENGINE: ClassVar[str]
-
     @abstractmethod
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, q: Array, v: Array) -> Array:
         """Accelerations (5,) of the joints by the engine at positions and rates (5,)."""
 
     @abstractmethod
-    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
         """Positions and rates (steps + 1, 10) by the engine's RK4, start included; RunFailed unless they are finite."""
 
-    def rates(self, state: np.ndarray) -> np.ndarray:
+    def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,) by the engine."""
         joints = to_joints(np.asarray(state, float))
         return rates_of(joints, self.accelerations(joints[:JOINTS], joints[JOINTS:]))
 
-    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
-        """As ``Equations.run``, by the engine's RK4; the contacts are those of the states that are kept."""
-        count, joints = self._steps(state, duration, step, every), to_joints(np.array(state, float))
+    def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
+        """States by the engine's RK4, and the contacts of those that are kept."""
+        joints = to_joints(state)
         states = from_joints(self.marched(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
-        kept = states[::every]
-        contacts, out = self.blank(len(kept)), np.empty(STATES)
-        for one, contact in zip(kept, contacts, strict=True):
-            rates(one, *self.given, out, contact)
-        found = Path(np.arange(len(kept)) * step * every, kept, contacts)
-        self._check(found, step, every, self.ENGINE)
-        return found
+        return states[::every], self.at(states[::every])[1]

@@ -1,20 +1,18 @@
 """A wheelset on rails in Exudyn: a kinematic tree of five links, native spring-dampers, both rails by a user function.
 
 Only the last link has mass. The suspension's ends are points of the axle, which spin does not move. The tree's own
-force function is called once per stage: it packs positions and rates into one block, lets the compiled forces work on
-its address, and returns a list.
+force function is called once per stage.
 """
 
-import struct
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
-from models.core.errors import RunFailed
-from models.engines.exudyn_system import KINDS, items, lists
+from models.contact.inputs import Array
+from models.engines.exudyn_coordinates import accelerations, add_node, compiled_forces, march
+from models.engines.exudyn_system import items, lists
 from models.engines.wheelset import EngineWheelset, leaning
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
 from models.rail.joint_forces import JOINTS, set_joint_forces, table
@@ -25,23 +23,9 @@ CHAIN = [KIND.PrismaticY, KIND.PrismaticZ, KIND.RevoluteZ, KIND.RevoluteX, KIND.
 """From the track to the wheelset."""
 
 
-def rails(numbers: np.ndarray) -> Callable[..., Any]:
-    """Exudyn's user function: forces of the joints, a list, by lists of their positions and rates."""
-    block = np.concatenate((np.zeros(3 * JOINTS), numbers))
-    pack, raw = struct.Struct(f"{2 * JOINTS}d").pack_into, block.data.cast("B")[8 * JOINTS :]
-    answer, address = block[:JOINTS].data.tolist, block.ctypes.data
-
-    def forces(mbs: Any, t: float, item: int, q: Any, v: Any) -> Any:
-        pack(raw, 0, *q, *v)
-        set_joint_forces(address)
-        return answer()
-
-    return forces
-
-
-def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
+def tree(mbs: Any, node: Any, numbers: Array, body: Array) -> Any:
     """The wheelset of ``Equations.body`` on a node of five coordinates; ``numbers`` is the table of the rails."""
-    zero = [[0.0, 0.0, 0.0]] * JOINTS
+    zero, forces = lists.Vector3DList([[0.0, 0.0, 0.0]] * JOINTS), compiled_forces(JOINTS, numbers, set_joint_forces)
     inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag(body[[ACROSS, ALONG, ACROSS]])]
     return mbs.AddObject(
         items.ObjectKinematicTree(
@@ -50,16 +34,16 @@ def tree(mbs: Any, node: Any, numbers: np.ndarray, body: np.ndarray) -> Any:
             jointTypes=CHAIN,
             linkParents=list(range(-1, JOINTS - 1)),
             jointTransformations=lists.Matrix3DList([np.eye(3)] * JOINTS),
-            jointOffsets=lists.Vector3DList(zero),
+            jointOffsets=zero,
             linkInertiasCOM=lists.Matrix3DList(inertias),
-            linkCOMs=lists.Vector3DList(zero),
+            linkCOMs=zero,
             linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]],
-            forceUserFunction=rails(numbers),
+            forceUserFunction=lambda mbs, t, item, q, v: forces(q, v),
         )
     )
 
 
-def suspension(mbs: Any, wheelset: Any, body: np.ndarray) -> None:
+def suspension(mbs: Any, wheelset: Any, body: Array) -> None:
     """Springs and dampers of both ends along the track's axes, if any, and what the vehicle weighs on them."""
     ground = mbs.AddObject(items.ObjectGround())
     for arm in (body[ARM], -body[ARM]):
@@ -82,61 +66,25 @@ class ExudynWheelset(EngineWheelset):
     ENGINE = "exudyn"
 
     @cached_property
-    def _system(self) -> tuple[Any, list[Any]]:
+    def system(self) -> tuple[Any, list[Any]]:
         """System and the sensors of positions and of rates."""
-        mbs, zero = exu.SystemContainer().AddSystem(), [0.0] * JOINTS
-        node = mbs.AddNode(
-            items.NodeGenericODE2(
-                referenceCoordinates=zero,
-                initialCoordinates=zero,
-                initialCoordinates_t=zero,
-                numberOfODE2Coordinates=JOINTS,
-            )
-        )
-        suspension(mbs, tree(mbs, node, table(self.given), self.body), self.body)
+        mbs = exu.SystemContainer().AddSystem()
+        node = add_node(mbs, JOINTS)
+        suspension(mbs, tree(mbs, node, table(*self.parameters), self.body), self.body)
+        kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t
         sensors = [
             mbs.AddSensor(
                 items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
             )
-            for kind in (KINDS.Coordinates, KINDS.Coordinates_t)
+            for kind in kinds
         ]
         mbs.Assemble()
         return mbs, sensors
 
-    def _started(self, q: np.ndarray, v: np.ndarray) -> tuple[Any, Any]:
-        """System at positions and rates, and settings that write no file."""
-        mbs, options, initial = self._system[0], exu.SimulationSettings(), exu.ConfigurationType.Initial
-        mbs.systemData.SetODE2Coordinates(q, initial)
-        mbs.systemData.SetODE2Coordinates_t(v, initial)
-        options.solution.file.write = options.solution.sensors.active = False
-        return mbs, options
-
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, q: Array, v: Array) -> Array:
         """Accelerations (5,) of the joints from Exudyn's own residual and mass matrix."""
-        mbs, options = self._started(q, v)
-        solver: Any = exu.MainSolverImplicitSecondOrder()
-        solver.InitializeSolver(mbs, options)
-        solver.ComputeMassMatrix(mbs)
-        solver.ComputeODE2RHS(mbs)
-        mass, force = np.array(solver.GetSystemMassMatrix()), np.array(solver.GetSystemResidual())
-        solver.FinalizeSolver(mbs, options)
-        return np.linalg.solve(mass, force)
+        return accelerations(self.system[0], q, v)
 
-    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
         """Positions and rates (steps + 1, 10) by Exudyn's RK44; RunFailed where it stops or is not finite."""
-        mbs, options = self._started(q, v)
-        options.solution.sensors.active, options.solution.sensors.writePeriod = True, step
-        ti = options.timeIntegration
-        ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
-        ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
-        try:
-            mbs.SolveDynamic(options, solverType=exu.DynamicSolverType.RK44)
-        except (exu.ExudynError, RuntimeError, ValueError) as error:
-            if "KeyboardInterrupt" in str(error):
-                raise KeyboardInterrupt from error
-            raise RunFailed("exudyn", f"the solver stopped: {str(error).strip().splitlines()[0]}") from error
-        path = np.hstack([mbs.GetSensorStoredData(sensor)[:, 1:] for sensor in self._system[1]])
-        good = np.isfinite(path).all(axis=1).cumprod().sum()
-        if good != steps + 1:
-            raise RunFailed("exudyn", "the engine gave up", max(good - 1, 0) * step)
-        return path
+        return march(*self.system, q, v, steps, step)

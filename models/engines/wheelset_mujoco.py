@@ -10,50 +10,39 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from models.engines.contact_bridge_mujoco import Marcher, native_law
+from models.contact.inputs import Array
+from models.engines.contact_bridge_mujoco import Marcher, add_joint, blank, compiled, native_law
 from models.engines.mujoco_callback import installed
-from models.engines.mujoco_layout import check
 from models.engines.wheelset import EngineWheelset, leaning
 from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUNK
 from models.rail.joint_forces import joint_forces, table
 from models.rail.wheelset import GRAVITY
 
 JOINTS = (
-    ("SLIDE", (0.0, 1.0, 0.0)),
-    ("SLIDE", (0.0, 0.0, 1.0)),
-    ("HINGE", (0.0, 0.0, 1.0)),
-    ("HINGE", (1.0, 0.0, 0.0)),
-    ("HINGE", (0.0, 1.0, 0.0)),
+    ("slide", (0.0, 1.0, 0.0)),
+    ("slide", (0.0, 0.0, 1.0)),
+    ("hinge", (0.0, 0.0, 1.0)),
+    ("hinge", (1.0, 0.0, 0.0)),
+    ("hinge", (0.0, 1.0, 0.0)),
 )
 """Kind and axis, from the track to the wheelset."""
 
 
-def model(numbers: np.ndarray, body: np.ndarray) -> mujoco.MjModel:
+def model(numbers: Array, body: Array) -> mujoco.MjModel:
     """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
-    spec = mujoco.MjSpec()
-    spec.option.gravity, spec.option.integrator = leaning(GRAVITY, body), mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    spec.compiler.degree = False
-    spec.add_numeric(name="rails", data=numbers, size=numbers.size)
-    own = spec.worldbody.add_body(mass=body[MASS], inertia=body[[ACROSS, ALONG, ACROSS]], explicitinertial=True)
-    for kind, axis in JOINTS:
-        own.add_joint(type=getattr(mujoco.mjtJoint, f"mjJNT_{kind}"), axis=axis)
+    spec = blank("rails", numbers, "RK4", leaning(GRAVITY, body))
+    wheelset = spec.worldbody.add_body(mass=body[MASS], inertia=body[[ACROSS, ALONG, ACROSS]], explicitinertial=True)
+    for joint in JOINTS:
+        add_joint(wheelset, *joint)
     for name, arm in (("right", body[ARM]), ("left", -body[ARM])):
-        own.add_site(name=name, pos=[0.0, arm, 0.0])
+        wheelset.add_site(name=name, pos=[0.0, arm, 0.0])
         spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body[SUNK]])
-        for i, held in enumerate(leaning(body[CARRIED], body)):
-            if body[KX + i] or body[DX + i] or held:
-                _strut(spec, name, i, body[KX + i], body[DX + i], held)
-    built = spec.compile()
-    check(built, mujoco.MjData(built))
-    return built
-
-
-def _strut(spec: Any, end: str, axis: int, stiffness: float, damping: float, held: float) -> None:
-    """Spring and damper of one end along an axis of the track, and a constant force."""
-    strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=end, refsite=f"{end} frame")
-    strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[axis], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
-    strut.biasprm[:3] = held, -stiffness, -damping
+        for i, load in enumerate(leaning(body[CARRIED], body)):
+            if body[KX + i] or body[DX + i] or load:
+                strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=name, refsite=f"{name} frame")
+                strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+                strut.biasprm[:3] = load, -body[KX + i], -body[DX + i]
+    return compiled(spec)
 
 
 def rail_law() -> Any:
@@ -69,13 +58,13 @@ class MujocoWheelset(EngineWheelset):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The model; without ``rail_law`` installed, it has no rails."""
-        return model(table(self.given), self.body)
+        return model(table(*self.parameters), self.body)
 
     @cached_property
     def _data(self) -> mujoco.MjData:
         return mujoco.MjData(self.model)
 
-    def accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def accelerations(self, q: Array, v: Array) -> Array:
         """Accelerations (5,) of the joints by ``mj_forward``."""
         data = self._data
         data.qpos[:], data.qvel[:] = q, v
@@ -83,7 +72,7 @@ class MujocoWheelset(EngineWheelset):
             mujoco.mj_forward(self.model, data)
         return data.qacc.copy()
 
-    def marched(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
         """Positions and rates (steps + 1, 10) by MuJoCo's RK4; RunFailed where it starts again or is not finite."""
         self.model.opt.timestep, start = step, np.concatenate((q, v))
         with installed(rail_law()):

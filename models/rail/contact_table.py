@@ -15,29 +15,23 @@ for each mm. The load of 10 kN on each wheel and the steps of 0.5 mm are those t
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
 
-from models.contact.inputs import quantity
+from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.standard_profiles import s1002, uic60
 from models.contact.undeformed_distance import Distance
-from models.contact.wheel_on_rail import Pose, Side, Touch, Track, Wheelset, laid, placed, touches_of
+from models.contact.wheel_on_rail import Pose, Side, Touch, placed, touches_of
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
 
-BENCHMARK_SHIFTS = tuple(0.5e-3 * k for k in range(21))
-"""m"""
-BENCHMARK_YAW = 2.4
-"""rad of yaw for each m of lateral displacement in case A-2."""
-BENCHMARK_LOAD, BENCHMARK_SPEED, BENCHMARK_FRICTION = 1.0e4, 2.0, 0.3
-"""N on each wheel; m/s; coefficient of friction."""
 Triple = tuple[float, float, float]
+SIGNS = (1.0, -1.0)
+"""Of the right wheel, and of the left one seen in a mirror."""
 ROLLS = 3
 """Times that the roll angle is found anew with the approaches of both wheels."""
 TURNS = 2
@@ -102,6 +96,16 @@ class Place:
         """Centre of pressure on the wheel from the taping line (m); the roll shortens this by 1e-4 of it at most."""
         return self.wheel_y + self.y - self.touch_y
 
+    @property
+    def on_rail(self) -> float:
+        """Centre of pressure from the rail's highest point (m)."""
+        return self.y - self.top
+
+    @property
+    def touch_on_rail(self) -> float:
+        """First touch from there (m)."""
+        return self.touch_y - self.top
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -119,23 +123,32 @@ class Placed:
 class Carried:
     """One wheel under its load: each patch pressed, and what rolling does to it (N, N, N m), in a mirror if left.
 
-    shares : what the patches carry by the exact normal contact, if that is known. approach : vertical (m). normal :
-    vertical part of the normal forces (N). moment : of the creep forces about the axle (N m).
+    pose : lowered until the wheel touches. shares : what the patches carry by the exact normal contact, if that is
+    known. approach : vertical (m). lifted : vertical part of the creep forces, upwards on the rail (N). normal : that
+    of the normal forces (N). moment : of the creep forces about the axle (N m).
     """
 
+    pose: Pose
     touches: list[Touch]
-    pressed: NormalContact
     creepages: list[Triple]
-    forces: list[Triple]
-    shares: list[Share]
+    pressed: NormalContact
     approach: float
     normal: float
-    moment: float
+    forces: Sequence[Triple] = ()
+    shares: Sequence[Share] = ()
+    lifted: float = 0.0
+    moment: float = 0.0
 
     @property
     def loads(self) -> list[float]:
         """Along the patches' normals (N)."""
-        return [share.load for share in self.shares] or [_load(self.pressed, touch) for touch in self.touches]
+        if self.shares:
+            return [share.load for share in self.shares]
+        return [0.0 if part is None else part.load for part in map(self.part, self.touches)]
+
+    def part(self, touch: Touch) -> PatchPressure | None:
+        """What the simplified theory finds in a patch, None where that leaves it without contact."""
+        return next((part for part in self.pressed.patches if part.patch is touch.patch), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +158,7 @@ class Contact:
 
     side: Side
     load: float
-    speed: float = BENCHMARK_SPEED
+    speed: float
     friction: float = 0.0
     pair: Pair = Pair()  # noqa: RUF009 - a frozen value
 
@@ -157,126 +170,158 @@ class Contact:
         """
         quantity("lateral_shift", shift, "a shift in m from -0.03 to 0.03", -0.03, 0.03)
         quantity("yaw", yaw, "a yaw angle in rad from -0.1 to 0.1", -0.1, 0.1)
-        side = self.side
-        pose, rolling = placed(side, shift, yaw), -self.speed / side.wheelset.radius
+        pose = placed(self.side, shift, yaw)
+        level, rolling = pose.roll, -self.speed / self.side.wheelset.radius
         for _ in range(ROLLS):
-            poses, touches = self._touching(side, pose)
-            right, left = self._both(side, poses, touches, rolling)
-            span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * side.wheelset.arm
-            pose = replace(pose, roll=placed(side, shift, yaw).roll + (right.approach - left.approach) / span)
+            right, left = wheels = self._carried(pose, rolling)
+            span = right.touches[0].wheel_y + left.touches[0].wheel_y + 2.0 * self.side.wheelset.arm
+            pose = replace(pose, roll=level + (right.approach - left.approach) / span)
             if self.friction > 0.0:
-                rolling = self._free_spin(side, poses, (right, left))
-        poses, touches = self._touching(side, pose)
-        wheels = self._both(side, poses, touches, rolling)
+                rolling = self._free_spin(wheels)
+        wheels = self._carried(pose, rolling)
         for _ in range(TURNS):
-            wheels = [self._exact(side, *one) for one in zip(poses, touches, wheels, strict=True)]
+            wheels = [self._exact(wheel) for wheel in wheels]
             if self.friction == 0.0:
                 break
-            rolling = self._free_spin(side, poses, wheels)
-            wheels = [self._turned(side, *one, rolling) for one in zip(poses, wheels, strict=True)]
-        places = [_places(side, *one) for one in zip(poses, wheels, strict=True)]
-        return _standing(Placed(shift, yaw, pose.roll, rolling, *places))
+            rolling = self._free_spin(wheels)
+            wheels = [self._turned(wheel, rolling) for wheel in wheels]
+        return _standing(Placed(shift, yaw, pose.roll, rolling, *map(self._places, wheels)))
 
-    def _touching(self, side: Side, pose: Pose) -> tuple[list[Pose], list[list[Touch]]]:
-        """Poses of the right wheel and of the left one in its mirror, each lowered until it touches, and the places."""
-        poses = []
-        for sign in (1.0, -1.0):
-            seen = Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0)
-            poses.append(replace(seen, fall=side.clearance(seen)))
-        return poses, [touches_of(side, one) for one in poses]
+    def _carried(self, pose: Pose, spin: float) -> list[Carried]:
+        """The right wheel, and the left one in its mirror, each lowered until it touches and pressed on its rail.
 
-    def _both(self, side: Side, poses: list[Pose], touches: list[list[Touch]], spin: float) -> list[Carried]:
-        return [self._carried(side, one, found, spin) for one, found in zip(poses, touches, strict=True)]
+        By the simplified theory, with normal forces such that they and the creep forces carry the load.
+        """
+        return [self._wheel(Pose(sign * pose.shift, sign * pose.yaw, sign * pose.roll, 0.0), spin) for sign in SIGNS]
 
-    def _free_spin(self, side: Side, poses: list[Pose], wheels: Sequence[Carried]) -> float:
+    def _wheel(self, seen: Pose, spin: float) -> Carried:
+        pose = replace(seen, fall=self.side.clearance(seen))
+        touches = touches_of(self.side, pose)
+        creepages = [self._creepage(pose, touch, spin) for touch in touches]
+
+        def by_normal(normal: float) -> Carried:
+            pressed = press([touch.patch for touch in touches], self.pair, load=normal)
+            return Carried(pose, touches, creepages, pressed, pressed.approach, normal)
+
+        return self._balanced(by_normal, self.load)
+
+    def _exact(self, near: Carried) -> Carried:
+        """The same wheel with the exact normal contact."""
+        patches = [touch.patch for touch in near.touches]
+
+        def by_normal(normal: float) -> Carried:
+            shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
+            return replace(near, shares=shares, approach=approach, normal=normal)
+
+        return self._balanced(by_normal, near.normal)
+
+    def _balanced(self, by_normal: Callable[[float], Carried], normal: float) -> Carried:
+        """A wheel whose normal and creep forces carry the load, by the vertical part (N) of the normal forces."""
+        for _ in range(ITERATIONS):
+            wheel = self._rolled(by_normal(normal))
+            if abs(normal - wheel.lifted - self.load) < PRECISION * self.load:
+                return wheel
+            normal *= self.load / (normal - wheel.lifted)
+        raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
+
+    def _free_spin(self, wheels: Sequence[Carried]) -> float:
         """Speed of spin (rad/s) at which the creep forces have no moment about the axle, pressed as the wheels are."""
 
         def moment(spin: float) -> float:
-            return sum(self._turned(side, *one, spin).moment for one in zip(poses, wheels, strict=True))
+            return sum(self._turned(wheel, spin).moment for wheel in wheels)
 
-        rolling = -self.speed / side.wheelset.radius
+        rolling = -self.speed / self.side.wheelset.radius
         return float(brentq(moment, rolling * (1.0 - SLIDE), rolling * (1.0 + SLIDE), xtol=1e-9))
 
-    def _turned(self, side: Side, pose: Pose, one: Carried, spin: float) -> Carried:
+    def _turned(self, wheel: Carried, spin: float) -> Carried:
         """A wheel that is pressed as it was and turns at another speed (rad/s)."""
-        creepages = [self._creepage(side, pose, touch, spin) for touch in one.touches]
-        forces, _, moment = self._rolled(side, pose, one.touches, one.pressed, creepages, one.loads)
-        return replace(one, creepages=creepages, forces=forces, moment=moment)
+        creepages = [self._creepage(wheel.pose, touch, spin) for touch in wheel.touches]
+        return self._rolled(replace(wheel, creepages=creepages))
 
-    def _carried(self, side: Side, pose: Pose, touches: list[Touch], spin: float) -> Carried:
-        """One wheel by the simplified theory, with normal forces such that they and the creep forces carry its load."""
-        creepages = [self._creepage(side, pose, touch, spin) for touch in touches]
-        normal = self.load
-        for _ in range(ITERATIONS):
-            pressed = press([touch.patch for touch in touches], self.pair, load=normal)
-            loads = [_load(pressed, touch) for touch in touches]
-            forces, lifted, moment = self._rolled(side, pose, touches, pressed, creepages, loads)
-            if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return Carried(touches, pressed, creepages, forces, [], pressed.approach, normal, moment)
-            normal *= self.load / (normal - lifted)
-        raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
-
-    def _exact(self, side: Side, pose: Pose, touches: list[Touch], near: Carried) -> Carried:
-        """The same wheel with the exact normal contact."""
-        patches, normal = [touch.patch for touch in touches], near.normal
-        for _ in range(ITERATIONS):
-            shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
-            loads = [share.load for share in shares]
-            forces, lifted, moment = self._rolled(side, pose, touches, near.pressed, near.creepages, loads)
-            if abs(normal - lifted - self.load) < PRECISION * self.load:
-                return replace(near, forces=forces, shares=shares, approach=approach, normal=normal, moment=moment)
-            normal *= self.load / (normal - lifted)
-        raise RunFailed("contact table", f"no normal force was found that carries {self.load:g} N")
-
-    def _rolled(
-        self,
-        side: Side,
-        pose: Pose,
-        touches: list[Touch],
-        pressed: NormalContact,
-        creepages: list[Triple],
-        loads: list[float],
-    ) -> tuple[list[Triple], float, float]:
-        """Creep forces of each patch, the vertical part of their sum, upwards on the rail, and moment about the axle.
-
-        A patch that the simplified theory leaves without contact has none.
-        """
+    def _rolled(self, wheel: Carried) -> Carried:
+        """The wheel with the creep forces of each patch, those without contact have none."""
         forces = []
-        for touch, creep, load in zip(touches, creepages, loads, strict=True):
-            part = _part(pressed, touch)
+        for touch, creepage, load in zip(wheel.touches, wheel.creepages, wheel.loads, strict=True):
+            part = wheel.part(touch)
             if part is None or load == 0.0 or self.friction == 0.0:
                 forces.append((0.0, 0.0, 0.0))
                 continue
-            one = replace(pressed, patches=(replace(part, load=load),))
-            found = roll(one, self.friction, *creep, cells=CELLS)
-            forces.append((found.fx, found.fy, found.mz))
-        lifted = sum(force[1] * math.sin(touch.angle) for force, touch in zip(forces, touches, strict=True))
-        return forces, lifted, sum(_moment(side, pose, *one) for one in zip(touches, forces, strict=True))
+            alone = replace(wheel.pressed, patches=(replace(part, load=load),))
+            creep = roll(alone, self.friction, *creepage, cells=CELLS)
+            forces.append((creep.fx, creep.fy, creep.mz))
+        pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
+        lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
+        moment = sum(float(axle @ _moments(self._arm(wheel.pose, touch), touch, force)) for touch, force in pairs)
+        return replace(wheel, forces=forces, lifted=lifted, moment=moment)
 
-    def _creepage(self, side: Side, pose: Pose, touch: Touch, spin: float) -> Triple:
+    def _creepage(self, pose: Pose, touch: Touch, spin: float) -> Triple:
         """Creepages and spin (1/m) at a place of first touch."""
         if self.friction == 0.0:
             return 0.0, 0.0, 0.0
-        axle, place = pose.turn[:, 1], _arm(side, pose, touch)
+        axle, place = pose.turn[:, 1], self._arm(pose, touch)
         velocity = spin * np.cross(axle, place) + np.array([self.speed, 0.0, 0.0])
         across, into = _axes(touch)
-        return (
-            float(velocity[0] / self.speed),
-            float(velocity @ across / self.speed),
-            float(spin * axle @ into / self.speed),
+        slips = velocity[0] / self.speed, velocity @ across / self.speed, spin * axle @ into / self.speed
+        return float(slips[0]), float(slips[1]), float(slips[2])
+
+    def _radius(self, touch: Touch) -> float:
+        return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
+
+    def _arm(self, pose: Pose, touch: Touch) -> Array:
+        """From the wheelset's centre to a place of first touch, in the track (m)."""
+        down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
+        return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
+
+    def _places(self, wheel: Carried) -> tuple[Place, ...]:
+        """What a wheel's patches report, those that carry something; patches that have grown together as one."""
+        rows = [
+            row
+            for row in zip(wheel.touches, wheel.creepages, wheel.forces, wheel.shares, strict=True)
+            if row[-1].load > 0.0
+        ]
+        pieces = dict.fromkeys(share.piece for *_, share in rows)
+        return tuple(self._place(wheel, [row for row in rows if row[-1].piece == piece]) for piece in pieces)
+
+    def _place(self, wheel: Carried, rows: list[tuple[Touch, Triple, Triple, Share]]) -> Place:
+        """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
+        side, (touch, creepage, _, _) = self.side, max(rows, key=lambda row: row[-1].load)
+        top, start = float(side.rail.y[np.argmin(side.rail.z)]), self._arm(wheel.pose, touch)
+        loads = np.array([share.load for *_, share in rows])
+        centres = [
+            (patch.rail_y + top + share.y * math.cos(patch.angle), patch.x + share.x) for patch, _, _, share in rows
+        ]
+        y, x = (float(np.average(values, weights=loads)) for values in zip(*centres, strict=True))
+        fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
+        mz = sum(
+            float(_axes(touch)[1] @ _moments(self._arm(wheel.pose, patch) - start, patch, force))
+            for patch, _, force, _ in rows
         )
-
-
-@cache
-def benchmark_side() -> Side:
-    """The benchmark's right wheel on its rail, with the built-in profiles."""
-    return Side(s1002(), laid(uic60(), Track()), Wheelset())
-
-
-def manchester(*, yaw: bool = False, rolling: bool = False, shifts: Iterable[float] = BENCHMARK_SHIFTS) -> list[Placed]:
-    """The benchmark's case A-1 (``yaw``: A-2), without friction or rolling with it, at lateral displacements in m."""
-    contact = Contact(benchmark_side(), BENCHMARK_LOAD, friction=BENCHMARK_FRICTION if rolling else 0.0)
-    return [contact.at(shift, BENCHMARK_YAW * shift if yaw else 0.0) for shift in shifts]
+        boxes = np.array([share.box for *_, share in rows])
+        length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
+        return Place(
+            touch.x,
+            touch.rail_y + top,
+            y,
+            top,
+            x,
+            touch.wheel_y,
+            touch.angle,
+            math.atan(float(side.rail.curve(y, 1))),
+            self._radius(touch),
+            float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y)),
+            *_curvatures(touch.patch.distance),
+            float(loads.sum()),
+            sum(share.load * math.cos(patch.angle) for patch, _, _, share in rows),
+            fx,
+            fy,
+            mz,
+            *creepage,
+            max(share.peak for *_, share in rows),
+            sum(share.area for *_, share in rows),
+            length,
+            width,
+            wheel.approach,
+        )
 
 
 def _standing(found: Placed) -> Placed:
@@ -298,117 +343,16 @@ def rolling_radius_difference(placed_at: Placed) -> float:
     return right.rolling_radius - left.rolling_radius
 
 
-def equivalent_conicity(shifts: np.ndarray, differences: np.ndarray, amplitude: float) -> float:
-    """Conicity of the cones whose first harmonic is that of profiles moving sideways as amplitude (m) times a sine.
-
-    shifts : (n,) m, ascending, from -amplitude to amplitude at least, or from 0 on for profiles alike on both sides;
-    differences : (n,) of the rolling radii (m), right less left.
-    """
-    shifts, differences = np.asarray(shifts, float), np.asarray(differences, float)
-    if shifts[0] == 0.0:
-        shifts = np.concatenate([-shifts[:0:-1], shifts])
-        differences = np.concatenate([-differences[:0:-1], differences])
-    quantity("amplitude", amplitude, f"an amplitude in m, above 0 and up to {shifts[-1]:g}", 1e-9, shifts[-1])
-    phase = 2.0 * math.pi * (np.arange(720) + 0.5) / 720
-    values = np.interp(amplitude * np.sin(phase), shifts, differences)
-    return float((values * np.sin(phase)).mean() / amplitude)
-
-
-def _axes(touch: Touch) -> tuple[np.ndarray, np.ndarray]:
+def _axes(touch: Touch) -> tuple[Array, Array]:
     """Directions along the rail's surface and into the rail, in the track."""
     cosine, sine = math.cos(touch.angle), math.sin(touch.angle)
     return np.array([0.0, cosine, sine]), np.array([0.0, -sine, cosine])
 
 
-def _radius(side: Side, touch: Touch) -> float:
-    return side.wheelset.radius + float(side.wheel.curve(touch.wheel_y))
-
-
-def _arm(side: Side, pose: Pose, touch: Touch) -> np.ndarray:
-    """From the wheelset's centre to a place of first touch, in the track (m)."""
-    down = math.sqrt(_radius(side, touch) ** 2 - touch.x**2)
-    return pose.turn @ np.array([touch.x, side.wheelset.arm + touch.wheel_y, down])
-
-
-def _moment(side: Side, pose: Pose, touch: Touch, force: Triple) -> float:
-    """Moment (N m) of a patch's creep forces about the axle."""
-    return float(pose.turn[:, 1] @ _moments(_arm(side, pose, touch), touch, force))
-
-
-def _moment_at(side: Side, pose: Pose, main: Touch, touch: Touch, force: Triple) -> float:
-    """Moment (N m) of a patch's creep forces about the normal through another patch's first touch, ``main``."""
-    lever = _arm(side, pose, touch) - _arm(side, pose, main)
-    return float(_axes(main)[1] @ _moments(lever, touch, force))
-
-
-def _moments(lever: np.ndarray, touch: Touch, force: Triple) -> np.ndarray:
+def _moments(lever: Array, touch: Touch, force: Triple) -> Array:
     """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
     across, into = _axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into
-
-
-def _load(pressed: NormalContact, touch: Touch) -> float:
-    part = _part(pressed, touch)
-    return 0.0 if part is None else part.load
-
-
-def _part(pressed: NormalContact, touch: Touch) -> PatchPressure | None:
-    return next((part for part in pressed.patches if part.patch is touch.patch), None)
-
-
-def _places(side: Side, pose: Pose, carried: Carried) -> tuple[Place, ...]:
-    """What a wheel's patches report, those that carry something; patches that have grown together as one."""
-    rows = list(zip(carried.touches, carried.creepages, carried.forces, carried.shares, strict=True))
-    pieces = dict.fromkeys(share.piece for *_, share in rows if share.load > 0.0)
-    loaded = [[row for row in rows if row[-1].piece == piece and row[-1].load > 0.0] for piece in pieces]
-    return tuple(_place(side, pose, parts, carried.approach) for parts in loaded)
-
-
-def _place(side: Side, pose: Pose, rows: list[tuple[Touch, Triple, Triple, Share]], approach: float) -> Place:
-    """One piece of the contact area: first touch and creepages are those of the patch that carries most."""
-    touch, creep, _, _ = max(rows, key=lambda row: row[-1].load)
-    top = float(side.rail.y[np.argmin(side.rail.z)])
-    loads = np.array([share.load for *_, share in rows])
-    y, x = (
-        float(np.average(values, weights=loads))
-        for values in zip(
-            *((one.rail_y + top + share.y * math.cos(one.angle), one.x + share.x) for one, _, _, share in rows),
-            strict=True,
-        )
-    )
-    fx, fy = (float(sum(force[k] for _, _, force, _ in rows)) for k in (0, 1))
-    mz = sum(_moment_at(side, pose, touch, other, force) for other, _, force, _ in rows)
-    vertical = sum(share.load * math.cos(one.angle) for one, _, _, share in rows)
-    boxes = np.array([share.box for *_, share in rows])
-    length, width = (float(boxes[:, k + 1].max() - boxes[:, k].min()) for k in (0, 2))
-    tip = float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y))
-    along, across = _curvatures(touch.patch.distance)
-    falling = math.atan(float(side.rail.curve(y, 1)))
-    return Place(
-        touch.x,
-        touch.rail_y + top,
-        y,
-        top,
-        x,
-        touch.wheel_y,
-        touch.angle,
-        falling,
-        _radius(side, touch),
-        tip,
-        along,
-        across,
-        float(loads.sum()),
-        vertical,
-        fx,
-        fy,
-        mz,
-        *creep,
-        max(share.peak for *_, share in rows),
-        sum(share.area for *_, share in rows),
-        length,
-        width,
-        approach,
-    )
 
 
 def _curvatures(distance: Distance) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.rail import equations as eq
+from models.contact.inputs import Array
 from models.rail.equations import (
     ARM,
     CARRIED,
@@ -40,71 +40,51 @@ from models.rail.wheelset import GRAVITY
 class Ledger:
     """Energies (n,) in J at times (n,) in s; works count from the path's start, those done by the wheelset positive."""
 
-    times: np.ndarray
-    kinetic: np.ndarray
-    springs: np.ndarray
-    gravity: np.ndarray
-    contacts: np.ndarray
-    drive: np.ndarray
-    dampers: np.ndarray
-    contact_damping: np.ndarray
-    creep: np.ndarray
+    times: Array
+    kinetic: Array
+    springs: Array
+    gravity: Array
+    contacts: Array
+    drive: Array
+    dampers: Array
+    contact_damping: Array
+    creep: Array
 
     @cached_property
-    def residual(self) -> np.ndarray:
+    def residual(self) -> Array:
         """What the sums do not account for (n,), 0 at the start (J)."""
-        held = self.kinetic + self.springs + self.gravity + self.contacts
-        return held - held[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
+        stored = self.kinetic + self.springs + self.gravity + self.contacts
+        return stored - stored[0] - (self.drive - self.dampers - self.contact_damping - self.creep)
 
 
 def ledger(equations: Equations, path: Path) -> Ledger:
     """The ledger of a path by RK4, of any implementation, whose every step was kept."""
-    states, w = path.states, equations.wheelset
-    gravity = -(w.mass * GRAVITY + 2.0 * equations.body[CARRIED]) * states[:, Z]
-    return Ledger(
-        path.times,
-        _kinetic(equations, states),
-        _suspension(equations.body, states)[0],
-        gravity,
-        *_works(equations, path).T,
-    )
-
-
-def _works(equations: Equations, path: Path) -> np.ndarray:
-    """Works (n, 5) in the order of the ledger, by the stages of every step."""
     start, step = path.states[:-1], np.diff(path.times)[:, None]
     done, rates = np.zeros((len(path.times), 5)), np.zeros_like(start)
     for ahead, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
-        rates, powers = _there(equations, start + ahead * step * rates)
+        rates, powers = rates_and_powers(equations, start + ahead * step * rates)
         done[1:] += weight / 6.0 * step * powers
-    return done.cumsum(axis=0)
+    return Ledger(path.times, *energies(equations, path.states), *done.cumsum(axis=0).T)
 
 
-def _there(equations: Equations, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rates (n, 10) of states and the powers (n, 5) that the works add up."""
-    rates, contacts = np.empty_like(states), equations.blank(len(states))
-    for state, rate, contact in zip(states, rates, contacts, strict=True):
-        eq.rates(state, *equations.given, rate, contact)
+def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
+    """Rates (n, 10) of states and the powers (n, 5) that the works add up, in the order of the ledger."""
+    rates, contacts = equations.at(states)
     out = -contacts.sum(axis=1)
-    return rates, np.column_stack(
-        [
-            out[:, ELASTIC_POWER],
-            equations.speed * out[:, FX],
-            _suspension(equations.body, states)[1],
-            out[:, DAMPING_POWER],
-            out[:, POWER],
-        ]
-    )
+    drive, dampers = equations.speed * out[:, FX], _suspension(equations.body, states)[1]
+    return rates, np.column_stack([out[:, ELASTIC_POWER], drive, dampers, out[:, DAMPING_POWER], out[:, POWER]])
 
 
-def _kinetic(equations: Equations, states: np.ndarray) -> np.ndarray:
-    w = equations.wheelset
+def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
+    """Energies (n,) of motion, of the springs and of gravity at states (n, 10), in J."""
+    w, body = equations.wheelset, equations.body
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     moved = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
-    return 0.5 * (w.mass * moved + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
+    kinetic = 0.5 * (w.mass * moved + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
+    return kinetic, _suspension(body, states)[0], -(w.mass * GRAVITY + 2.0 * body[CARRIED]) * states[:, Z]
 
 
-def _suspension(body: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _suspension(body: Array, states: Array) -> tuple[Array, Array]:
     """Energy of the springs (n,) and power into the dampers (n,)."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])

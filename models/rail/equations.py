@@ -19,17 +19,28 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.optimize import brentq, root
 
-from models.contact.inputs import number, quantity
+from models.contact.inputs import Array, number, quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
 from models.machine.compiled import inlined, lean, njit
-from models.rail.wheel_forces import LAWS, LOAD, REPORTED, carried, net, numbers, patches, room_for, wheel_forces
+from models.rail.wheel_forces import (
+    LAWS,
+    LOAD,
+    REPORTED,
+    Rails,
+    carries,
+    numbers,
+    patches,
+    rails_of,
+    room_for,
+    wheel_forces,
+)
 from models.rail.wheelset import GRAVITY, Wheelset
 
 STATES = 10
@@ -51,13 +62,13 @@ DEEPEST = 5e-3
 
 
 @njit(cache=True, error_model="numpy")
-def rates(state, speed, body, p, strips, cells, middle, law, out, report):
+def rates(state, speed, body, rails, out, report):
     """Fill ``out`` with the rates of a state (10,), and ``report`` (patches, REPORTED) with the contacts."""
-    set_rates(state, speed, body, p, strips, cells, middle, law, out, report, room_for(p))
+    set_rates(state, speed, body, rails, out, report, room_for(rails.numbers))
 
 
 @inlined
-def set_rates(state, speed, body, p, strips, cells, middle, law, out, report, room):
+def set_rates(state, speed, body, rails, out, report, room):
     """The same with ``Room`` made beforehand; a report of no rows where nobody asks."""
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
@@ -66,20 +77,20 @@ def set_rates(state, speed, body, p, strips, cells, middle, law, out, report, ro
     for k in range(3):
         force[k] = moment[k] = 0.0
     velocity[0], velocity[1], velocity[2] = speed, state[Y_RATE], state[Z_RATE]
-    axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
-    own = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
-    turning[0], turning[1] = cy * roll_rate + axle_x * own, sy * roll_rate + axle_y * own
-    turning[2] = yaw_rate + axle_z * own
-    wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room)
+    axle = axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
+    rolling = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
+    turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
+    turning[2] = yaw_rate + axle_z * rolling
+    wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room)
     force[1] += 2.0 * body[CARRIED] * body[LEAN]
     force[2] += 2.0 * body[CARRIED]
     if body[HELD] > 0.0:
-        _hold(state, body, cy * roll_rate, sy * roll_rate, axle_x, axle_y, axle_z, force, moment)
+        _hold(state, body, cy * roll_rate, sy * roll_rate, axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
     out[Y], out[Z], out[ROLL], out[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
-    out[ANGLE] = own
+    out[ANGLE] = rolling
     out[Y_RATE] = force[1] / body[MASS] + GRAVITY * body[LEAN]
     out[Z_RATE] = force[2] / body[MASS] + GRAVITY
     whirl = body[ALONG] * spin
@@ -89,11 +100,11 @@ def set_rates(state, speed, body, p, strips, cells, middle, law, out, report, ro
 
 
 @lean
-def _hold(state, body, turn_x, turn_y, axle_x, axle_y, axle_z, force, moment):
+def _hold(state, body, turn_x, turn_y, axle, force, moment):
     """Add springs and dampers of both ends; turn_x, turn_y : of the axle's own axes (rad/s)."""
     for side in (1.0, -1.0):
         arm, turn_z = side * body[ARM], state[YAW_RATE]
-        ax, ay, az = arm * axle_x, arm * axle_y, arm * axle_z
+        ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
         vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
         fx = -body[KX] * ax - body[DX] * vx
         fy = -body[KY] * (state[Y] + ay - arm) - body[DY] * (state[Y_RATE] + vy)
@@ -107,30 +118,14 @@ def _hold(state, body, turn_x, turn_y, axle_x, axle_y, axle_z, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports):
+def march(state, speed, body, rails, step, count, every, path, reports):
     """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
-    return _march(
-        state,
-        speed,
-        step,
-        count,
-        every,
-        body,
-        p,
-        strips,
-        cells,
-        middle,
-        law,
-        path,
-        reports,
-        room_for(p),
-        np.empty((3, STATES)),
-        np.empty((0, REPORTED)),
-    )
+    room, some, none = room_for(rails.numbers), np.empty((3, STATES)), np.empty((0, REPORTED))
+    return _march(state, speed, body, rails, step, count, every, path, reports, room, some, none)
 
 
 @lean
-def _march(state, speed, step, count, every, body, p, strips, cells, middle, law, path, reports, room, some, none):
+def _march(state, speed, body, rails, step, count, every, path, reports, room, some, none):
     """The same with all arrays made: it counts no references to them, which takes 5 % of a bare wheelset's time."""
     total, rate, here = some[0], some[1], some[2]
     for i in range(count + 1):
@@ -141,7 +136,7 @@ def _march(state, speed, step, count, every, body, p, strips, cells, middle, law
             ahead = step if stage == 3 else 0.5 * step
             for k in range(STATES):  # a sum of whole arrays would make one
                 here[k] = state[k] + ahead * rate[k] if stage > 0 else state[k]
-            set_rates(here, speed, body, p, strips, cells, middle, law, rate, report, room)
+            set_rates(here, speed, body, rails, rate, report, room)
             for k in range(STATES):
                 total[k] = total[k] + (1.0 if stage == 3 else 2.0) * rate[k] if stage > 0 else rate[k]
             if kept:
@@ -161,8 +156,8 @@ class Path:
     """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
 
     times: np.ndarray
-    states: np.ndarray
-    contacts: np.ndarray
+    states: Array
+    contacts: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +166,9 @@ class Equations:
 
     lean : of the track to the right, the weight across the track as a share of that square to it.
     """
+
+    ENGINE: ClassVar[str] = "wheelset"
+    """Who says that a run failed."""
 
     wheelset: Wheelset
     speed: float
@@ -185,44 +183,49 @@ class Equations:
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
-    def body(self) -> np.ndarray:
+    def body(self) -> Array:
         """Numbers of the body and its suspension (14,)."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
-        sunk = self._static_height() if w.profiles else float(w.ellipse.approach) / w.slant[1]
+        sunk = float(w.ellipse.approach) / w.slant[1]
+        if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
+            contact = numbers(w)
+            sunk = float(brentq(lambda z: carries(z, contact) - w.load, 0.0, DEEPEST, xtol=1e-15))
         held = [w.stiffness_x, w.stiffness_y, w.stiffness_z, w.damping_x, w.damping_y, w.damping_z]
         return np.array(
             [w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean, any(held)]
         )
 
     @cached_property
-    def given(self) -> tuple:
-        """What the compiled functions take after the state: speed, body, contact, net and law."""
-        return (float(self.speed), self.body, numbers(self.wheelset), *net(self.wheelset, self.cells), LAWS[self.law])
+    def parameters(self) -> tuple[float, Array, Rails]:
+        """What the compiled functions take after the state: speed, body and rails."""
+        return float(self.speed), self.body, rails_of(self.wheelset, self.law, self.cells)
 
-    def _static_height(self) -> float:
-        """Height z (m) in the middle of the track at which smooth rails carry the load."""
-        given = numbers(self.wheelset)
-        return float(brentq(lambda z: carried(z, given) - self.wheelset.load, 0.0, DEEPEST, xtol=1e-15))
-
-    def blank(self, *shape: int) -> np.ndarray:
+    def blank(self, *shape: int) -> Array:
         """Contacts (*shape, patches, REPORTED) that are not known yet."""
-        return np.full((*shape, patches(self.given[2]), REPORTED), np.nan)
+        return np.full((*shape, patches(self.parameters[2].numbers), REPORTED), np.nan)
 
-    def rates(self, state: np.ndarray) -> np.ndarray:
+    def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
         out = np.empty(STATES)
-        rates(np.asarray(state, float), *self.given, out, self.blank())
+        rates(np.asarray(state, float), *self.parameters, out, self.blank())
         return out
 
+    def at(self, states: Array) -> tuple[Array, Array]:
+        """Rates (n, 10) by the written equations and contacts (n, patches, REPORTED) at states (n, 10)."""
+        every, contacts = np.empty_like(states), self.blank(len(states))
+        for state, rate, contact in zip(states, every, contacts, strict=True):
+            rates(state, *self.parameters, rate, contact)
+        return every, contacts
+
     @cached_property
-    def rest(self) -> np.ndarray:
+    def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATES)
         start[Z], start[SPIN] = self.body[SUNK], -self.speed / self.wheelset.radius
         return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
 
-    def displaced(self, shift: float) -> np.ndarray:
+    def displaced(self, shift: float) -> Array:
         """The state (10,) at a lateral displacement (m) without yaw or rates but spin: height and roll in balance."""
         start, w = self.rest.copy(), self.wheelset
         start[Y] = shift
@@ -232,24 +235,23 @@ class Equations:
             start[Z] += rise
         return self._settled(start, (Z, ROLL), (Z_RATE, ROLL_RATE))
 
-    def _settled(self, start: np.ndarray, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> np.ndarray:
+    def _settled(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
         """The state with two of its values such that two accelerations vanish."""
-        places, scale = list(coordinates), np.maximum(np.abs(start[list(coordinates)]), self.body[SUNK])
+        places = list(coordinates)
+        scale = np.maximum(np.abs(start[places]), self.body[SUNK])
 
-        def off(unknown: np.ndarray) -> np.ndarray:
+        def moved(unknown: Array) -> Array:
             state = start.copy()
             state[places] += unknown * scale
-            return self.rates(state)[list(accelerations)]
+            return state
 
-        found = root(off, np.zeros(2), tol=1e-15)
-        if np.abs(found.fun).max() > 1e-6:
+        solution = root(lambda unknown: self.rates(moved(unknown))[list(accelerations)], np.zeros(2), tol=1e-15)
+        if np.abs(solution.fun).max() > 1e-6:
             raise RunFailed("wheelset", "no height was found at which both rails carry it")
-        state = start.copy()
-        state[places] += found.x * scale
-        return state
+        return moved(solution.x)
 
     @cached_property
-    def state_matrix(self) -> np.ndarray:
+    def state_matrix(self) -> Array:
         """A (9, 9) about rest, the angle of spin left out."""
         return slopes(self.rates, self.rest)
 
@@ -258,7 +260,7 @@ class Equations:
         """Largest rate (1/s) of the motions about rest."""
         return float(np.abs(np.linalg.eigvals(self.state_matrix)).max())
 
-    def run(self, state: np.ndarray, duration: float, step: float, every: int = 1) -> Path:
+    def run(self, state: Array, duration: float, step: float, every: int = 1) -> Path:
         """RK4 from a state (10,) over a duration (s) with a step (s); every so many steps are kept.
 
         Raises InputError for a state that is no wheelset's, a step too large for the fastest motion, or a duration that
@@ -266,37 +268,41 @@ class Equations:
         contacts' largest loads among the states that are kept or, where all are, for the motion.
         """
         count = self._steps(state, duration, step, every)
+        states, contacts = self._marched(np.array(state, float), count, step, every)
+        path = Path(np.arange(len(states)) * step * every, states, contacts)
+        self.check(path, step, every)
+        return path
+
+    def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
+        """States and contacts of a path that are kept; ``state`` (10,) is moved."""
         kept = count // every + 1
-        path, contacts = np.empty((kept, STATES)), np.empty((kept, patches(self.given[2]), REPORTED))
-        speed, *rest = self.given
-        done = march(np.array(state, float), speed, step, count, every, *rest, path, contacts)
+        states, contacts = np.empty((kept, STATES)), self.blank(kept)
+        done = march(state, *self.parameters, step, count, every, states, contacts)
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
-        found = Path(np.arange(kept) * step * every, path, contacts)
-        self._check(found, step, every, "wheelset")
-        return found
+        return states, contacts
 
-    def _check(self, path: Path, step: float, every: int, engine: str) -> None:
+    def check(self, path: Path, step: float, every: int) -> None:
         """Raise RunFailed if the step was too large for the loads or, where every one is kept, for the motion."""
-        self._check_loads(path, step, engine)
+        self.check_loads(path, step)
         if every == 1:
-            w, own = self.wheelset, path.states
+            w = self.wheelset
             inert = np.array([w.mass, w.mass, w.yaw_inertia, w.yaw_inertia])
-            check_resolved(engine, path.times, own[:, :ANGLE], own[:, Y_RATE:SPIN], inert)
+            check_resolved(self.ENGINE, path.times, path.states[:, :ANGLE], path.states[:, Y_RATE:SPIN], inert)
 
-    def _check_loads(self, path: Path, step: float, engine: str) -> None:
+    def check_loads(self, path: Path, step: float) -> None:
         """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
         for k in sorted(set(path.contacts[:, :, LOAD].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
                 raise RunFailed(
-                    engine,
+                    self.ENGINE,
                     f"the step of {step:g} s is too large for contacts that carry "
                     f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
                     path.times[k],
                 )
 
-    def _steps(self, state: np.ndarray, duration: float, step: float, every: int) -> int:
+    def _steps(self, state: Array, duration: float, step: float, every: int) -> int:
         """Number of steps of a run that is possible."""
         if quantity("state", state, "ten finite numbers").shape != (STATES,):
             raise InputError("", "state", None, f"must be {STATES} finite numbers")
@@ -316,10 +322,10 @@ class Equations:
         return count
 
 
-def slopes(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray) -> np.ndarray:
+def slopes(rates: Callable[[Array], Array], state: Array) -> Array:
     """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order."""
     columns = []
     for k in range(STATES):
-        some = [rates(state + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0)]
-        columns.append((some[0] - 8.0 * some[1] + 8.0 * some[2] - some[3]) / (12.0 * MOVED[k]))
+        a, b, c, d = (rates(state + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
+        columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * MOVED[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)

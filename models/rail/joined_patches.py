@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import label
 
+from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.contact.normal_problem import centres, solve_normal
 from models.contact.patches import Box, Patch
@@ -87,7 +88,7 @@ def _pressed(
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
 
-def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[np.ndarray, np.ndarray]:
+def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[Array, Array]:
     """Centres (m) of the cells along x and along the contour."""
     x0, x1 = min(part.box[0] for part in near), max(part.box[1] for part in near)
     y0 = min(part.box[2] + part.patch.place for part in near)
@@ -99,17 +100,16 @@ def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[np.ndarray, np.
     return along, (y0 + y1) / 2.0 + centres(rows, high / rows)
 
 
-def _height(patch: Patch, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along its normal, on the common contour."""
-    known, own = patch.distance, y - patch.place
-    over = (own >= known.y[0]) & (own <= known.y[-1])
-    found = np.full((y.size, x.size), FAR)
-    inside = np.clip(x, known.x[0], known.x[-1])
-    found[over] = known.at(inside[None, :], own[over][:, None])
-    return found
+    known, across = patch.distance, y - patch.place
+    over = (across >= known.y[0]) & (across <= known.y[-1])
+    heights = np.full((y.size, x.size), FAR)
+    heights[over] = known.at(np.clip(x, known.x[0], known.x[-1])[None, :], across[over][:, None])
+    return heights
 
 
-def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cell: float, pieces: np.ndarray) -> Share:
+def _share(pressure: Array, x: Array, y: Array, place: float, cell: float, pieces: Array) -> Share:
     """Share of a patch at a place on the contour (m), of which ``pressure`` is zero elsewhere."""
     total = float(pressure.sum())
     if total == 0.0:
@@ -126,7 +126,7 @@ def _share(pressure: np.ndarray, x: np.ndarray, y: np.ndarray, place: float, cel
     )
 
 
-def _ends(at: np.ndarray, inside: np.ndarray) -> tuple[float, float]:
+def _ends(at: Array, inside: Array) -> tuple[float, float]:
     """Outer sides (m) of the first and the last cell inside."""
     half = (at[1] - at[0]) / 2.0
     return float(at[inside][0] - half), float(at[inside][-1] + half)

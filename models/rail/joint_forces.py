@@ -12,10 +12,11 @@ import math
 import numpy as np
 from numba import carray
 
+from models.contact.inputs import Array
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
 from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
-from models.rail.wheel_forces import REPORTED, room_for, wheel_forces
+from models.rail.wheel_forces import REPORTED, Rails, room_for, wheel_forces
 
 JOINTS = 5
 SPEED, LAW, MIDDLE, NUMBERS, STRIPS, CELLS, HEADER = range(7)
@@ -25,21 +26,21 @@ PER_STRIP, PER_CELL = 4, 5
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
-def table(given: tuple) -> np.ndarray:
-    """What the compiled functions read, from ``Equations.given``."""
-    speed, _, numbers, strips, cells, middle, law = given
-    head = [speed, law, middle, numbers.size, strips.shape[1], cells.shape[1]]
+def table(speed: float, body: Array, rails: Rails) -> Array:
+    """What the compiled functions read, from ``Equations.parameters``."""
+    numbers, strips, cells = rails.numbers, rails.strips, rails.cells
+    head = [speed, rails.law, rails.middle, numbers.size, strips.shape[1], cells.shape[1]]
     return np.concatenate((head, numbers, strips.ravel(), cells.ravel()))
 
 
-def to_joints(states: np.ndarray) -> np.ndarray:
+def to_joints(states: Array) -> Array:
     """Positions and rates of the joints (..., 10) of states (..., 10)."""
     found = states[..., _POSITIONS + _RATES]
     found[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
     return found
 
 
-def from_joints(joints: np.ndarray) -> np.ndarray:
+def from_joints(joints: Array) -> Array:
     """States (..., 10) of positions and rates of the joints (..., 10)."""
     states = np.empty(joints.shape)
     states[..., _POSITIONS + _RATES] = joints
@@ -47,7 +48,7 @@ def from_joints(joints: np.ndarray) -> np.ndarray:
     return states
 
 
-def rates_of(joints: np.ndarray, accelerations: np.ndarray) -> np.ndarray:
+def rates_of(joints: Array, accelerations: Array) -> Array:
     """Rates (10,) of the state by positions and rates (10,) and accelerations (5,) of the joints."""
     out = np.empty(STATES)
     out[_POSITIONS], out[_RATES] = joints[JOINTS:], accelerations
@@ -78,24 +79,9 @@ def joint_forces(numbers, q, v, f):
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
     velocity = np.array([head[SPEED], y_rate, z_rate])
     turning = np.array([cy * roll_rate + axle_x * spin, sy * roll_rate + axle_y * spin, yaw_rate + axle_z * spin])
-    force, moment = np.zeros(3), np.zeros(3)
-    wheel_forces(
-        y,
-        z,
-        roll,
-        yaw,
-        velocity,
-        turning,
-        contact,
-        net,
-        along,
-        head[MIDDLE],
-        int(head[LAW]),
-        force,
-        moment,
-        np.empty((0, REPORTED)),
-        room_for(contact),
-    )
+    force, moment, report = np.zeros(3), np.zeros(3), np.empty((0, REPORTED))
+    rails = Rails(contact, net, along, head[MIDDLE], int(head[LAW]))
+    wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room_for(contact))
     out[0] += force[1]
     out[1] += force[2]
     out[2] += moment[2]

@@ -8,13 +8,16 @@ import numpy as np
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
+from models.contact.inputs import Array
 from models.contact.profile_files import Kind, read_profile
 from models.contact.profiles import Profile
 from models.contact.standard_profiles import RAILS, WHEELS
 from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, placed
 from models.core.errors import InputError
+from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
 
+BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 SPACING, OF_KNOTS = 1e-4, 2.5e-4
 """Distance (m) of nodes along the wheel's contour and of knots along the rail's."""
 SHIFTS = np.arange(-0.012, 0.0120001, 1e-3)
@@ -44,6 +47,17 @@ class Profiles(Strict):
     back_to_back: float = quantity("m", "between the backs of the flanges", default=1.360)
     taping: float = quantity("m", "from a flange's back to the taping line", default=0.070)
 
+    def located(self, scene: SceneFile) -> "Profiles":
+        """The same with the paths of the files that a scene names; InputError for what is neither file nor built in."""
+        files = {}
+        for kind, known in BUILT_IN.items():
+            name = getattr(self, kind)
+            if Path(name).suffix:
+                files[kind] = str(scene.path(name, f"profiles.{kind}"))
+            elif name not in known:
+                raise InputError(scene.file, f"profiles.{kind}", name, "must be a file or built in", tuple(known))
+        return self.model_copy(update=files)
+
     def side(self, radius: float) -> Side:
         """The right wheel of a radius (m) on its rail; raises InputError for files that are no profiles."""
         rail = _profile(self.rail, "rail", self.smoothing)
@@ -61,7 +75,7 @@ class Profiles(Strict):
 
 
 def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
-    known = WHEELS if kind == "wheel" else RAILS
+    known = BUILT_IN[kind]
     if name in known:
         return known[name]()
     if not Path(name).suffix:
@@ -70,65 +84,62 @@ def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
 
 
 @cache
-def profile_numbers(profiles: Profiles, radius: float) -> np.ndarray:
+def profile_numbers(profiles: Profiles, radius: float) -> Array:
     """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
     y = _even(side.wheel.y[tip:], side.wheel.z[tip:], SPACING)
     curve = side.wheel.curve
-    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, _cuts(side))])
+    touched = [(shift, touch[0]) for shift in SHIFTS.tolist() if (touch := _first(side, shift)) is not None]
+    cuts = [cut for cut in (_ridge(side, *pair) for pair in pairwise(touched)) if cut is not None]
+    nodes = np.column_stack([y, radius + curve(y), curve(y, 1), _zones(y, cuts)])
     knots = _even(side.rail.y, side.rail.z, OF_KNOTS)
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
     head = [int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]
-    found = np.concatenate((head, nodes.ravel(), rail.ravel()))
-    found.flags.writeable = False
-    return found
+    numbers = np.concatenate((head, nodes.ravel(), rail.ravel()))
+    numbers.flags.writeable = False
+    return numbers
 
 
-def _even(y: np.ndarray, z: np.ndarray, spacing: float) -> np.ndarray:
+def _even(y: Array, z: Array, spacing: float) -> Array:
     """Places y at even distances (m) along a contour."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])
     return np.interp(np.arange(0.0, length[-1], spacing), length, y)
 
 
-def _cuts(side: Side) -> list[float]:
-    """Places (m from the taping line) on the wheel that first contact jumps across, over a ridge of the gap."""
-    touched = [(float(shift), found[0]) for shift in SHIFTS if (found := _first(side, float(shift))) is not None]
-    cuts = [_ridge(side, before, after) for before, after in pairwise(touched)]
-    return [cut for cut in cuts if cut is not None]
-
-
-def _first(side: Side, shift: float) -> tuple[float, np.ndarray, np.ndarray] | None:
+def _first(side: Side, shift: float) -> tuple[float, Array, Array] | None:
     """Place of first contact from the taping line, places and gaps (m) there; None where the profiles do not meet."""
     try:
         pose = placed(side, shift, 0.0)
     except InputError:
         return None
     points, gap = side.gaps(pose)
-    own = points[:, 1] - shift - side.wheelset.arm
-    return float(own[np.argmin(gap)]), own, gap
+    places = points[:, 1] - shift - side.wheelset.arm
+    return float(places[np.argmin(gap)]), places, gap
 
 
 def _ridge(side: Side, before: tuple[float, float], after: tuple[float, float]) -> float | None:
     """Highest place between both ends of a jump of first contact between two (shift, place); None without a jump."""
     while abs(after[1] - before[1]) > APART:
         middle = (before[0] + after[0]) / 2.0
-        found = _first(side, middle)
-        if found is None:
+        touch = _first(side, middle)
+        if touch is None:
             return None
-        here, own, gap = found
+        here, places, gap = touch
+        low, high = sorted((before[1], after[1]))
         if after[0] - before[0] < CLOSE:
-            between = (own > min(before[1], after[1])) & (own < max(before[1], after[1]))
-            return float(own[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
-        before, after = (
-            (before, (middle, here)) if abs(here - before[1]) > abs(here - after[1]) else ((middle, here), after)
-        )
+            between = (places > low) & (places < high)
+            return float(places[between][np.argmax(gap[between])]) if gap[between].max() > RIDGE else None
+        if abs(here - before[1]) > abs(here - after[1]):
+            after = middle, here
+        else:
+            before = middle, here
     return None
 
 
-def _zones(y: np.ndarray, cuts: list[float]) -> np.ndarray:
+def _zones(y: Array, cuts: list[float]) -> Array:
     """Zone (n,) of places on the wheel: a whole number, but where one passes smoothly into the next."""
     zones = np.zeros(y.size)
     for cut in cuts:

@@ -1,18 +1,51 @@
-"""The limit cycle that a wheelset reaches from a large disturbance, and the branch of cycles over the speed.
+"""Limit cycles of a wheelset by shooting, those that attract and those that only part two behaviours; their branch.
 
-Above the critical speed the motion grows until creep forces saturate and flanges touch. Below it, down to a speed of
+An orbit begins where the lateral displacement is at its maximum, the amplitude. It is marched with a whole number of
+steps to the period, so that halving the step asks the same question again. Newton's method makes the state come back;
+besides state and period, either the amplitude or the speed is unknown. With a given amplitude, branches can be
+followed that stand upright over the speed or turn back.
+
+Floquet multipliers are those of the return map of the section without lateral rate: beyond 1 the orbit repels.
+
+Above the critical speed a motion grows until creep forces saturate and flanges touch. Below it, down to a speed of
 its own, a large disturbance may end in the same cycle: the branch then begins with cycles that repel.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from itertools import count
+from typing import Literal
 
 import numpy as np
 
-from models.core.errors import RunFailed
-from models.rail.equations import Equations, Y
-from models.rail.orbit import Orbit, beginning, branch, near, refined, solved
+from models.contact.inputs import Array
+from models.core.errors import InputError, RunFailed
+from models.rail.equations import ANGLE, STATES, Y_RATE, Equations, Path, Y
+from models.rail.linear import critical_speed
+from models.rail.wheelset import Wheelset
 
+Unknown = Literal["amplitude", "speed"]
+SIZES = np.array([1e-3, 1e-4, 1e-4, 1e-3, 1.0, 1e-2, 1e-2, 1e-2, 1e-2, 1.0])
+"""Of the states (m, rad, m/s, rad/s): what a difference of each is measured by."""
+CLOSED = 1e-9
+"""Largest difference of start and end, by SIZES, of a state that has come back."""
+SHIFT = 1e-2
+"""Of the sizes, of 1 m/s and the period: steps of the central differences that linearise the return, wide enough to
+reach over the kinks that cells of FASTSIM make where they begin to slide."""
+NEWTON, LEAST_GAIN = 15, 0.3
+"""Corrections at most; share of the difference that one may leave before the return is linearised anew."""
+ASIDE = 0.01
+"""Share by which a guess for other equations is displaced, so that they find the orbit by themselves."""
+HALVINGS = 5
+"""Of the way to the next amplitude, where Newton's method does not reach it at once."""
+RETURNS = [k for k in range(STATES) if k != ANGLE]
+"""States that must come back; the angle of spin does not."""
+SPEED, PERIOD = len(RETURNS), len(RETURNS) + 1
+"""Columns of the slopes after those of the states."""
+AMPLITUDE, RATE = RETURNS.index(Y), RETURNS.index(Y_RATE)
+STILL = [k for k in range(len(RETURNS)) if k != RATE]
+"""The section's coordinates."""
 NOTHING = 1e-5
 """Displacement (m) below which a motion has died out."""
 MARCH, MARCHES = 2.0, 20
@@ -25,6 +58,180 @@ INNER, OUTER = 12, 0.03
 """Amplitudes of a branch up to the clearance; step of those beyond, by the clearance."""
 LARGEST = 2.0
 """Amplitude at which a branch ends, by the clearance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """One periodic motion. state (10,) : at its maximum of y; period : s, of so many steps.
+
+    slopes (9, 11) : of the state after a period, the angle of spin left out, by the state before, the speed and the
+    period, by SIZES, 1 m/s and the period. error : change of the unknown by halving the step, frequency_error : Hz;
+    both NaN where it was not halved.
+    """
+
+    equations: Equations
+    state: Array
+    period: float
+    steps: int
+    slopes: Array
+    error: float = math.nan
+    frequency_error: float = math.nan
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return self.equations.speed
+
+    @property
+    def amplitude(self) -> float:
+        """Of the lateral displacement (m)."""
+        return float(self.state[Y])
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return 1.0 / self.period
+
+    @property
+    def multiplier(self) -> float:
+        """Largest magnitude of the Floquet multipliers."""
+        by_states, back = self.slopes[:, : len(RETURNS)], self.slopes[:, PERIOD]
+        returned = by_states - np.outer(back, by_states[RATE]) / back[RATE]
+        return float(np.abs(np.linalg.eigvals(returned[np.ix_(STILL, STILL)])).max())
+
+    @property
+    def stable(self) -> bool:
+        """Whether neighbouring motions come nearer."""
+        return self.multiplier < 1.0
+
+    def path(self) -> Path:
+        """One period, start and end included."""
+        return self.equations.run(self.state, self.period, self.period / self.steps)
+
+
+def near(equations: Equations, state: Array, period: float, step: float) -> Orbit:
+    """A guess for ``solved``: a state (10,) near a maximum of y and a period (s), in steps (s) of this size at most."""
+    start = state.copy()
+    start[Y_RATE] = 0.0
+    return _linearised(Orbit(equations, start, period, math.ceil(period / step), np.empty(0)))
+
+
+def beginning(equations: Equations, amplitude: float, step: float) -> Orbit:
+    """The orbit of a small amplitude (m), from the motion that neither grows nor decays by the equations' own law.
+
+    step : s, about. Raises NoCriticalSpeed if there is no such motion, RunFailed if it leads to no orbit, as where the
+    amplitude is so small that cells of FASTSIM begin to slide one by one.
+    """
+
+    def growth(_: Wheelset, speed: float) -> float:
+        return float(np.linalg.eigvals(replace(equations, speed=speed).state_matrix).real.max())
+
+    at = replace(equations, speed=critical_speed(equations.wheelset, growth))
+    values, vectors = np.linalg.eig(at.state_matrix)
+    k = np.where(values.imag > 0.0, values.real, -math.inf).argmax()
+    state = at.rest.copy()
+    state[RETURNS] += amplitude * (vectors[:, k] / vectors[AMPLITUDE, k]).real
+    return solved(near(at, state, 2.0 * math.pi / values[k].imag, step), "speed")
+
+
+def beside(orbit: Orbit, equations: Equations) -> Orbit:
+    """A guess for the same orbit by other equations: everything ASIDE farther from rest."""
+    rest = orbit.equations.rest
+    return replace(orbit, equations=equations, state=rest + (1.0 + ASIDE) * (orbit.state - rest))
+
+
+def branch(first: Orbit, amplitudes: Iterable[float]) -> Iterator[Orbit]:
+    """Orbits of one amplitude (m) after the other, each from the ones before; the speed of each is found.
+
+    Raises RunFailed where the branch cannot be followed.
+    """
+    before, last = replace(first, state=first.equations.rest), first
+    for amplitude in amplitudes:
+        before, last = last, _onwards(before, last, amplitude, HALVINGS)
+        yield last
+
+
+def _onwards(before: Orbit, last: Orbit, amplitude: float, halvings: int) -> Orbit:
+    """The orbit of an amplitude along the straight line through two orbits, in smaller steps if need be."""
+    way = last.amplitude - before.amplitude
+    share = (amplitude - last.amplitude) / way
+    state = last.state + share * (last.state - before.state)
+    state[Y] = amplitude
+    ahead = replace(last.equations, speed=last.speed + share * (last.speed - before.speed))
+    guess = replace(last, equations=ahead, state=state, period=last.period + share * (last.period - before.period))
+    try:
+        return solved(guess, "speed")
+    except RunFailed:
+        if halvings == 0:
+            raise
+    middle = _onwards(before, last, (last.amplitude + amplitude) / 2.0, halvings - 1)
+    return _onwards(last, middle, amplitude, halvings - 1)
+
+
+def solved(guess: Orbit, unknown: Unknown, *, precise: bool = True) -> Orbit:
+    """The orbit near a guess, with the speed or the amplitude of the guess, and its slopes if it is to be precise.
+
+    The slopes of the guess lead there as long as they do; what is asked of the orbit is that it comes back.
+    Raises RunFailed if none is found.
+    """
+    orbit, fresh, left = guess, False, math.inf
+    for _ in range(NEWTON):
+        try:
+            end = _end(orbit.equations, orbit.state, orbit.period, orbit.steps)
+        except (InputError, RunFailed):  # a correction that led away: off the track, to a speed or period that is none
+            break
+        missed = ((end - orbit.state) / SIZES)[RETURNS]
+        size = float(np.abs(missed).max())
+        if size < CLOSED:
+            return orbit if fresh or not precise else _linearised(orbit)
+        if not fresh and size > LEAST_GAIN * left:
+            orbit, fresh = _linearised(orbit), True
+        orbit, left, fresh = _corrected(orbit, missed, unknown), size, False
+    raise RunFailed("wheelset", f"no periodic motion was found near {guess.speed:.6g} m/s and {guess.amplitude:.3g} m")
+
+
+def refined(orbit: Orbit, unknown: Unknown) -> Orbit:
+    """The orbit at half the step, with the changes that halving made."""
+    half = solved(replace(orbit, steps=2 * orbit.steps), unknown, precise=False)
+    return replace(
+        half,
+        error=abs(getattr(half, unknown) - getattr(orbit, unknown)),
+        frequency_error=abs(half.frequency - orbit.frequency),
+    )
+
+
+def _end(equations: Equations, state: Array, period: float, steps: int) -> Array:
+    return equations.run(state, period, period / steps, steps).states[-1]
+
+
+def _linearised(orbit: Orbit) -> Orbit:
+    """The orbit with its own slopes."""
+    eq, T, n, state, signs = orbit.equations, orbit.period, orbit.steps, orbit.state, (-1.0, 1.0)
+    ends = [
+        *([_end(eq, state + sign * SHIFT * SIZES[k] * np.eye(STATES)[k], T, n) for sign in signs] for k in RETURNS),
+        [_end(replace(eq, speed=eq.speed + sign * SHIFT), state, T, n) for sign in signs],
+        [_end(eq, state, T * (1.0 + sign * SHIFT), n) for sign in signs],
+    ]
+    columns = [((after - before) / (2.0 * SHIFT * SIZES))[RETURNS] for before, after in ends]
+    return replace(orbit, slopes=np.array(columns).T)
+
+
+def _corrected(orbit: Orbit, missed: Array, unknown: Unknown) -> Orbit:
+    """One correction by the slopes; the lateral rate stays zero."""
+    returned = orbit.slopes.copy()
+    returned[:, : len(RETURNS)] -= np.eye(len(RETURNS))
+    free = [k for k in STILL if k != AMPLITUDE]
+    columns = [*free, AMPLITUDE if unknown == "amplitude" else SPEED, PERIOD]
+    *section, change, longer = -np.linalg.solve(returned[:, columns], missed)
+    state, speed = orbit.state.copy(), orbit.speed
+    places = [RETURNS[k] for k in free]
+    state[places] += section * SIZES[places]
+    if unknown == "amplitude":
+        state[Y] += change * SIZES[Y]
+    else:
+        speed += change
+    period = orbit.period * (1.0 + longer)
+    return replace(orbit, equations=replace(orbit.equations, speed=speed), state=state, period=period)
 
 
 def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -> Orbit | None:
@@ -46,7 +253,7 @@ def attained(equations: Equations, *, start: float = 5e-3, step: float = 5e-4) -
     raise RunFailed("wheelset", f"no steady motion within {MARCHES * MARCH:g} s at {equations.speed:.6g} m/s")
 
 
-def maxima(values: np.ndarray) -> np.ndarray:
+def maxima(values: Array) -> np.ndarray:
     """Places of the positive maxima."""
     before, here, after = values[:-2], values[1:-1], values[2:]
     return 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.0))
@@ -59,7 +266,13 @@ def bifurcation(equations: Equations, slowest: float, fastest: float, step: floa
     NoCriticalSpeed if no branch begins, RunFailed where it cannot be followed.
     """
     clearance = equations.wheelset.flange_clearance
-    first = _first(equations, clearance, step)
+    for share in FIRST:
+        try:
+            first = beginning(equations, share * clearance, step)
+            break
+        except RunFailed:
+            if share == FIRST[-1]:
+                raise
     inner = np.linspace(first.amplitude, clearance, INNER)[1:]
     outer = (clearance * (1.0 + OUTER * k) for k in count(1))
     yield refined(first, "speed")
@@ -69,12 +282,3 @@ def bifurcation(equations: Equations, slowest: float, fastest: float, step: floa
                 return
             first = orbit
             yield refined(orbit, "speed")
-
-
-def _first(equations: Equations, clearance: float, step: float) -> Orbit:
-    for share in FIRST:
-        try:
-            return beginning(equations, share * clearance, step)
-        except RunFailed as error:
-            failed = error
-    raise failed

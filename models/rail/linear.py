@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.core.errors import InputError
 from models.rail.wheelset import Wheelset
@@ -54,12 +55,12 @@ class NoCriticalSpeed(InputError):
 class Linear:
     """M q'' + D q' + K q = 0 for q = (y, psi); each (2, 2), SI units."""
 
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
+    mass: Array
+    damping: Array
+    stiffness: Array
 
     @property
-    def state_matrix(self) -> np.ndarray:
+    def state_matrix(self) -> Array:
         """A (4, 4) of the state (y, psi, y', psi')."""
         rates = -np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
         return np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), rates])
@@ -71,7 +72,7 @@ def klingel(wheelset: Wheelset) -> float:
     return 2.0 * math.pi * math.sqrt(r * b * b / (wheelset.conicity * (b + head * wheelset.slant[0])))
 
 
-def kalker(wheelset: Wheelset) -> np.ndarray:
+def kalker(wheelset: Wheelset) -> Array:
     """Forces (3, 3) by creepages: (-fx, -fy, -mz) of one wheel by (xi_x, xi_y, spin); N, N m, N m^2."""
     contact, pair = wheelset.ellipse, wheelset.pair
     c, area = coefficients(contact.a / contact.b, pair.nu), contact.a * contact.b
@@ -85,37 +86,31 @@ def matrices(wheelset: Wheelset, speed: float) -> Linear:
         raise InputError("", "speed", speed, "must be a speed above 0, in m/s")
     w, creep = wheelset, kalker(wheelset)
     gyroscopic = w.tilt * w.spin_inertia * speed / w.radius
-    damping, stiffness = _suspension(w)
+    arm = w.half_spacing**2  # of the suspension; roll goes with the lateral displacement
+    damping = 2.0 * np.diag([w.damping_y + w.damping_z * arm * w.tilt**2, w.damping_x * arm])
+    stiffness = 2.0 * np.diag([w.stiffness_y + w.stiffness_z * arm * w.tilt**2, w.stiffness_x * arm])
     damping += np.array([[0.0, -gyroscopic], [gyroscopic, 0.0]])
-    stiffness += _gravity(w)
+    stiffness += gravity(w)
     for motion, place in _contacts(w):
         damping += motion.T @ creep @ motion / speed
         stiffness += motion.T @ creep @ place
     return Linear(np.diag([w.mass + w.yaw_inertia * w.tilt**2, w.yaw_inertia]), damping, stiffness)
 
 
-def _contacts(w: Wheelset) -> list[tuple[np.ndarray, np.ndarray]]:
+def _contacts(w: Wheelset) -> list[tuple[Array, Array]]:
     """Creepages (3) of the right and the left wheel by (y', psi') / V and by (y, psi), (3, 2) each."""
     cosine, b = w.slant[1], w.half_gauge
     across = b / (b - w.conicity * w.radius) / cosine
-    found = []
-    for side in (1.0, -1.0):
-        motion = np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]])
-        place = np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]])
-        found.append((motion, place))
-    return found
+    return [
+        (
+            np.array([[0.0, -side * b], [across, 0.0], [0.0, cosine]]),
+            np.array([[-side * w.equivalent_conicity / w.radius, 0.0], [0.0, -1.0 / cosine], [0.0, 0.0]]),
+        )
+        for side in (1.0, -1.0)
+    ]
 
 
-def _suspension(w: Wheelset) -> tuple[np.ndarray, np.ndarray]:
-    """Damping and stiffness of the primary suspension; roll goes with the lateral displacement."""
-    arm = w.half_spacing**2
-    return tuple(
-        2.0 * np.diag([y + z * arm * w.tilt**2, x * arm])
-        for x, y, z in ((w.damping_x, w.damping_y, w.damping_z), (w.stiffness_x, w.stiffness_y, w.stiffness_z))
-    )  # type: ignore[return-value]
-
-
-def _gravity(w: Wheelset) -> np.ndarray:
+def gravity(w: Wheelset) -> Array:
     """Stiffness of the load, which rises with y and sinks with yaw."""
     b, c = w.half_gauge, w.conicity
     rise = 2.0 * w.tilt + (c * b + w.radius + w.head_radius / w.slant[1]) * w.tilt**2
@@ -125,8 +120,7 @@ def _gravity(w: Wheelset) -> np.ndarray:
 def kinematic_wavelength(wheelset: Wheelset) -> float:
     """Wavelength (m) by the eigenvalues of creep forces alone: no inertia, no suspension, no weight."""
     creep = kalker(wheelset)
-    motion = sum(m.T @ creep @ m for m, _ in _contacts(wheelset))
-    place = sum(m.T @ creep @ p for m, p in _contacts(wheelset))
+    motion, place = (sum(pair[0].T @ creep @ pair[k] for pair in _contacts(wheelset)) for k in (0, 1))
     values = np.linalg.eigvals(-np.linalg.solve(motion, place))
     return float(2.0 * math.pi / np.abs(values.imag).max())
 
@@ -151,3 +145,13 @@ def critical_speed(wheelset: Wheelset, growth: Callable[[Wheelset, float], float
             return float(brentq(lambda v: growth(wheelset, v), below, speed, xtol=PRECISION * speed, rtol=PRECISION))
         below = speed
     raise NoCriticalSpeed(unstable=False)
+
+
+def critical_or_why(
+    wheelset: Wheelset, growth: Callable[[Wheelset, float], float] = growth
+) -> tuple[float | None, str]:
+    """The critical speed (m/s), or why there is none, as words that follow "the wheelset"."""
+    try:
+        return critical_speed(wheelset, growth), ""
+    except NoCriticalSpeed as error:
+        return None, str(error.allowed)

@@ -1,12 +1,13 @@
 """A wheelset on profiles at rest on smooth rails, held sideways: heights, loads, and the cones that steer alike."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import root
 
+from models.contact.inputs import Array, quantity
 from models.core.errors import InputError, RunFailed
-from models.rail.contact_table import equivalent_conicity
 from models.rail.profile_contact import ACROSS, ALONG, DEPTH, N_Z, TOUCH, X_, Z_, pressed
 from models.rail.wheel_forces import MODULUS, contact_points, numbers, patches
 from models.rail.wheelset import Wheelset
@@ -25,10 +26,10 @@ class Held:
 
     z: float
     roll: float
-    touches: np.ndarray
-    loads: np.ndarray
+    touches: Array
+    loads: Array
 
-    def radii(self) -> np.ndarray:
+    def radii(self) -> Array:
         """Rolling radius (2,) of the right and the left wheel, the mean of its patches by their loads (m)."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
         places = self.touches[:, X_ : Z_ + 1]
@@ -44,24 +45,24 @@ def held(wheelset: Wheelset, shift: float) -> Held:
     """
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
-    given, half = numbers(wheelset), 0.5 * wheelset.load
+    contact, half = numbers(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
-    def found(unknown: np.ndarray) -> Held:
-        touches = np.zeros((patches(given), TOUCH))
+    def pose(unknown: Array) -> Held:
+        touches = np.zeros((patches(contact), TOUCH))
         here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
-        contact_points(shift, *here, 0.0, given, touches)
-        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], given[MODULUS])[0] for touch in touches])
+        contact_points(shift, *here, 0.0, contact, touches)
+        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], contact[MODULUS])[0] for touch in touches])
         return Held(*here, touches, loads)
 
-    def off(unknown: np.ndarray) -> np.ndarray:
-        one = found(unknown)
-        return (one.loads * one.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
+    def off(unknown: Array) -> Array:
+        now = pose(unknown)
+        return (now.loads * now.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
 
     solved = root(off, [5.0, 0.0], tol=1e-14)
     if np.abs(solved.fun).max() > PRECISION:
         raise RunFailed("wheelset", f"no height was found at which both wheels carry their load at y = {shift:g} m")
-    return found(solved.x)
+    return pose(solved.x)
 
 
 def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
@@ -69,3 +70,19 @@ def steering_cones(wheelset: Wheelset, amplitude: float) -> Wheelset:
     shifts = np.linspace(0.0, amplitude, SHIFTS + 1)
     differences = np.array([0.0, *(-np.diff(held(wheelset, float(shift)).radii())[0] for shift in shifts[1:])])
     return wheelset.coned(equivalent_conicity(shifts, differences, amplitude)).changed(profiles=None)
+
+
+def equivalent_conicity(shifts: Array, differences: Array, amplitude: float) -> float:
+    """Conicity of the cones whose first harmonic is that of profiles moving sideways as amplitude (m) times a sine.
+
+    shifts : (n,) m, ascending, from -amplitude to amplitude at least, or from 0 on for profiles alike on both sides;
+    differences : (n,) of the rolling radii (m), right less left.
+    """
+    shifts, differences = np.asarray(shifts, float), np.asarray(differences, float)
+    if shifts[0] == 0.0:
+        shifts = np.concatenate([-shifts[:0:-1], shifts])
+        differences = np.concatenate([-differences[:0:-1], differences])
+    quantity("amplitude", amplitude, f"an amplitude in m, above 0 and up to {shifts[-1]:g}", 1e-9, shifts[-1])
+    phase = 2.0 * math.pi * (np.arange(720) + 0.5) / 720
+    values = np.interp(amplitude * np.sin(phase), shifts, differences)
+    return float((values * np.sin(phase)).mean() / amplitude)

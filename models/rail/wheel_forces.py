@@ -25,6 +25,7 @@ import numpy as np
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
 from models.contact.fastsim_many import SPIN, XI_X, forces
+from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean, njit
@@ -72,6 +73,17 @@ across the track (m/s), elastic normal force (N), lateral force of a cone's flan
 BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
 
 
+class Rails(NamedTuple):
+    """What wheels roll on, and by which law: ``numbers`` of the contact; strips, cells and middle of FASTSIM's ``net``;
+    law : LINEAR or FASTSIM."""
+
+    numbers: Array
+    strips: Array
+    cells: Array
+    middle: float
+    law: int
+
+
 class Room(NamedTuple):
     """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
 
@@ -79,40 +91,62 @@ class Room(NamedTuple):
     first to last, contacts (patches, 10), motion (patches, MOVED), creep forces found (patches, 4) and other ones.
     """
 
-    vectors: np.ndarray
-    touches: np.ndarray
-    contacts: np.ndarray
-    motion: np.ndarray
-    other: np.ndarray
-    found: np.ndarray
+    vectors: Array
+    touches: Array
+    contacts: Array
+    motion: Array
+    other: Array
+    found: Array
 
 
-def numbers(wheelset: Wheelset) -> np.ndarray:
+class Place(NamedTuple):
+    """Normal into the rail, and place from the wheelset's centre in the track's axes (m)."""
+
+    n_y: float
+    n_z: float
+    x: float
+    y: float
+    z: float
+
+
+class Motion(NamedTuple):
+    """Of a patch: slip along, velocity across the track, slip across (m/s), turning about the normal (1/s), speed of
+    approach (m/s)."""
+
+    vx: float
+    vy: float
+    aside: float
+    turn: float
+    rate: float
+
+
+class Pressed(NamedTuple):
+    """Penetration and semi-axes of a patch (m); elastic normal force, the same with damping, and lateral force of a
+    cone's flange (N)."""
+
+    depth: float
+    a: float
+    b: float
+    elastic: float
+    load: float
+    push: float
+
+
+def numbers(wheelset: Wheelset) -> Array:
     """The contact's numbers, in the order above: (11,), or more for profiles."""
     w, pair = wheelset, wheelset.pair
-    found = [
-        w.radius,
-        w.half_gauge,
-        w.conicity,
-        w.head_radius,
-        pair.modulus,
-        pair.G,
-        pair.nu,
-        w.friction,
-        w.contact_damping,
-        w.flange_clearance,
-        w.flange_stiffness,
-    ]
-    return np.concatenate((found, profile_numbers(w.profiles, w.radius))) if w.profiles else np.array(found)
+    shape = [w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu]
+    forces = [w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness]
+    return np.concatenate((shape, forces, profile_numbers(w.profiles, w.radius) if w.profiles else []))
 
 
-def net(wheelset: Wheelset, cells: int = 21) -> tuple[np.ndarray, np.ndarray, float]:
-    """FASTSIM's net for the ellipse of the wheelset at rest: strips, cells, middle (see ``fastsim_grid``)."""
+def rails_of(wheelset: Wheelset, law: str, cells: int) -> Rails:
+    """The rails under a wheelset, with FASTSIM's net for its ellipse at rest (see ``fastsim_grid``)."""
     if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
         raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
     ellipse = wheelset.ellipse
-    found = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
-    return found.strips, found.cells, found.middle
+    net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
+    return Rails(numbers(wheelset), net.strips, net.cells, net.middle, LAWS[law])
 
 
 @lean
@@ -140,20 +174,20 @@ def contact_points(y, z, roll, yaw, p, touches):
     """Fill ``touches`` (patches, TOUCH), the right wheel's first; without a normal where nothing is near."""
     each = len(touches) // 2
     for k in range(2):
-        side, own = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
+        side, wheel = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
         if p.size > NUMBERS:
-            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], p[MODULUS], own)
+            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], p[MODULUS], wheel)
             continue
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(
             side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]
         )
-        touch = own[0]
+        touch = wheel[0]
         touch[DEEP], touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_] = depth, n_y, n_z, cx, cy, cz
         touch[ALONG], touch[ACROSS] = _along(rolling, p[CONICITY]), 0.5 / p[HEAD]
 
 
 @njit(cache=True, error_model="numpy")
-def carried(z, p):
+def carries(z, p):
     """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
     touches, whole = np.zeros((patches(p), TOUCH)), 0.0
     contact_points(0.0, z, 0.0, 0.0, p, touches)
@@ -175,35 +209,35 @@ def _linear(a, b, x, y, spin, shear, poisson):
 
 
 @inlined
-def _one_way(sign, contacts, slip, speed, p, strips, cells, middle, law, found):
+def _one_way(sign, contacts, slip, speed, rails, found):
     """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
     for k in range(len(contacts)):
         contacts[k, XI_X] = sign * slip[k, VX] / max(abs(speed), REGULAR)
         contacts[k, XI_X + 1] = slip[k, ASIDE] / max(abs(speed), REGULAR)
         contacts[k, SPIN] = sign * slip[k, TURN] / max(abs(speed), REGULAR)
-    if law == FASTSIM:
-        forces(contacts, strips, cells, middle, BLEND, ORDER, found)
+    if rails.law == FASTSIM:
+        forces(contacts, rails.strips, rails.cells, rails.middle, BLEND, ORDER, found)
     else:
+        shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
         for k in range(len(contacts)):
-            found[k, 0], found[k, 1], found[k, 2] = _linear(
+            a, b, x, y, spin = (
                 contacts[k, 0],
                 contacts[k, 1],
                 contacts[k, XI_X],
                 contacts[k, XI_X + 1],
                 contacts[k, SPIN],
-                p[SHEAR],
-                p[POISSON],
             )
+            found[k, 0], found[k, 1], found[k, 2] = _linear(a, b, x, y, spin, shear, poisson)
 
 
 @lean
-def _both_ways(forwards, contacts, slip, speed, p, strips, cells, middle, law, some, found):
+def _both_ways(forwards, contacts, slip, speed, rails, some, found):
     """Fill fx, fy, mz of wheels that roll forwards by a share, with ``some`` as room."""
     found[:] = 0.0
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
-            _one_way(sign, contacts, slip, speed, p, strips, cells, middle, law, some)
+            _one_way(sign, contacts, slip, speed, rails, some)
             for k in range(len(contacts)):
                 found[k, 0] += share * sign * some[k, 0]
                 found[k, 1] += share * some[k, 1]
@@ -211,119 +245,76 @@ def _both_ways(forwards, contacts, slip, speed, p, strips, cells, middle, law, s
 
 
 @inlined
-def creep(contacts, slip, speed, p, strips, cells, middle, law, some, found):
+def creep(contacts, slip, speed, rails, some, found):
     """Fill fx, fy, mz of contacts (n, 10) from their slip, the first columns of their motion (n, MOVED).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image. ``some``,
     of the shape of ``found`` (n, 4), is written over.
     """
-    if law == FASTSIM:
+    if rails.law == FASTSIM:
+        shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
         for contact in contacts:
-            contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], p[SHEAR], p[POISSON])
+            contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], shear, poisson)
     if speed >= REGULAR:
-        _one_way(1.0, contacts, slip, speed, p, strips, cells, middle, law, found)
+        _one_way(1.0, contacts, slip, speed, rails, found)
     else:
-        forwards = max(0.0, 0.5 + 0.5 * speed / REGULAR)
-        _both_ways(forwards, contacts, slip, speed, p, strips, cells, middle, law, some, found)
+        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, some, found)
 
 
 @inlined
-def wheel_forces(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room):
+def wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room):
     """Add what both rails do to the wheelset to ``force`` and ``moment`` (3,), about its centre, in the track's axes.
 
     y, z : of the wheelset's centre (m), roll, yaw : rad; velocity (3,) : of the centre in the track, the speed of
     travel first (m/s); turning (3,) : angular velocity, spin about the axle included, in the track's axes (rad/s);
-    p : ``numbers``; strips, cells, middle : ``net``; law : LINEAR or FASTSIM; report (patches, REPORTED) is filled, or
-    has no rows where nobody asks; room : written over.
+    report (patches, REPORTED) is filled, or has no rows where nobody asks; room : written over.
     """
-    if law == LINEAR and p.size == NUMBERS and velocity[0] >= REGULAR:
-        _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report)
+    if rails.law == LINEAR and rails.numbers.size == NUMBERS and velocity[0] >= REGULAR:
+        _linear_cones(y, z, roll, yaw, velocity, turning, rails.numbers, force, moment, report)
     else:
-        _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room)
+        patch_by_patch(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room)
 
 
 @inlined
 def _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report):
-    """``_patch_by_patch`` of cones with the linear law, rolling forwards: nothing is written down in between."""
+    """``patch_by_patch`` of cones with the linear law, rolling forwards: nothing is written down in between."""
     speed, radius, gauge, cone, head = velocity[0], p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]  # read once
     modulus, shear, poisson, damping = p[MODULUS], p[SHEAR], p[POISSON], p[DAMPING]
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, radius, gauge, cone, head)
-        vx, vy, aside, turn, rate = _moving(n_y, n_z, cx, cy, cz, velocity, turning)
+        place = Place(n_y, n_z, cx, cy, cz)
+        motion = _moving(place, velocity, turning)
         elastic, a, b = pressed(depth, _along(rolling, cone), 0.5 / head, modulus)
-        fx, fy, mz = _linear(a, b, vx / speed, aside / speed, turn / speed, shear, poisson)
-        load, push = elastic * max(0.0, 1.0 + damping * rate), _flange(side, y, p)
-        _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
+        creeping = _linear(a, b, motion.vx / speed, motion.aside / speed, motion.turn / speed, shear, poisson)
+        load = elastic * max(0.0, 1.0 + damping * motion.rate)
+        press = Pressed(depth, a, b, elastic, load, _flange(side, y, p))
+        _act(place, press, creeping, force, moment)
         if len(report) > 0:
-            _tell(
-                n_y,
-                n_z,
-                cx,
-                cy,
-                cz,
-                depth,
-                a,
-                b,
-                load,
-                push,
-                vx,
-                vy,
-                aside,
-                turn,
-                rate,
-                elastic,
-                fx,
-                fy,
-                mz,
-                speed,
-                report[0 if side == RIGHT else 1],
-            )
+            _tell(place, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
 
 
 @lean
-def _patch_by_patch(y, z, roll, yaw, velocity, turning, p, strips, cells, middle, law, force, moment, report, room):
+def patch_by_patch(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room):
     """``wheel_forces`` of all patches, laws and directions."""
-    touches, contacts, motion, n, some = room.touches, room.contacts, room.motion, len(room.touches), 0
+    touches, contacts, motions, n, some = room.touches, room.contacts, room.motion, len(room.touches), 0
+    p = rails.numbers
     contact_points(y, z, roll, yaw, p, touches)
     for k in range(n):
         if touches[k, N_Z] != 0.0 or touches[k, N_Y] != 0.0:
             push = _flange(RIGHT if 2 * k < n else LEFT, y, p) if p.size == NUMBERS else 0.0
-            _press(touches[k], velocity, turning, p, push, contacts[some], motion[some])
-            motion[some, PATCH], some = k, some + 1
-    creep(
-        contacts[:some], motion[:some], velocity[0], p, strips, cells, middle, law, room.other[:some], room.found[:some]
-    )
+            _press(touches[k], velocity, turning, p, push, contacts[some], motions[some])
+            motions[some, PATCH], some = k, some + 1
+    creep(contacts[:some], motions[:some], velocity[0], rails, room.other[:some], room.found[:some])
     report[:] = 0.0
     for i in range(some):
-        k = int(motion[i, PATCH])
-        n_y, n_z, cx, cy, cz = touches[k, N_Y], touches[k, N_Z], touches[k, X_], touches[k, Y_], touches[k, Z_]
-        a, b, load, push = contacts[i, 0], contacts[i, 1], contacts[i, 2], motion[i, PUSH]
-        fx, fy, mz = room.found[i, 0], room.found[i, 1], room.found[i, 2]
-        _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment)
+        k, contact, m = int(motions[i, PATCH]), contacts[i], motions[i]
+        place, depth = _place(touches[k]), touches[k, DEEP]
+        press = Pressed(depth, contact[0], contact[1], m[ELASTIC], contact[2], m[PUSH])
+        creeping = room.found[i, 0], room.found[i, 1], room.found[i, 2]
+        _act(place, press, creeping, force, moment)
         if len(report) > 0:
-            _tell(
-                n_y,
-                n_z,
-                cx,
-                cy,
-                cz,
-                touches[k, DEEP],
-                a,
-                b,
-                load,
-                push,
-                motion[i, VX],
-                motion[i, VY],
-                motion[i, ASIDE],
-                motion[i, TURN],
-                motion[i, RATE],
-                motion[i, ELASTIC],
-                fx,
-                fy,
-                mz,
-                velocity[0],
-                report[k],
-            )
+            motion = Motion(m[VX], m[VY], m[ASIDE], m[TURN], m[RATE])
+            _tell(place, motion, press, creeping, velocity[0], report[k])
 
 
 @inlined
@@ -339,29 +330,38 @@ def _flange(side, y, p):
 
 
 @inlined
-def _moving(n_y, n_z, cx, cy, cz, velocity, turning):
-    """Slip along, velocity across the track, slip across, turning about the normal, speed of approach of a patch."""
+def _place(touch):
+    """``Place`` of a touch (TOUCH,)."""
+    return Place(touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_])
+
+
+@inlined
+def _moving(place, velocity, turning):
+    """``Motion`` of a patch."""
+    n_y, n_z, cx, cy, cz = place
     vx = velocity[0] + turning[1] * cz - turning[2] * cy
     vy = velocity[1] + turning[2] * cx - turning[0] * cz
     vz = velocity[2] + turning[0] * cy - turning[1] * cx
-    return vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz
+    return Motion(vx, vy, n_z * vy - n_y * vz, turning[1] * n_y + turning[2] * n_z, n_y * vy + n_z * vz)
 
 
 @inlined
 def _press(touch, velocity, turning, p, push, contact, motion):
     """Kinematics and normal force of one patch: its contact (10,) for the creep law, its motion (MOVED,)."""
-    vx, vy, aside, turn, rate = _moving(touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_], velocity, turning)
+    moving = _moving(_place(touch), velocity, turning)
     elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
-    motion[VX], motion[ASIDE], motion[TURN] = vx, aside, turn
-    motion[RATE], motion[VY], motion[ELASTIC], motion[PUSH] = rate, vy, elastic, push
+    motion[VX], motion[VY], motion[ASIDE], motion[TURN], motion[RATE] = moving
+    motion[ELASTIC], motion[PUSH] = elastic, push
     contact[0], contact[1], contact[3] = a, b, p[FRICTION]
-    contact[2] = elastic * max(0.0, 1.0 + p[DAMPING] * rate)
+    contact[2] = elastic * max(0.0, 1.0 + p[DAMPING] * moving.rate)
 
 
 @inlined
-def _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment):
+def _act(place, press, creeping, force, moment):
     """Add one patch's forces to force and moment."""
-    across, down = n_z * fy - n_y * load + push, -n_y * fy - n_z * load
+    n_y, n_z, cx, cy, cz = place
+    fx, fy, mz = creeping
+    across, down = n_z * fy - n_y * press.load + press.push, -n_y * fy - n_z * press.load
     force[0] += fx
     force[1] += across
     force[2] += down
@@ -371,12 +371,16 @@ def _act(n_y, n_z, cx, cy, cz, load, push, fx, fy, mz, force, moment):
 
 
 @lean
-def _tell(n_y, n_z, cx, cy, cz, depth, a, b, load, push, vx, vy, aside, turn, rate, elastic, fx, fy, mz, speed, report):
+def _tell(place, motion, press, creeping, speed, report):
     """Fill one patch's report."""
-    report[LOAD], report[FX], report[FY], report[MZ] = load, fx, fy, mz
+    fx, fy, mz = creeping
+    vx, vy, aside, turn, rate = motion
+    report[LOAD], report[FX], report[FY], report[MZ] = press.load, fx, fy, mz
     by = max(abs(speed), REGULAR)
     report[XI_1], report[XI_2], report[XI_3] = vx / by, aside / by, turn / by
-    report[A], report[B], report[DEPTH], report[ANGLE] = a, b, depth, math.atan2(-n_y, n_z)
+    report[A], report[B], report[DEPTH] = press.a, press.b, press.depth
+    report[ANGLE] = math.atan2(-place.n_y, place.n_z)
     report[POWER] = fx * vx + fy * aside + mz * turn
-    report[PLACE_X], report[PLACE_Y], report[PLACE_Z], report[FLANGE_FORCE] = cx, cy, cz, push
-    report[ELASTIC_POWER], report[DAMPING_POWER] = push * vy - elastic * rate, (elastic - load) * rate
+    report[PLACE_X], report[PLACE_Y], report[PLACE_Z], report[FLANGE_FORCE] = place.x, place.y, place.z, press.push
+    report[ELASTIC_POWER] = press.push * vy - press.elastic * rate
+    report[DAMPING_POWER] = (press.elastic - press.load) * rate

@@ -1,11 +1,15 @@
-"""Where the spectator stands, and what a surface looks like from there."""
+"""Where the spectator stands, and what a surface looks like from there: triangles to pixels.
 
+The nearest surface wins at every pixel; colours run straight between corners.
+"""
+
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from studies.pictures.raster import halved, paint
+from models.machine.compiled import njit
 from studies.pictures.shapes import Surface
 
 NEAREST = 0.05
@@ -71,18 +75,62 @@ def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int
             veil, front = image.copy(), nearest.copy()
             paint(*_shaded(camera, [surface], width, height, sky[1]), veil, front)
             image += np.float32(surface.alpha) * (veil - image)
-    return halved(image)
+    return (image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]) / 4.0  # smooth edges
 
 
 def _shaded(
     camera: Camera, surfaces: list[Surface], width: int, height: int, haze: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What ``paint`` takes, of the triangles that lie before the eye."""
-    corners, near = camera.seen(np.concatenate([one.corners for one in surfaces]), 2 * width, 2 * height)
-    normals = np.concatenate([one.normals for one in surfaces])
-    colours = np.repeat([one.colour for one in surfaces], [len(one.corners) for one in surfaces], axis=0)
+    corners, near = camera.seen(np.concatenate([surface.corners for surface in surfaces]), 2 * width, 2 * height)
+    normals = np.concatenate([surface.normals for surface in surfaces])
+    sizes = [len(surface.corners) for surface in surfaces]
+    colours = np.repeat([surface.colour for surface in surfaces], sizes, axis=0)
     kept = ((near > 0.0) & (near < 1.0 / NEAREST)).all(axis=1)
     towards = LIGHT @ camera.axes / np.linalg.norm(LIGHT)
     light = DIM + (1.0 - DIM) * (0.5 + 0.5 * normals[kept] @ towards)
     clear = np.exp(-1.0 / (HAZE * near[kept]))[..., None]
     return corners[kept], near[kept], clear * light[..., None] * colours[kept, None] + (1.0 - clear) * haze
+
+
+@njit(cache=True, error_model="numpy")
+def within(start, growth, left, right):
+    """The part of columns from ``left`` to ``right`` in which start + column * growth is not negative."""
+    if growth > 0.0:
+        return max(left, -start / growth), right
+    if growth < 0.0:
+        return left, min(right, -start / growth)
+    return left, right if start >= 0.0 else left - 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def paint(corners, near, colours, image, nearest):
+    """Paint triangles into ``image`` (h, w, 3) where they lie before what is in ``nearest`` (h, w) already.
+
+    corners (m, 3, 2) : pixels, x to the right, y down; near (m, 3) : inverse distances (1/m), which are linear in
+    pixels; colours (m, 3, 3) : red, green, blue from 0 to 1 at each corner.
+    """
+    height, width = nearest.shape
+    for k in range(len(corners)):
+        x0, y0 = corners[k, 0]
+        x1, y1 = corners[k, 1]
+        x2, y2 = corners[k, 2]
+        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        if area == 0.0:
+            continue
+        top, bottom = max(0, math.ceil(min(y0, y1, y2))), min(height - 1, math.floor(max(y0, y1, y2)))
+        for row in range(top, bottom + 1):
+            # Shares of corners 1 and 2 at column 0, and their growth from column to column.
+            one, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
+            two, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
+            left, right = within(one, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
+            left, right = within(two, two_on, left, right)
+            left, right = within(1.0 - one - two, -one_on - two_on, left, right)
+            for column in range(math.ceil(left), math.floor(right) + 1):
+                b, c = one + column * one_on, two + column * two_on
+                a = 1.0 - b - c
+                here = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
+                if here > nearest[row, column]:
+                    nearest[row, column] = here
+                    for i in range(3):
+                        image[row, column, i] = a * colours[k, 0, i] + b * colours[k, 1, i] + c * colours[k, 2, i]

@@ -1,10 +1,11 @@
-"""What can be drawn: the motion that an engine reports, and the stage that it happens on.
+"""What can be drawn: the motion that an engine reports, as it computes poses itself, and the stage of it.
 
 Axes are those of the run, whatever they are; the camera's ``up`` says where up is. Lengths in m, forces in N.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,7 +88,43 @@ class Stage:
 
 def gaps(one: Motion, two: Motion) -> tuple[float, float, float]:
     """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
-    places = max(float(np.abs(one.places[name] - two.places[name]).max()) for name in one.places)
-    turns = max(float(np.abs(one.turns[name] - two.turns[name]).max()) for name in one.turns)
-    forces = [float(np.abs(a.vectors - b.vectors).max()) for a, b in zip(one.arrows, two.arrows, strict=True)]
-    return places, turns, max(forces, default=0.0)
+    places = [(place, two.places[name]) for name, place in one.places.items()]
+    turns = [(turn, two.turns[name]) for name, turn in one.turns.items()]
+    forces = [(a.vectors, b.vectors) for a, b in zip(one.arrows, two.arrows, strict=True)]
+    largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))
+    return next(largest), next(largest), next(largest)
+
+
+Poses = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
+"""Places (f, 3) in m and turns (f, 3, 3), space from body, of each body by its name."""
+
+
+def of_mujoco(model: Any, bodies: Mapping[str, int], coordinates: np.ndarray) -> Poses:
+    """Poses by ``mj_kinematics`` at ``qpos`` (f, nq); ``bodies`` are MuJoCo's numbers of them."""
+    import mujoco
+
+    data, frames = mujoco.MjData(model), []
+    for data.qpos[:] in coordinates:
+        mujoco.mj_kinematics(model, data)
+        frames.append([(data.xpos[i].copy(), data.xmat[i].copy()) for i in bodies.values()])
+    return _poses(frames, bodies)
+
+
+def of_exudyn(mbs: Any, bodies: Mapping[str, Callable[[Any], Any]], coordinates: np.ndarray) -> Poses:
+    """Poses at Exudyn's coordinates (f, n), in its own order; ``bodies`` answer for an output variable of Exudyn."""
+    import exudyn as exu
+
+    kinds, frames = exu.OutputVariableType, []
+    for row in coordinates:
+        mbs.systemData.SetODE2Coordinates(row)
+        frames.append([(ask(kinds.Position), ask(kinds.RotationMatrix)) for ask in bodies.values()])
+    return _poses(frames, bodies)
+
+
+def _poses(frames: list[list[tuple[Any, Any]]], bodies: Iterable[str]) -> Poses:
+    """Poses of place and turn of every body in every frame."""
+    by_body = {
+        name: list(zip(*path, strict=True)) for name, path in zip(bodies, zip(*frames, strict=True), strict=True)
+    }
+    places = {name: np.array(place) for name, (place, _) in by_body.items()}
+    return places, {name: np.reshape(turn, (-1, 3, 3)) for name, (_, turn) in by_body.items()}

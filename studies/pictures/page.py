@@ -1,6 +1,7 @@
 """The page of a film: each engine's picture, the forces' scale, their course, and how far the engines differ."""
 
 from collections.abc import Iterator
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,18 @@ class Page:
     def __init__(self, stage: Stage, motions: list[Motion]) -> None:
         self.stage, self.motions = stage, motions
         self._wide = (WIDTH - EDGE * (len(motions) + 1)) // len(motions)
+        self._lefts = [EDGE + i * (self._wide + EDGE) for i in range(len(motions))]
+        self._forces = [
+            [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
+            for motion in motions
+        ]
         no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
         self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout=no_layout)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._head()
+        self._figure.text(EDGE / WIDTH, 0.96, stage.title, fontsize=15, weight="bold")
+        for left, motion in zip(self._lefts, motions, strict=True):
+            style: Any = {"fontsize": 12, "weight": "bold", "color": COLOURS[motion.engine], "va": "bottom"}
+            self._figure.text(left / WIDTH, 1 - (TOP - 5) / HEIGHT, LABELS[motion.engine], **style)
         self._legend()
         axes = self._curves()
         self._clock = self._figure.text(1 - EDGE / WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace")
@@ -51,36 +60,14 @@ class Page:
         for artist in (self._clock, self._cursor):
             self._figure.draw_artist(artist)
         page = np.asarray(canvas.buffer_rgba())[..., :3].copy()
-        for i, motion in enumerate(self.motions):
-            left = EDGE + i * (self._wide + EDGE)
-            page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(
-                drawn(motion, self.stage, k, self._wide, TALL)
-            )
+        for left, motion in zip(self._lefts, self.motions, strict=True):
+            image = drawn(motion, self.stage, k, self._wide, TALL)
+            page[TOP : TOP + TALL, left : left + self._wide] = eight_bits(image)
         return page
 
     def tallest(self) -> int:
         """The frame in which the plotted forces are largest."""
-        return int(np.abs(self._values(self.motions[0])[0]).sum(axis=1).argmax())
-
-    def _values(self, motion: Motion) -> tuple[np.ndarray, list[str]]:
-        """Plotted forces (f, arrows) in kN, and their names."""
-        own = [arrow for arrow in motion.arrows if arrow.kind == self.stage.curve.kind]
-        names = [arrow.name.rpartition(", ")[2] for arrow in own]
-        return np.column_stack([arrow.vectors @ self.stage.curve.direction for arrow in own]) / 1e3, names
-
-    def _head(self) -> None:
-        self._figure.text(EDGE / WIDTH, 0.96, self.stage.title, fontsize=15, weight="bold")
-        for i, motion in enumerate(self.motions):
-            left = EDGE + i * (self._wide + EDGE)
-            self._figure.text(
-                left / WIDTH,
-                1 - (TOP - 5) / HEIGHT,
-                LABELS[motion.engine],
-                fontsize=12,
-                weight="bold",
-                color=COLOURS[motion.engine],
-                va="bottom",
-            )
+        return int(np.abs(np.column_stack(self._forces[0])).sum(axis=1).argmax())
 
     def _legend(self) -> None:
         """An arrow of each kind as long as its round force is at the camera's target, and what is drawn."""
@@ -106,28 +93,25 @@ class Page:
         self._figure.text(1 - EDGE / WIDTH, row, self.stage.caption, ha="right", va="center")
 
     def _curves(self) -> Axes:
-        """Axes with the plotted forces: a line of the first engine, dots of the second one."""
+        """Axes with the plotted forces in kN: a line of the first engine, dots of the second one."""
         axes = self._figure.add_axes((70 / WIDTH, 62 / HEIGHT, 1 - 82 / WIDTH, 128 / HEIGHT))
-        values, names = self._values(self.motions[0])
-        times, every = self.motions[0].times, max(1, len(self.motions[0].times) // 60)
-        for i, name in enumerate(names):
-            axes.plot(times, values[:, i], color=TONES[i % len(TONES)], label=name)
-        for motion in self.motions[1:]:
-            for i in range(len(names)):
-                axes.plot(times[::every], self._values(motion)[0][::every, i], "o", ms=3, color=TONES[i % len(TONES)])
+        first, curve = self.motions[0], self.stage.curve
+        names = [arrow.name.rpartition(", ")[2] for arrow in first.arrows if arrow.kind == curve.kind]
+        times, every = first.times, max(1, len(first.times) // 60)
+        for name, values, tone in zip(names, self._forces[0], cycle(TONES)):
+            axes.plot(times, values, color=tone, label=name)
+        for forces in self._forces[1:]:
+            for values, tone in zip(forces, cycle(TONES)):
+                axes.plot(times[::every], values[::every], "o", ms=3, color=tone)
         axes.set_xlim(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
-        axes.set_ylabel(f"{self.stage.curve.kind} [kN]")
-        axes.set_title(f"{self.stage.curve.kind.capitalize()} {self.stage.curve.meaning}{self._marks()}")
+        axes.set_ylabel(f"{curve.kind} [kN]")
+        marks = ": lines {}, dots {}" if len(self.motions) > 1 else ""
+        labels = (LABELS[motion.engine] for motion in self.motions)
+        axes.set_title(f"{curve.kind.capitalize()} {curve.meaning}" + marks.format(*labels))
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
         self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, difference(self.motions), ha="right", fontsize=9.5)
         self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]", fontsize=9.5)
         return axes
-
-    def _marks(self) -> str:
-        if len(self.motions) == 1:
-            return ""
-        one, two = (LABELS[motion.engine] for motion in self.motions)
-        return f": lines {one}, dots {two}"
 
 
 TONES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

@@ -13,10 +13,9 @@ from models.systems.pitch_plane.scene import build as scene_of
 from models.systems.pitch_plane.scene import settings_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage, Strut
-from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, Strut, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
-from studies.pictures.shapes import Colour, Surface, box, revolved
+from studies.pictures.shapes import PAINT, Surface, box, tyred_wheel
 
 SPEED, SEED = 15.0, 1
 MAGNIFIED = 3.0
@@ -26,9 +25,6 @@ KINDS = {"wheel force": Kind((0.0, 0.62, 0.45), 1.2e-4, 4e3), "suspension force"
 CURVE = Curve("wheel force", (0.0, 0.0, -1.0), "upwards")
 PLANE = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 """Exudyn's axes as columns: backward, down, to the right."""
-PAINT: Colour = (0.16, 0.42, 0.72)
-RUBBER: Colour = (0.16, 0.16, 0.17)
-RIM: Colour = (0.78, 0.79, 0.8)
 
 
 def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tuple[Stage, list[Motion]]:
@@ -129,6 +125,4 @@ def shapes(assembly: Assembly) -> dict[str, list[Surface]]:
     """A beam for the chassis and two wheels."""
     p = assembly.parameters
     beam = box(p.a + p.b + 0.5, 0.5, 0.14, PAINT).at((p.b - p.a) / 2.0, 0.0, -0.07)
-    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * RADIUS, RUBBER)
-    rim = revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * RADIUS, RIM)
-    return {axle.wheel: [tyre, rim] for axle in assembly.vehicle.axles} | {"chassis": [beam]}
+    return {axle.wheel: tyred_wheel(RADIUS) for axle in assembly.vehicle.axles} | {"chassis": [beam]}

@@ -14,10 +14,9 @@ from models.systems.ride.scene import build as ride_scene
 from models.vehicles.spatial import PointOutput, SpatialVehicle, TyreOutput
 from models.vehicles.spatial_linear import linearise, preloads, wheels
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
-from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, of_exudyn, of_mujoco
 from studies.pictures.road import AHEAD, PassingRoad
-from studies.pictures.shapes import Colour, Surface, ball, box, extruded, revolved
+from studies.pictures.shapes import PAINT, Colour, Surface, ball, box, extruded, tyred_wheel
 
 SPEED, STEP, SEED, GUST = 20.0, 1e-3, 3, 0.5
 """m/s, largest step (s), seed of the road, lateral speed of the body at the start (m/s)."""
@@ -31,9 +30,6 @@ SCENE = {
 }
 KINDS = {"wheel load": Kind((0.0, 0.62, 0.45), 1.6e-4, 4e3), "side force": Kind((0.84, 0.2, 0.0), 6e-4, 1e3)}
 CURVE = Curve("wheel load", (0.0, 0.0, 1.0), "of the road on the tyres, static part included")
-PAINT: Colour = (0.16, 0.42, 0.72)
-RUBBER: Colour = (0.16, 0.16, 0.17)
-RIM: Colour = (0.78, 0.79, 0.8)
 ENGINE: Colour = (0.75, 0.45, 0.15)
 PERSON: Colour = (0.93, 0.76, 0.55)
 
@@ -59,19 +55,18 @@ def reporting(vehicle: SpatialVehicle) -> SpatialVehicle:
 
 def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, rows: np.ndarray) -> Motion:
     settings = Settings(INTEGRATORS[engine], road.step, (len(table) - 1) // 2 * road.step)
-    model = build(engine, vehicle, settings, SPEED, table)
+    model: Any = build(engine, vehicle, settings, SPEED, table)
     zero = np.zeros(len(vehicle.coordinates()))
     gust = np.array([GUST if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
     run = model.run(zero, gust)
     kept = SpatialRun(run.times[rows], run.positions[rows], run.rates[rows])
-    poses = (_exudyn if engine == "exudyn" else _mujoco)(model, kept.positions)
+    if engine == "exudyn":
+        poses = _exudyn(model, kept.positions)
+    else:
+        joints = np.empty_like(kept.positions)
+        joints[:, model.numbers.columns] = kept.positions
+        poses = of_mujoco(model.model, model.numbers.bodies, joints)
     return Motion(engine, kept.times, *poses, arrows(vehicle, kept, table[2 * rows], poses))
-
-
-def _mujoco(model: Any, positions: np.ndarray) -> Poses:
-    joints = np.empty_like(positions)
-    joints[:, model.numbers.columns] = positions
-    return of_mujoco(model.model, model.numbers.bodies, joints)
 
 
 def _exudyn(model: Any, positions: np.ndarray) -> Poses:
@@ -79,38 +74,33 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
     model.mbs.Assemble()
     asked = {name: partial(model.mbs.GetMarkerOutput, marker) for name, marker in markers.items()}
     places, turns = of_exudyn(model.mbs, asked, np.array([model._all(row) for row in positions]))
-    own = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
-    return places, {name: turn @ own[name] for name, turn in turns.items()}  # a mass that slides has other axes
+    axes = {name: np.transpose([model.built.own(name, axis) for axis in np.eye(3)]) for name in markers}
+    return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
 
 
 def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
-    own = linearise(vehicle, SPEED).outputs
-    found = [
+    forces = [
         run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
-        for one in own
+        for one in linearise(vehicle, SPEED).outputs
     ]
-    held = preloads(replace(vehicle, gravity=GRAVITY)).tyres
-    loads = [
-        _arrow("wheel load", vehicle, tyre.name, tyre.body, tyre.point, held[tyre.name] + force, 2, poses)
-        for tyre, force in zip(vehicle.tyres, found, strict=False)
+    held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
+    arrows = [
+        _arrow("wheel load", vehicle, tyre, held[tyre.name] + force, 2, poses)
+        for tyre, force in zip(vehicle.tyres, forces, strict=False)
     ]
-    names = vehicle.coordinates()
-    sides = []
-    for side, speed in zip(vehicle.side_forces, found[len(vehicle.tyres) :], strict=True):
+    for side, speed in zip(vehicle.side_forces, forces[len(vehicle.tyres) :], strict=True):
         roll, yaw = (run.positions[:, names.index((side.chassis, freedom))] for freedom in ("rx", "rz"))
         force = side.stiffness * (side.roll_steer * roll + yaw - speed / SPEED)
-        sides.append(_arrow("side force", vehicle, side.name, side.body, side.point, force, 1, poses))
-    return (*loads, *sides)
+        arrows.append(_arrow("side force", vehicle, side, force, 1, poses))
+    return tuple(arrows)
 
 
-def _arrow(
-    kind: str, vehicle: SpatialVehicle, name: str, body: str, point: Any, force: np.ndarray, axis: int, poses: Poses
-) -> Arrow:
-    """A force along an axis of the space, at the road under a point of a body."""
-    arm = np.subtract((point[0], point[1], 0.0), vehicle.body(body).position)
-    points = poses[0][body] + poses[1][body] @ arm
-    return Arrow(f"{kind}, {name}", kind, body, points, force[:, None] * np.eye(3)[axis])
+def _arrow(kind: str, vehicle: SpatialVehicle, place: Any, force: np.ndarray, axis: int, poses: Poses) -> Arrow:
+    """A force along an axis of the space, at the road under the point of a body where a tyre or side force is."""
+    (x, y, _), body = place.point, place.body
+    points = poses[0][body] + poses[1][body] @ np.subtract((x, y, 0.0), vehicle.body(body).position)
+    return Arrow(f"{kind}, {place.name}", kind, body, points, force[:, None] * np.eye(3)[axis])
 
 
 def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
@@ -129,19 +119,14 @@ def stage(vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> Stage:
 
 def shapes(vehicle: SpatialVehicle) -> dict[str, list[Surface]]:
     """Wheels where there are tyres, a car about the chassis, an engine and occupants within it."""
-    found = {tyre.body: _wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres}
-    found["engine"] = [box(0.5, 0.7, 0.45, ENGINE)]
-    found |= {
-        f"{side} seat": [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
-        for side in ("left", "right")
+    person = [ball(0.13, PERSON).at(0.0, 0.0, 0.42), box(0.26, 0.4, 0.55, PERSON).at(0.0, 0.0, 0.02)]
+    return {
+        **{tyre.body: tyred_wheel(vehicle.body(tyre.body).position[2]) for tyre in vehicle.tyres},
+        "engine": [box(0.5, 0.7, 0.45, ENGINE)],
+        "left seat": person,
+        "right seat": person,
+        "body": _car(vehicle),
     }
-    found["body"] = _car(vehicle)
-    return found
-
-
-def _wheel(radius: float) -> list[Surface]:
-    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
-    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
 
 
 def _car(vehicle: SpatialVehicle) -> list[Surface]:
@@ -158,4 +143,5 @@ def _car(vehicle: SpatialVehicle) -> list[Surface]:
         (rear - 0.6, 0.92),
     ]
     upper = [(rear - 0.45, 0.92), (front - 0.38, 0.88), (front - 1.05, 1.38), (rear + 0.15, 1.4)]
-    return [extruded(np.array(lower) - [x, z], 1.66, PAINT, 0.42), extruded(np.array(upper) - [x, z], 1.4, PAINT, 0.3)]
+    outlines = ((lower, 1.66, 0.42), (upper, 1.4, 0.3))
+    return [replace(extruded(np.array(line) - [x, z], wide, PAINT), alpha=alpha) for line, wide, alpha in outlines]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.pictures.shapes import Colour, Surface, box, faceted, floor
+from studies.pictures.shapes import Colour, Surface, box, faceted, floor, patches
 
 LIGHT: Colour = (0.60, 0.61, 0.63)
 DARK: Colour = (0.54, 0.55, 0.57)
@@ -31,28 +31,23 @@ class PassingRoad:
     half: float = 2.6
 
     def at(self, time: float) -> list[Surface]:
-        """Road, its middle line and the grass at a time (s)."""
+        """Road, lines along both its edges and the grass at a time (s)."""
         first = np.floor((self.speed * time - AHEAD) / TILE)
         stations = np.arange(first, first + 2.0 * AHEAD / TILE)
-        own = TILE * stations - self.speed * time
         across = np.linspace(-self.half, self.half, 2 * round(self.half / TILE) + 1)
-        x, y = np.meshgrid(own, across, indexing="ij")
+        x, y = np.meshgrid(TILE * stations - self.speed * time, across, indexing="ij")
         net = np.stack([x, y, self._height(x + self.speed * time, y)], -1)
         dark = (stations[:-1, None] + np.arange(len(across) - 1)) % 2 == 1
         if self.up < 0:
             net, dark = net[:, ::-1], dark[:, ::-1]
         grass = floor(-0.35 * self.up, GRASS, self.up)
-        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), grass, *self._marks(time)]
-
-    def _marks(self, time: float) -> list[Surface]:
-        """Lines along both edges."""
-        side = self.half - 0.15
-        starts = 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
-        return [
+        side, starts = self.half - 0.15, 4.0 * np.arange(-10, 11) - self.speed * time % 4.0
+        marks = [
             box(1.6, 0.1, 0.02, LINE).at(x, y, float(self._height(x + self.speed * time, y)) + 0.01 * self.up)
             for x in starts
             for y in (-side, side)
         ]
+        return [_tiles(net, dark, DARK), _tiles(net, ~dark, LIGHT), grass, *marks]
 
     def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""
@@ -63,6 +58,4 @@ class PassingRoad:
 
 def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> Surface:
     """Chosen tiles (a - 1, b - 1) of a net (a, b, 3)."""
-    one, two, three, four = (part[chosen] for part in (net[:-1, :-1], net[1:, :-1], net[1:, 1:], net[:-1, 1:]))
-    corners = np.concatenate([np.stack([one, two, three], 1), np.stack([one, three, four], 1)])
-    return faceted(corners, colour)
+    return faceted(patches(net)[np.tile(chosen.ravel(), 2)], colour)

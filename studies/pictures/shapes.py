@@ -6,6 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 Colour = tuple[float, float, float]
+PAINT: Colour = (0.16, 0.42, 0.72)
+RUBBER: Colour = (0.16, 0.16, 0.17)
+RIM: Colour = (0.78, 0.79, 0.8)
+FAR = 150.0
+"""m to the edges of a floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,15 +34,15 @@ class Surface:
         return replace(self, corners=self.corners + np.array(place))
 
 
-def faceted(corners: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
+def faceted(corners: np.ndarray, colour: Colour) -> Surface:
     """Triangles (m, 3, 3) with flat faces; counter-clockwise seen from outside."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(length > 0, length, 1.0)
-    return Surface(corners, np.repeat(normals[:, None], 3, axis=1), colour, alpha)
+    return Surface(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
 
-def _patches(points: np.ndarray) -> np.ndarray:
+def patches(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
     one, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
@@ -45,12 +50,7 @@ def _patches(points: np.ndarray) -> np.ndarray:
     )
 
 
-def sheet(points: np.ndarray, colour: Colour, alpha: float = 1.0) -> Surface:
-    """A net of points (a, b, 3) with flat faces."""
-    return faceted(_patches(points), colour, alpha)
-
-
-def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 1.0, pieces: int = 48) -> Surface:
+def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, pieces: int = 48) -> Surface:
     """A line (axial, radii) turned about y, from left to right; round along, sharp at the line's corners."""
     angles = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     y, r = np.array(axial, float), np.array(radii, float)
@@ -59,18 +59,24 @@ def revolved(axial: ArrayLike, radii: ArrayLike, colour: Colour, alpha: float = 
     slopes = np.stack([np.diff(y), -np.diff(r)], 1)
     length = np.linalg.norm(slopes, axis=1, keepdims=True)
     slopes /= np.where(length > 0, length, 1.0)
-    corners = [_patches(net[i : i + 2]) for i in range(len(slopes))]
-    normals = [_patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
-    return Surface(np.concatenate(corners), np.concatenate(normals), colour, alpha)
+    corners = [patches(net[i : i + 2]) for i in range(len(slopes))]
+    normals = [patches(np.stack([slope[0] * ring + [0.0, slope[1], 0.0]] * 2)) for slope in slopes]
+    return Surface(np.concatenate(corners), np.concatenate(normals), colour)
 
 
-def box(x: float, y: float, z: float, colour: Colour, alpha: float = 1.0) -> Surface:
+def tyred_wheel(radius: float) -> list[Surface]:
+    """A tyre and its rim."""
+    tyre = revolved([-0.1, -0.1, -0.07, 0.07, 0.1, 0.1], np.array([0.62, 0.92, 1.0, 1.0, 0.92, 0.62]) * radius, RUBBER)
+    return [tyre, revolved([-0.09, -0.09, 0.09, 0.09], np.array([0.0, 0.64, 0.64, 0.0]) * radius, RIM)]
+
+
+def box(x: float, y: float, z: float, colour: Colour) -> Surface:
     """A box about the origin with these edges."""
     half = np.array([x, y, z]) / 2.0
-    return extruded(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour, alpha)
+    return extruded(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half[[0, 2]], 2.0 * half[1], colour)
 
 
-def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1.0) -> Surface:
+def extruded(outline: np.ndarray, width: float, colour: Colour) -> Surface:
     """A convex outline (n, 2) in x and z, counter-clockwise from x to z, drawn out along y about the origin."""
     front = np.insert(outline, 1, -width / 2.0, axis=1)
     back = np.insert(outline, 1, width / 2.0, axis=1)
@@ -78,35 +84,33 @@ def extruded(outline: np.ndarray, width: float, colour: Colour, alpha: float = 1
         np.stack([np.broadcast_to(side[:1], side[2:].shape), side[1:-1], side[2:]], 1) for side in (front, back[::-1])
     ]
     closed = np.stack([np.vstack([front, front[:1]]), np.vstack([back, back[:1]])])
-    return faceted(np.concatenate([*fan, _patches(closed)]), colour, alpha)
+    return faceted(np.concatenate([*fan, patches(closed)]), colour)
 
 
-def floor(z: float, colour: Colour, up: float, half: float = 150.0) -> Surface:
+def floor(z: float, colour: Colour, up: float) -> Surface:
     """A level square about the origin, of tiles: what is behind the eye is lost, near the origin little at a time.
 
     up : 1 where z is up, -1 where it is down.
     """
-    lines = half * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
+    lines = FAR * np.sinh(np.linspace(-6.0, 6.0, 57)) / np.sinh(6.0)
     x, y = np.meshgrid(up * lines, lines, indexing="ij")
-    return sheet(np.stack([x, y, np.full_like(x, z)], -1), colour)
+    return faceted(patches(np.stack([x, y, np.full_like(x, z)], -1)), colour)
 
 
-def ball(radius: float, colour: Colour, alpha: float = 1.0) -> Surface:
+def ball(radius: float, colour: Colour) -> Surface:
     """A sphere about the origin."""
     angle = np.linspace(0.0, np.pi, 17)
-    found = revolved(-radius * np.cos(angle), radius * np.sin(angle), colour, alpha, 32)
-    return replace(found, normals=found.corners / radius)
+    round_about = revolved(-radius * np.cos(angle), radius * np.sin(angle), colour, 32)
+    return replace(round_about, normals=round_about.corners / radius)
 
 
-def between(
-    tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour, alpha: float = 1.0
-) -> Surface:
+def between(tail: np.ndarray, head: np.ndarray, axial: np.ndarray, radii: np.ndarray, colour: Colour) -> Surface:
     """A revolved line whose axis runs from one point to another; ``axial`` counts from the tail (m)."""
     along = (head - tail) / np.linalg.norm(head - tail)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     aside /= np.linalg.norm(aside)
     turn = np.column_stack([aside, along, np.cross(aside, along)])
-    return revolved(axial, radii, colour, alpha, 16).moved(tail, turn)
+    return revolved(axial, radii, colour, 16).moved(tail, turn)
 
 
 def rod(tail: np.ndarray, head: np.ndarray, radius: float, colour: Colour) -> Surface:

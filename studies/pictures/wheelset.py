@@ -10,9 +10,9 @@ from models.rail.equations import ROLL, YAW, Path, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
 from models.rail.wheelset import CHOSEN, Wheelset
+from models.systems.wheelset.of_scene import implementation
 from studies.pictures.camera import Camera
-from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage
-from studies.pictures.poses import Poses, of_exudyn, of_mujoco
+from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage, of_exudyn, of_mujoco
 from studies.pictures.shapes import Colour, Surface, box, extruded, floor, revolved
 
 SPEED, SHIFT, CELLS, STEP = 75.0, 6e-3, 11, 5e-4
@@ -37,60 +37,50 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
 
 
 def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
-    from models.engines.wheelset_exudyn import ExudynWheelset
-    from models.engines.wheelset_mujoco import MujocoWheelset
-
-    own = {"exudyn": ExudynWheelset, "mujoco": MujocoWheelset}[engine](CHOSEN, SPEED, "fastsim", CELLS)
-    path = own.run(own.displaced(SHIFT), duration, STEP)
+    equations: Any = implementation(engine)(CHOSEN, SPEED, "fastsim", CELLS)
+    path = equations.run(equations.displaced(SHIFT), duration, STEP)
     rows = np.rint(times / STEP).astype(int)
     kept = Path(path.times[rows], path.states[rows], path.contacts[rows])
     joints = to_joints(kept.states)[:, :JOINTS]
-    poses = _exudyn(own, joints) if engine == "exudyn" else of_mujoco(own.model, {"wheelset": 1}, joints)  # type: ignore[attr-defined]
+    if engine == "mujoco":
+        poses = of_mujoco(equations.model, {"wheelset": 1}, joints)
+    else:  # by a marker in the middle of the axle: the last link of the first object
+        from models.engines.exudyn_system import items
+
+        mbs, origin = equations.system[0], [0.0, 0.0, 0.0]
+        link = items.MarkerKinematicTreeRigid(objectNumber=0, linkNumber=JOINTS - 1, localPosition=origin)
+        middle = mbs.AddMarker(link)
+        mbs.Assemble()
+        poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
     return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept))
 
 
-def _exudyn(own: Any, joints: np.ndarray) -> Poses:
-    """Poses by a marker in the middle of the axle: the last link of the first object."""
-    from models.engines.exudyn_system import items
-
-    mbs = own._system[0]
-    middle = mbs.AddMarker(
-        items.MarkerKinematicTreeRigid(objectNumber=0, linkNumber=JOINTS - 1, localPosition=[0.0, 0.0, 0.0])
-    )
-    mbs.Assemble()
-    return of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-
-
-def arrows(wheelset: Wheelset, path: Path) -> tuple[Arrow, ...]:
+def arrows(w: Wheelset, path: Path) -> tuple[Arrow, ...]:
     """Normal force and creep force on the wheels where they touch, of the contacts of a path."""
-    found = []
+    every = []
     for k, (name, side) in enumerate(SIDES.items()):
-        points = np.array([_place(wheelset, side, state) for state in path.states])
+        cone = [
+            cone_on_rail(side, *state[[Y, Z, ROLL, YAW]], w.radius, w.half_gauge, w.conicity, w.head_radius)
+            for state in path.states
+        ]
+        points = np.array(cone)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = path.contacts[:, k]
         sine, cosine, none = np.sin(contact[:, ANGLE]), np.cos(contact[:, ANGLE]), 0.0 * contact[:, ANGLE]
         normal = contact[:, LOAD, None] * np.stack([none, sine, -cosine], 1)
         creep = np.stack([contact[:, FX], contact[:, FY] * cosine, contact[:, FY] * sine], 1)
-        found += [
-            Arrow(f"normal force, {name}", "normal force", "wheelset", points, normal),
-            Arrow(f"creep force, {name}", "creep force", "wheelset", points, creep),
+        every += [
+            Arrow(f"{kind}, {name}", kind, "wheelset", points, force)
+            for kind, force in zip(KINDS, (normal, creep), strict=True)
         ]
-    return tuple(found)
-
-
-def _place(w: Wheelset, side: float, state: np.ndarray) -> np.ndarray:
-    """Place of contact in the track's axes (m)."""
-    found = cone_on_rail(side, *state[[Y, Z, ROLL, YAW]], w.radius, w.half_gauge, w.conicity, w.head_radius)
-    return np.array(found[-3:]) + np.array([0.0, state[Y], state[Z]])
+    return tuple(every)
 
 
 def stage(wheelset: Wheelset) -> Stage:
     """Wheelset, rails and sleepers, seen from ahead and to the right; z down."""
     camera = Camera((2.75, 1.75, -0.95), (0.0, 0.12, 0.06), (0.0, 0.0, -1.0), 0.54)
-    caption = f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels"
-    title = f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM"
     return Stage(
-        title,
-        caption,
+        f"Wheelset that hunts at {SPEED:g} m/s, creep forces by FASTSIM",
+        f"displacements drawn {MAGNIFIED:g} times as large; forces on the wheels",
         {"wheelset": shapes(wheelset)},
         {"wheelset": (0.0, 0.0, 0.0)},
         camera,
@@ -104,61 +94,35 @@ def stage(wheelset: Wheelset) -> Stage:
 
 def shapes(w: Wheelset) -> list[Surface]:
     """An axle and two wheels, whose treads are the model's cones; flanges stand off by the magnified clearance."""
-    found = [
-        revolved(
-            [-w.half_spacing - 0.12, -w.half_spacing - 0.12, w.half_spacing + 0.12, w.half_spacing + 0.12],
-            [0.0, 0.085, 0.085, 0.0],
-            DARK,
-        )
-    ]
+    end = w.half_spacing + 0.12
+    surfaces = [revolved([-end, -end, end, end], [0.0, 0.085, 0.085, 0.0], DARK)]
     inner, outer = 0.036 + MAGNIFIED * w.flange_clearance + 0.004, 0.075
-    for side in (1.0, -1.0):
-        across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05])
-        radii = np.array(
-            [
-                0.0,
-                w.radius + 0.028,
-                w.radius + w.conicity * inner,
-                w.radius - w.conicity * outer,
-                0.39,
-                0.37,
-                0.19,
-                0.16,
-                0.0,
-            ]
-        )
-        across = w.half_gauge + across
-        if side < 0:
-            across, radii = -across[::-1], radii[::-1]
-        found.append(revolved(across, radii, STEEL, pieces=72))
-        found += [
+    across = np.array([-inner - 0.03, -inner - 0.025, -inner, outer, outer, 0.02, 0.02, 0.05, 0.05]) + w.half_gauge
+    tread = [w.radius + 0.028, w.radius + w.conicity * inner, w.radius - w.conicity * outer]
+    radii = np.array([0.0, *tread, 0.39, 0.37, 0.19, 0.16, 0.0])
+    for side, order in ((1.0, slice(None)), (-1.0, slice(None, None, -1))):
+        surfaces.append(revolved(side * across[order], radii[order], STEEL, pieces=72))
+        surfaces += [
             box(0.09, 0.03, 0.09, BROWN).at(0.28 * np.cos(a), side * (w.half_gauge + y), 0.28 * np.sin(a))
             for a in np.arange(6) * np.pi / 3.0
             for y in (0.016, -inner - 0.02)
         ]
-    return found
+    return surfaces
 
 
 def track(w: Wheelset, way: float) -> list[Surface]:
     """Rails, sleepers and ballast after a way (m)."""
-    found = []
     first, last, top = -24.0, 2.4, w.radius
-    for side in (1.0, -1.0):
-        y = side * w.half_gauge
-        head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
-        parts = [
-            _along(head, last - first, STEEL),
-            box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
-            box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16),
-        ]
-        found += [part.at((first + last) / 2.0, y, top) for part in parts]
+    head = np.array([[-0.036, 0.012], [-0.02, 0.0], [0.02, 0.0], [0.036, 0.012], [0.036, 0.05], [-0.036, 0.05]])
+    along = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # the outline lies in y and z
+    rail = [
+        extruded(head, last - first, STEEL).moved(np.zeros(3), along),
+        box(last - first, 0.02, 0.1, RAIL).at(0.0, 0.0, 0.1),
+        box(last - first, 0.14, 0.02, RAIL).at(0.0, 0.0, 0.16),
+    ]
+    sides = w.half_gauge, -w.half_gauge
+    surfaces = [part.at((first + last) / 2.0, y, top) for y in sides for part in rail]
     phase = way % SLEEPERS
     for i in range(int(np.ceil(first / SLEEPERS)), int(np.floor(last / SLEEPERS)) + 1):
-        found.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
-    return [*found, floor(top + 0.24, BALLAST, -1.0)]
-
-
-def _along(outline: np.ndarray, length: float, colour: Colour) -> Surface:
-    """An outline (n, 2) in y and z drawn out along x."""
-    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    return extruded(outline, length, colour).moved(np.zeros(3), turn)
+        surfaces.append(box(0.24, 2.5, 0.1, CONCRETE).at(i * SLEEPERS - phase + 0.3, 0.0, top + 0.22))
+    return [*surfaces, floor(top + 0.24, BALLAST, -1.0)]

@@ -14,6 +14,7 @@ from models.contact.linear_theory import coefficient_at
 from models.machine.compiled import lean, njit
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.profile_contact import pressed
+from models.rail.wheel_forces import numbers
 
 STATES, COLUMNS = 10, 18
 
@@ -101,20 +102,8 @@ def march(state, speed, step, p, path, reports):
 def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], Any]:
     """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts
     (steps + 1, 2, 18)."""
-    w, pair = wheelset, wheelset.pair
-    p = (
-        w.mass,
-        w.spin_inertia,
-        w.yaw_inertia,
-        (w.load - w.mass * 9.81) / 2.0,
-        w.radius,
-        w.half_gauge,
-        w.conicity,
-        w.head_radius,
-        pair.modulus,
-        pair.G,
-        pair.nu,
-    )
+    w = wheelset
+    p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *numbers(w)[:7].tolist())
 
     def marched() -> tuple[np.ndarray, np.ndarray]:
         path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, COLUMNS))

@@ -43,7 +43,7 @@ def wheelsets(steps: int) -> tuple[Callable[[], Path], Callable[[], Path]]:
 
     def written() -> Path:
         found = Path(times, *theirs())
-        own._check(found, STEP, 1, "written")
+        own.check(found, STEP, 1)
         return found
 
     return lambda: own.run(start, steps * STEP, STEP), written

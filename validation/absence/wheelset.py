@@ -35,38 +35,33 @@ BARE: dict[str, Any] = {
 def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
     """Counts of a wheelset, in its numbers and in what an engine builds of it, and its path."""
     from models.systems.wheelset.of_scene import equations_of
+    from models.systems.wheelset.run import run
 
-    own = equations_of(scene, engine, SPEED)
-    _, body, contact, *_, law = own.given
-    profiles = contact.size > forces.NUMBERS  # they have flanges of their own
+    equations = equations_of(scene, engine, SPEED)
+    _, body, rails = equations.parameters
+    profiles = rails.numbers.size > forces.NUMBERS  # they have flanges of their own
     counts = {
         "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()),
         "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
-        "creep nets": int(law == forces.FASTSIM),
-        "flanges": int(contact[forces.FLANGE] > 0.0 and not profiles),
-        "contact damping": int(contact[forces.DAMPING] > 0.0),
+        "creep nets": int(rails.law == forces.FASTSIM),
+        "flanges": int(rails.numbers[forces.FLANGE] > 0.0 and not profiles),
+        "contact damping": int(rails.numbers[forces.DAMPING] > 0.0),
         "profiles": int(profiles),
-        **_built(own, engine),
     }
-    path = own.run(own.displaced(scene.run.displacement), scene.run.duration, scene.run.step)
-    return counts, path.states.tobytes()
-
-
-def _built(own: Equations, engine: str) -> dict[str, int]:
-    """Items of an engine's own."""
-    if engine == "reference":
-        return {}
-    exudyn, mujoco = springs(own.wheelset)
-    return {"spring-dampers": exudyn} if engine == "exudyn" else {"actuators": mujoco}
+    if engine != "reference":
+        exudyn, mujoco = springs(equations.wheelset)
+        counts |= {"spring-dampers": exudyn} if engine == "exudyn" else {"actuators": mujoco}
+    return counts, run(scene, engine, SPEED).detail.states.tobytes()
 
 
 def without_net(law: Any) -> str:
     """What the rates become where FASTSIM's net holds no numbers: the same to the last bit, or no numbers."""
     equations = Equations(CHOSEN, SPEED, law, 11)
-    state, (speed, body, p, strips, cells, *rest) = equations.displaced(SHIFT), equations.given
-    found, report = np.empty(eq.STATES), equations.blank()
-    eq.rates(state, speed, body, p, np.full_like(strips, np.nan), np.full_like(cells, np.nan), *rest, found, report)
-    return "the same" if found.tobytes() == equations.rates(state).tobytes() else "no numbers"
+    state, (speed, body, rails) = equations.displaced(SHIFT), equations.parameters
+    rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
+    rates = np.empty(eq.STATES)
+    eq.rates(state, speed, body, rails, rates, equations.blank())
+    return "the same" if rates.tobytes() == equations.rates(state).tobytes() else "no numbers"
 
 
 def springs(wheelset: Wheelset) -> tuple[int, int]:
@@ -74,14 +69,14 @@ def springs(wheelset: Wheelset) -> tuple[int, int]:
     from models.engines.wheelset_exudyn import ExudynWheelset
     from models.engines.wheelset_mujoco import MujocoWheelset
 
-    mbs, _ = ExudynWheelset(wheelset, SPEED)._system
+    mbs, _ = ExudynWheelset(wheelset, SPEED).system
     items = [mbs.GetObject(k)["objectType"] for k in range(mbs.systemData.NumberOfObjects())]
     return sum("SpringDamper" in kind for kind in items), MujocoWheelset(wheelset, SPEED).model.nu
 
 
 def rows() -> list[Row]:
     """All counts, each beside its positive control."""
-    counts = [", ".join(map(str, springs(one))) for one in (CHOSEN, free(CHOSEN))]
+    counts = [", ".join(map(str, springs(wheelset))) for wheelset in (CHOSEN, free(CHOSEN))]
     return [
         behaves(
             "absent.wheelset.fastsim",

@@ -36,6 +36,8 @@ MAIN = LAWS[3]
 COUNTS = (1, 4, 8)
 EVALUATIONS = {"Euler": 1, "RK4": 4, "ExplicitEuler": 1, "RK44": 4}
 """Calls of the callback per step."""
+ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
+NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
 ENGINES = {"mujoco": ("Euler", "RK4"), "exudyn": ("ExplicitEuler", "RK44")}
 ROUNDS, SHOWN = 48, 6
 """Rounds of what rows tell, timed by itself, as work between its turns slows short ones; of all, for the table."""
@@ -78,10 +80,6 @@ class Setup:
         return Wheels(self.count, cast(Theory, theory), cells or 21)
 
 
-ENGINE_NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-NAMES = {"linear": "linear theory", "simplified": "non-Hertzian"}
-
-
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Whether threads and engines agree, and low speed; in the full run also the price of every law and bridge.
 
@@ -101,14 +99,14 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def every() -> list[Setup]:
     """All of them."""
-    found = []
-    for engine, methods in ENGINES.items():
+    setups = []
+    for engine, (usual, fine) in ENGINES.items():
         best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
-        for method, count in [(methods[0], count) for count in COUNTS] + [(methods[1], 4)]:
-            found += [Setup(engine, method, "none", None, count), Setup(engine, method, "empty", None, count)]
-            found += [Setup(engine, method, best, law, count) for law in (LAWS if method == methods[0] else (MAIN,))]
-        found += [Setup(engine, method, other, MAIN, 4) for method in methods for other in others]
-    return [*found, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
+        for method, count in (*((usual, count) for count in COUNTS), (fine, 4)):
+            setups += [Setup(engine, method, bridge, None, count) for bridge in ("none", "empty")]
+            setups += [Setup(engine, method, best, law, count) for law in (LAWS if method == usual else (MAIN,))]
+        setups += [Setup(engine, method, other, MAIN, 4) for method in (usual, fine) for other in others]
+    return [*setups, Setup("mujoco", "Euler", "plain", LAWS[-1], 4)]
 
 
 class Prices:
@@ -124,28 +122,16 @@ class Prices:
         self._steps = {one: (a, b, steps - 1) for one, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)}
         self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
-    def step(self, one: Setup, rounds: bool = False) -> Any:
-        """Seconds per step: of each round, or their median."""
-        whole, first, steps = self._steps[one]
-        found = (whole - first) / steps
-        return found if rounds else float(np.median(found))
-
-    def own(self, one: Setup, rounds: bool = False) -> Any:
-        """The same without contact: the engine's own."""
-        return self.step(one.without, rounds)
-
-    def kernel(self, one: Setup, rounds: bool = False) -> Any:
-        """Seconds of the kernel in a step, likewise."""
-        if one.law is None:
-            return 0.0
+    def rounds(self, one: Setup) -> tuple[Any, Any, Any]:
+        """Seconds of each round: of a step, of the same without contact (the engine's own), of the kernel in it."""
+        step, own = ((whole - first) / steps for whole, first, steps in (self._steps[one], self._steps[one.without]))
         calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
-        found = calls * self._calls[one.law, one.count]
-        return found if rounds else float(np.median(found))
+        return step, own, 0.0 if one.law is None else calls * self._calls[one.law, one.count]
 
     def point(self, one: Setup) -> dict[str, Any]:
         """A step and what it is made of, in seconds: engine, kernel, bridge; the share of the bridge."""
-        step, own, kernel = self.step(one), self.own(one), self.kernel(one)
-        a, b, c = (part(one, True) for part in (self.step, self.own, self.kernel))
+        a, b, c = self.rounds(one)
+        step, own, kernel = (float(np.median(part)) for part in (a, b, c))
         share = median((a - b - c) / a)
         return {
             "engine": one.engine,
@@ -182,9 +168,7 @@ def _job(one: Setup) -> tuple[Callable[[int], Any], int]:
     kind = one.bridge if one.bridge in STEPS else "native"
     if wheels.theory == "simplified":
         kind = "plain simplified" if one.bridge == "plain" else "simplified"
-    law = None
-    if one.bridge == "plain":
-        law = non_hertzian(wheels) if wheels.theory == "simplified" else plain(wheels)
+    law = plain(wheels) if one.bridge == "plain" else None
     march = (_mujoco_job if one.engine == "mujoco" else _exudyn_job)(one, wheels, law)
     return march, max(2, STEPS[kind] // EVALUATIONS[one.method])
 
@@ -220,35 +204,24 @@ def _exudyn_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
 
 
 def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The same law by the functions that a user calls from Python."""
+    """The same law by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
+    bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
+        pressed: Any
+        creep: Any
         for k in range(0, wheels.size, FREEDOMS):
-            hertz = by_approach(*wheels.curvatures, numbers[SUNK] + q[k + Z], wheels.pair)
-            creep = fastsim(
-                hertz.a, hertz.b, hertz.load, wheels.mu, *_motion(wheels, q, v, k), wheels.pair, cells=wheels.cells
-            )
-            f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - hertz.load, creep.mz
-
-    return add
-
-
-def non_hertzian(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The theory of 1983 likewise."""
-    bodies = separate(wheels.bodies)
-
-    def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
-        for k in range(0, wheels.size, FREEDOMS):
-            pressed = press(bodies, wheels.pair, approach=numbers[SUNK] + q[k + Z])
-            creep = roll(pressed, wheels.mu, *_motion(wheels, q, v, k), cells=wheels.cells)
+            approach, mu, speed = numbers[SUNK] + q[k + Z], wheels.mu, wheels.speed
+            slip = v[k + X] / speed, v[k + Y] / speed - q[k + YAW], v[k + YAW] / speed
+            if bodies is not None:
+                pressed = press(bodies, wheels.pair, approach=approach)
+                creep = roll(pressed, mu, *slip, cells=wheels.cells)
+            else:
+                pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
+                creep = fastsim(pressed.a, pressed.b, pressed.load, mu, *slip, wheels.pair, cells=wheels.cells)
             f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
 
     return add
-
-
-def _motion(wheels: Wheels, q: Array, v: Array, k: int) -> tuple[float, float, float]:
-    """Creepages and spin (1/m) of the wheel whose coordinates begin at k."""
-    return v[k + X] / wheels.speed, v[k + Y] / wheels.speed - q[k + YAW], v[k + YAW] / wheels.speed
 
 
 def _price_rows(prices: Prices) -> list[Row]:
@@ -256,7 +229,7 @@ def _price_rows(prices: Prices) -> list[Row]:
     for one in prices.setups:
         if not one.told:
             continue
-        step, own, kernel = (part(one, True) for part in (prices.step, prices.own, prices.kernel))
+        step, own, kernel = prices.rounds(one)
         name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
         if one.engine == "mujoco":
             value, low, high = median(step / (own + kernel))

@@ -1,6 +1,6 @@
 """The Manchester contact benchmark: places, angles and forces of both wheels, against CONTACT and second ways."""
 
-import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +8,22 @@ import numpy as np
 
 from models.contact.profile_files import read_profile
 from models.contact.wheel_on_rail import Side, Track, Wheelset, laid
-from models.rail.contact_table import BENCHMARK_FRICTION, BENCHMARK_LOAD, BENCHMARK_YAW, Contact, Placed, benchmark_side
+from models.rail.contact_table import Placed
+from models.systems.wheel_rail.run import run
+from models.systems.wheel_rail.scene import Positions
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
 from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import data_folder
-from validation.contact.manchester_references import CONTACT, apart, on_one_plane, searched, sums
+from validation.contact.manchester_references import (
+    CONTACT,
+    SCENE,
+    apart,
+    contact_of,
+    on_one_plane,
+    placed_at,
+    searched,
+    sums,
+)
 
 TITLE = "The Manchester contact benchmark, cases A"
 SYSTEM: System = "contact"
@@ -29,17 +40,15 @@ WHEELS = {"right": 2, "left": 5}
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows on case A-2 against what is published; in full also on case A-1 at every mm, searches, files, the price."""
-    rolling, still = (Contact(benchmark_side(), BENCHMARK_LOAD, friction=mu) for mu in (BENCHMARK_FRICTION, 0.0))
     published = CONTACT[np.isin(CONTACT[:, 0], QUICK)] if quick else CONTACT
-    placed, each = _timed(rolling, BENCHMARK_YAW, published[:, 0])
+    placed, each = _placed("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
-    two = still.at(5e-3)
     rows.append(
         within(
             "manchester.two_patches",
             SYSTEM,
             "patches on the right wheel at 5 mm, case A-1",
-            float(len(two.right)),
+            float(len(placed_at("A-1", 5e-3).right)),
             "",
             2.0,
             0.0,
@@ -49,12 +58,12 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     )
     data: dict[str, Any] = {"A-2": [_told(one) for one in placed], "published": published.tolist()}
     if not quick:
-        static, each_still = _timed(still, 0.0, CONTACT[::2, 0])
+        static, each_still = _placed("A-1", CONTACT[::2, 0])
         data["A-1"] = [_told(one) for one in static]
         rows += [
-            *_static_rows(still, static),
-            *_split_rows(rolling, placed[10]),
-            *_file_rows(rolling, placed),
+            *_static_rows(static),
+            *_split_rows(placed[10]),
+            *_file_rows(placed),
             _load_row(static),
             _axle_row(placed[0]),
             *_price_rows({"A-1": each_still, "A-2": each}),
@@ -62,24 +71,24 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, data
 
 
-def _timed(contact: Contact, yaw: float, shifts: np.ndarray) -> tuple[list[Placed], float]:
+def _placed(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
     """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
-    start = time.process_time()
-    found = [contact.at(1e-3 * float(shift), 1e-3 * float(shift) * yaw) for shift in shifts]
-    return found, (time.process_time() - start) / len(found)
+    positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
+    found = run(SCENE.model_copy(update={"positions": positions}), case=case)
+    return found.detail.placed, found.seconds / len(shifts)
 
 
 def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
-    own = np.array([sums(one, wheel) for one in placed])
-    theirs = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
-    off = np.abs(own - theirs)
-    force = 100.0 * off / theirs
+    published_sums = published[:, WHEELS[wheel] : WHEELS[wheel] + 3]
+    off = np.abs(np.array([sums(position, wheel) for position in placed]) - published_sums)
+    place, _, _ = off.max(axis=0).tolist()
+    _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
         at_most(
             f"manchester.places.{wheel}",
             SYSTEM,
             f"mean place of contact of the {wheel} wheel, largest difference",
-            float(off[:, 0].max()),
+            place,
             "mm",
             PLACE,
             PUBLISHED,
@@ -89,7 +98,7 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.forces.{wheel}",
             SYSTEM,
             f"normal force of the {wheel} wheel, largest difference",
-            float(force[:, 1].max()),
+            force,
             "%",
             FORCE,
             PUBLISHED,
@@ -99,34 +108,27 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
             f"manchester.peaks.{wheel}",
             SYSTEM,
             f"largest pressure of the {wheel} wheel, largest difference",
-            float(force[:, 2].max()),
+            peak,
             "%",
             0.0,
             "CONTACT's cells of 0.2 mm; a flange's patch has four of them",
         ),
     ]
-    roll = np.abs(np.array([1e3 * one.roll for one in placed]) - published[:, 1])
-    return (
-        rows
-        if wheel == "left"
-        else [
-            *rows,
-            finding(
-                "manchester.roll",
-                SYSTEM,
-                "roll, largest difference",
-                float(roll.max()),
-                "mrad",
-                0.0,
-                "CONTACT's input, which another code found; on the flange its wheels do not stand equally low",
-            ),
-        ]
-    )
+    if wheel == "right":
+        why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
+        roll = np.abs(np.array([1e3 * position.roll for position in placed]) - published[:, 1])
+        rows.append(finding("manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad", 0.0, why))
+    return rows
 
 
-def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
+def _static_rows(placed: list[Placed]) -> list[Row]:
     """Touching places by search, and the mirror image."""
-    off = np.array([gap for one in placed for gap in _searched_off(contact, one)])
+    contact, gaps = contact_of("A-1"), []
+    for position in placed:
+        for sign, places in ((1.0, position.right), (-1.0, position.left)):
+            for place in places:
+                y, u, angle = searched(contact.side, position, sign, place.wheel_y)
+                gaps.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
     one, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
     mirror = max(
         abs(a / b - 1.0)
@@ -135,36 +137,25 @@ def _static_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
         for a, b in ((x.y, y.y), (x.normal, y.normal))
     )
     why = "search over points of the wheel's surface, straight between points of both profiles"
+    asked, corner = f"{why}; the bound asked for", f"{why}, as far as an angle changes in 0.3 mm of the gauge corner"
+    told = (
+        ("rail", "first touch on the rail, case A-1", "mm", PLACE, asked),
+        ("wheel", "first touch on the wheel, case A-1", "mm", PLACE, asked),
+        ("angle", "angle there", "rad", 0.02, corner),
+    )
     return [
-        at_most(
-            "manchester.search.rail",
-            SYSTEM,
-            "first touch on the rail, case A-1, largest difference",
-            float(off[:, 0].max()),
-            "mm",
-            PLACE,
-            f"{why}; the bound asked for",
-            "closed form",
-        ),
-        at_most(
-            "manchester.search.wheel",
-            SYSTEM,
-            "first touch on the wheel, case A-1, largest difference",
-            float(off[:, 1].max()),
-            "mm",
-            PLACE,
-            f"{why}; the bound asked for",
-            "closed form",
-        ),
-        at_most(
-            "manchester.search.angle",
-            SYSTEM,
-            "angle there, largest difference",
-            float(off[:, 2].max()),
-            "rad",
-            0.02,
-            f"{why}, as far as an angle changes in 0.3 mm of the gauge corner",
-            "closed form",
+        *(
+            at_most(
+                f"manchester.search.{name}",
+                SYSTEM,
+                f"{what}, largest difference",
+                float(gap),
+                unit,
+                bound,
+                why,
+                "closed form",
+            )
+            for (name, what, unit, bound, why), gap in zip(told, np.max(gaps, axis=0), strict=True)
         ),
         at_most(
             "manchester.mirror",
@@ -184,7 +175,7 @@ def _axle_row(placed: Placed) -> Row:
     moments = [
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
     ]
-    most = BENCHMARK_FRICTION * BENCHMARK_LOAD * placed.right[0].rolling_radius
+    most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placed.right[0].rolling_radius
     return at_most(
         "manchester.axle",
         SYSTEM,
@@ -197,19 +188,11 @@ def _axle_row(placed: Placed) -> Row:
     )
 
 
-def _searched_off(contact: Contact, placed: Placed) -> list[tuple[float, float, float]]:
-    found = []
-    for sign, places in ((1.0, placed.right), (-1.0, placed.left)):
-        for place in places:
-            y, u, angle = searched(contact.side, placed, sign, place.wheel_y)
-            found.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
-    return found
-
-
-def _split_rows(contact: Contact, placed: Placed) -> list[Row]:
+def _split_rows(placed: Placed) -> list[Row]:
     """How two patches share the load at 5 mm, in case A-2."""
     own = [place.normal for place in placed.right]
     total = sum(own)
+    contact = contact_of("A-2")
     alone, (mean, _, plane) = apart(contact, placed), on_one_plane(contact, placed)
     far = {
         name: 100.0 * max(abs(a - b) for a, b in zip(own, other, strict=True)) / total
@@ -250,7 +233,7 @@ def _split_rows(contact: Contact, placed: Placed) -> list[Row]:
 
 def _load_row(static: list[Placed]) -> Row:
     off = max(
-        abs(sum(place.vertical for place in wheel) / BENCHMARK_LOAD - 1.0)
+        abs(sum(place.vertical for place in wheel) / SCENE.wheelset.load - 1.0)
         for one in static
         for wheel in (one.right, one.left)
     )
@@ -266,7 +249,7 @@ def _load_row(static: list[Placed]) -> Row:
     )
 
 
-def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
+def _file_rows(placed: list[Placed]) -> list[Row]:
     """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
     names = {"places": ("mm", PLACE, 0), "forces": ("%", FORCE, 1)}
     words = "built-in profiles against the benchmark's files, case A-2"
@@ -276,7 +259,7 @@ def _file_rows(contact: Contact, placed: list[Placed]) -> list[Row]:
         return [not_run(f"manchester.files.{name}", SYSTEM, f"{name}: {words}", reason) for name in names]
     rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = Side(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
-    other = Contact(side, contact.load, contact.speed, contact.friction)
+    other = replace(contact_of("A-2"), side=side)
     chosen = [(one, other.at(one.shift, one.yaw)) for one in placed if round(1e3 * one.shift, 6) in FILES]
     pairs = [(sums(one, wheel), sums(theirs, wheel)) for one, theirs in chosen for wheel in WHEELS]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]

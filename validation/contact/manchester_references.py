@@ -6,6 +6,7 @@ Published are the reference outputs mbench_a22_right and mbench_a22_left that CO
 
 import math
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,16 @@ from models.contact.normal_problem import NormalSolution, centres, solve_normal
 from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, Side, distance_over, touches_of
 from models.rail.contact_table import Contact, Placed
+from models.systems.wheel_rail.scene import build
 
+SCENE = build(
+    {
+        "title": "Manchester contact benchmark",
+        "system": "wheel-rail",
+        "cases": {"A-1": {}, "A-2": {"yaw": 2.4, "friction": 0.3}},
+    }
+)
+"""New S1002 wheels on new UIC 60 rails at 1:40 with 10 kN on each; A-1 is pressed, A-2 rolls at 2 m/s with yaw."""
 CONTACT = np.loadtxt(Path(__file__).with_name("manchester_contact.csv"), delimiter=",", skiprows=1)
 """Shift (mm), roll (mrad), then of the right and of the left wheel the mean place of contact across the track (mm), the
 normal force (N) and the largest pressure (MPa)."""
@@ -29,6 +39,17 @@ SETTLED, SUNK = 1e-4, 1e-8
 SEARCHED, GRID, HALVINGS, STEP = (2e-3, 0.06), np.linspace(-1.0, 1.0, 101), 6, 3e-4
 """Reach of the search along the profile (m) and round the axle (rad), its grid, how often it shrinks to a quarter; step
 (m) over which the rail's angle is taken."""
+
+
+@cache
+def contact_of(case: str) -> Contact:
+    """Wheelset and track of a case."""
+    return SCENE.contact(SCENE.cases[case])
+
+
+def placed_at(case: str, shift: float) -> Placed:
+    """Contact of a case at a lateral displacement (m)."""
+    return contact_of(case).at(shift, SCENE.cases[case].yaw * shift)
 
 
 def sums(placed: Placed, wheel: str) -> tuple[float, float, float]:

@@ -1,5 +1,6 @@
 """Wheels at low speed in Exudyn: what an explicit and an implicit integrator need for the same decaying motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,16 +40,22 @@ def wheel(speed: float) -> tuple[Wheels, tuple[Array, Array]]:
     return Wheels(1, speed=speed), (np.array([1e-4, 1e-4, 0.0, 1e-4]), np.zeros(4))
 
 
+def counting(function: Callable[..., Any], calls: list[int], each: int = 1) -> Callable[..., Any]:
+    """The function, every call of which adds ``each`` to ``calls``."""
+
+    def counted(*arguments: Any) -> Any:
+        calls[0] += each
+        return function(*arguments)
+
+    return counted
+
+
 def march(speed: float, method: str, steps: int, with_slopes: bool = True) -> tuple[Array, int]:
     """Positions at the end and the number of force calls; RunFailed or Refused where there are none."""
     (wheels, start), calls = wheel(speed), [0]
     forces = Forces(wheels)
-
-    def of(q: Any, v: Any) -> Any:
-        calls[0] += 1
-        return forces.of(q, v)
-
-    rolling = Rolling(wheels, of, slopes=forces.slopes if with_slopes and method in METHODS else None)
+    slopes = forces.slopes if with_slopes and method in METHODS else None
+    rolling = Rolling(wheels, counting(forces.of, calls), slopes=slopes)
     return rolling.run(*start, steps, DURATION / steps, method)[: wheels.size], calls[0]
 
 
@@ -61,12 +68,12 @@ def runs(speed: float, steps: tuple[float, ...]) -> list[Run]:
     """The explicit run at nearly its longest step, against one of half of it, and implicit ones of some steps (s)."""
     coarse = int(np.ceil(1.05 * DURATION / longest(speed)))
     true, _ = march(speed, "RK44", 2 * coarse)
-    found = []
+    done = []
     for method, count in [("RK44", coarse)] + [(name, round(DURATION / step)) for name in METHODS for step in steps]:
         end, calls = march(speed, method, count)
         error = float(np.abs(end - true).max() / np.abs(true).max())
-        found.append(Run(speed, method, DURATION / count, count, calls, error))
-    return found
+        done.append(Run(speed, method, DURATION / count, count, calls, error))
+    return done
 
 
 def rows(quick: bool) -> tuple[list[Row], list[Run]]:
@@ -91,33 +98,20 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
         )
         for run in implicit
     ]
-    tried = {"slopes by differences": (0.1, "GeneralizedAlpha", 200, False), "explicit": (0.1, "RK44", 200, True)}
-    expected = {"slopes by differences": "raised", "explicit": "refused"}
     why = "the slopes of sliding let Newton's method leap from slip to slip; an explicit step is beyond its limit"
-    for name, how in tried.items():
-        what = f"Exudyn at 0.1 m/s in steps of 1 ms, {how[1]}, {name}"
-        found.append(
-            behaves(
-                f"contact_bridges.low-speed.{name.replace(' ', '-')}",
-                SYSTEM,
-                what,
-                _said(*how),
-                expected[name],
-                why,
-                "none",
-            )
-        )
+    for name, method, with_slopes, expected in (
+        ("slopes by differences", "GeneralizedAlpha", False, "raised"),
+        ("explicit", "RK44", True, "refused"),
+    ):
+        try:
+            march(0.1, method, 200, with_slopes)
+            said = "an answer"
+        except (Refused, RunFailed) as error:
+            said = "refused" if isinstance(error, Refused) else "raised"
+        what = f"Exudyn at 0.1 m/s in steps of 1 ms, {method}, {name}"
+        row = f"contact_bridges.low-speed.{name.replace(' ', '-')}"
+        found.append(behaves(row, SYSTEM, what, said, expected, why, "none"))
     return found, done
-
-
-def _said(speed: float, method: str, steps: int, with_slopes: bool) -> str:
-    try:
-        march(speed, method, steps, with_slopes)
-    except Refused:
-        return "refused"
-    except RunFailed:
-        return "raised"
-    return "an answer"
 
 
 def table(saved: list[dict[str, Any]]) -> Table:

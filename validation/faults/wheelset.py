@@ -8,12 +8,13 @@ from unittest import mock
 
 import numpy as np
 
+from models.contact.inputs import Array
 from models.contact.linear_theory import forces as kalker
 from models.engines.wheelset_mujoco import MujocoWheelset
-from models.rail import energy
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import wavelength
+from models.rail.energy import energies, rates_and_powers
 from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.profile_contact import N_Y, Y_, Z_
@@ -41,13 +42,13 @@ def equations(law: Law = "fastsim") -> Equations:
 
 
 @cache
-def states() -> np.ndarray:
+def states() -> Array:
     """States (2, 10) about rest."""
     return equations().rest + STATES
 
 
 @cache
-def by_engine() -> np.ndarray:
+def by_engine() -> Array:
     """Rates (2, 10) by MuJoCo."""
     built = MujocoWheelset(CHOSEN, SPEED, cells=7)
     return np.array([built.rates(state) for state in states()])
@@ -58,56 +59,44 @@ def _engine() -> float:
 
 
 def _mirror() -> float:
-    own = equations()
-    return max(off(MIRROR * own.rates(MIRROR * state), own.rates(state)) for state in states())
+    rates = equations().rates
+    return max(off(MIRROR * rates(MIRROR * state), rates(state)) for state in states())
 
 
 def _balance() -> float:
-    """Change of the energy held, by its differences along the motion, less the powers."""
-    own, there = equations(), states()
-    rates, powers = energy._there(own, there)
-    ahead, behind = (_held(own, there + part * TINY * rates) for part in (1.0, -1.0))
+    """Change of the energies of motion, springs and weight, by differences along the motion, less the powers."""
+    written, there = equations(), states()
+    rates, powers = rates_and_powers(written, there)
+    ahead, behind = (np.sum(energies(written, there + part * TINY * rates), axis=0) for part in (1.0, -1.0))
     stored, driven, *lost = powers.T
-    found = (ahead - behind) / (2.0 * TINY) + stored - driven + sum(lost)
-    return float(np.abs(found).max() / np.abs(powers).max())
+    missing = (ahead - behind) / (2.0 * TINY) + stored - driven + sum(lost)
+    return float(np.abs(missing).max() / np.abs(powers).max())
 
 
-def _held(own: Equations, there: np.ndarray) -> np.ndarray:
-    weight = own.wheelset.mass * energy.GRAVITY + 2.0 * own.body[eq.CARRIED]
-    return energy._kinetic(own, there) + energy._suspension(own.body, there)[0] - weight * there[:, eq.Z]
-
-
-def _reports(state: np.ndarray, law: Law = "fastsim") -> np.ndarray:
-    own = equations(law)
-    report = own.blank()
-    eq.rates(state, *own.given, np.empty(eq.STATES), report)
-    return report
+def _report(state: Array, law: Law = "fastsim") -> Array:
+    return equations(law).at(state[None])[1][0]
 
 
 def _friction() -> float:
     """Creep forces of wheels that slide all over, by mu N, less 1; infinite if they have power."""
-    report = _reports(states()[SLIDING])
+    report = _report(states()[SLIDING])
     if report[:, wf.POWER].max() > 0.0:
         return np.inf
     bound = CHOSEN.friction * report[:, wf.LOAD]
     return float(np.abs(np.hypot(report[:, wf.FX], report[:, wf.FY]) / bound - 1.0).max())
 
 
-def _wave() -> float:
-    return abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0)
-
-
 def _rest() -> float:
     """Spin and carried load at rest."""
-    own = equations()
-    report = _reports(own.rest)
+    rest = equations().rest
+    report = _report(rest)
     up = report[:, wf.LOAD] * np.cos(report[:, wf.ANGLE]) - report[:, wf.FY] * np.sin(report[:, wf.ANGLE])
-    return max(abs(own.rest[eq.SPIN] * CHOSEN.radius / SPEED + 1.0), abs(up.sum() / CHOSEN.load - 1.0))
+    return max(abs(rest[eq.SPIN] * CHOSEN.radius / SPEED + 1.0), abs(up.sum() / CHOSEN.load - 1.0))
 
 
 def _linear() -> float:
     """Creep forces and moment of the linear law against Kalker's theory at the creepages that are reported."""
-    report = _reports(states()[0], "linear")
+    report = _report(states()[0], "linear")
     a, b, x, y, spin = report[:, [wf.A, wf.B, wf.XI_1, wf.XI_2, wf.XI_3]].T
     wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
     return max(off(report[:, k], value) for k, value in zip((wf.FX, wf.FY, wf.MZ), wanted, strict=True))
@@ -118,7 +107,12 @@ CHECKS = {
     "mirror": Check("rates of the mirror image", "of the largest", 1e-12, _mirror),
     "balance": Check("change of energy by the powers", "of the largest", 1e-6, _balance),
     "friction": Check("force of sliding wheels by mu N, little of it by spin, no power", "relative", 1e-3, _friction),
-    "wave": Check("Klingel's wavelength in closed form", "relative", 1e-3, _wave),
+    "wave": Check(
+        "Klingel's wavelength in closed form",
+        "relative",
+        1e-3,
+        lambda: abs(wavelength(Equations, CHOSEN) / klingel(CHOSEN) - 1.0),
+    ),
     "rest": Check("spin and load at rest", "relative", 1e-5, _rest),
     "linear": Check("forces by Kalker's linear theory", "of the largest", 1e-9, _linear),
 }
@@ -130,8 +124,8 @@ def written(**functions: Any) -> Patch:
     def prepare() -> Context:
         @contextmanager
         def context() -> Iterator[None]:
-            each = with_globals(wf._patch_by_patch.py_func, **functions)
-            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, _patch_by_patch=each)
+            each = with_globals(wf.patch_by_patch.py_func, **functions)
+            faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=each)
             with mock.patch.multiple(eq, wheel_forces=faulty, rates=eq.rates.py_func, set_rates=eq.set_rates.py_func):
                 yield
 
@@ -174,20 +168,20 @@ def touching(change: Callable[[Any], None]) -> Patch:
     return written(contact_points=contact_points)
 
 
-def _nothing(*_: Any) -> None:
-    pass
+def times(column: int, factor: float, which: int = 0) -> Callable[..., None]:
+    """Multiply a column of one of the arrays."""
+
+    def change(*arrays: Any) -> None:
+        arrays[which][:, column] *= factor
+
+    return change
 
 
-def _spin_reversed(contacts: Any, slip: Any) -> None:
-    slip[:, 2] *= -1.0
+spin_reversed = times(2, -1.0, which=1)
 
 
 def _shared(contacts: Any, slip: Any) -> None:
     contacts[:, 2] = contacts[:, 2].mean()
-
-
-def _rougher(contacts: Any, slip: Any) -> None:
-    contacts[:, 3] *= 1.01
 
 
 def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
@@ -198,17 +192,9 @@ def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
 
 def _swapped(touches: Any) -> None:
     """Each wheel on its own side with the other one's contact."""
-    own = touches[:, [Y_, N_Y]].copy()
+    sides = touches[:, [Y_, N_Y]].copy()
     touches[:] = touches[::-1].copy()
-    touches[:, [Y_, N_Y]] = own
-
-
-def _other_normal(touches: Any) -> None:
-    touches[:, N_Y] *= -1.0
-
-
-def _longer_arm(touches: Any) -> None:
-    touches[:, Z_] *= 1.01
+    touches[:, [Y_, N_Y]] = sides
 
 
 def _no_gyroscope(state: Any, body: Any, rates: Any) -> None:
@@ -231,14 +217,14 @@ def _damped_twice(real: Any) -> Any:
 
 
 FAULTS = (
-    Fault("sign of the spin creepage", "creep law", creeping(_spin_reversed)),
+    Fault("sign of the spin creepage", "creep law", creeping(spin_reversed)),
     Fault("sign of the spin moment", "creep law", written(creep=_turned_back)),
-    Fault("creepage by a speed 2 % off", "creep law", creeping(_nothing, 1.02)),
+    Fault("creepage by a speed 2 % off", "creep law", creeping(lambda contacts, slip: None, 1.02)),
     Fault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
-    Fault("friction 1 % off", "creep law", creeping(_rougher)),
+    Fault("friction 1 % off", "creep law", creeping(times(3, 1.01))),
     Fault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
-    Fault("normal leans the other way", "contact", touching(_other_normal)),
-    Fault("arm of the contact forces 1 % off", "contact", touching(_longer_arm)),
+    Fault("normal leans the other way", "contact", touching(times(N_Y, -1.0))),
+    Fault("arm of the contact forces 1 % off", "contact", touching(times(Z_, 1.01))),
     Fault("no gyroscopic moments", "body", after(_no_gyroscope)),
     Fault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
     Fault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),

@@ -1,8 +1,6 @@
 """A user's scene of a wheelset as the search of the price of accuracy sees it: all its paths at once."""
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,17 +8,15 @@ from scipy.integrate import solve_ivp
 from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
-from models.rail.equations import STATES, STIFF, YAW, Equations, Path, rates
-from models.rail.wheelset import Wheelset
-from models.systems.wheelset.channels import CONTACTS
-from models.systems.wheelset.channels import STATES as COORDINATES
-from models.systems.wheelset.of_scene import implementation, path_speeds, wheelset_of
+from models.rail.equations import STIFF, Equations, Path
+from models.systems.wheelset.of_scene import path_speeds, started, wheelset_of
+from models.systems.wheelset.run import CONTACTS, STATES, path
 from models.systems.wheelset.scene import WheelsetScene
 
 FIRST = 0.25
 """s: of a longer path only so much is searched."""
 USUAL = "y"
-QUANTITIES = {**COORDINATES, **CONTACTS}
+QUANTITIES = {**STATES, **CONTACTS}
 """Places and units of what can be asked about: of states, or of the contacts of all patches."""
 
 
@@ -28,40 +24,28 @@ QUANTITIES = {**COORDINATES, **CONTACTS}
 class OwnWheelset(Meshed):
     """The paths of a scene at all its speeds."""
 
-    wheelset: Wheelset
-    law: Literal["linear", "fastsim"]
+    scene: WheelsetScene
     speeds: tuple[float, ...]
-    start: tuple[float, float]
 
-    @cached_property
-    def _starts(self) -> dict[tuple[str, int, float], tuple[Equations, np.ndarray]]:
-        return {}
-
-    def _started(self, engine: str, cells: int, speed: float) -> tuple[Equations, np.ndarray]:
-        """Equations and the scene's start."""
-        key = (engine, cells, speed)
-        if key not in self._starts:
-            found = implementation(engine)(self.wheelset, speed, self.law, cells or 3)
-            state = found.displaced(self.start[0])
-            state[YAW] = self.start[1]
-            self._starts[key] = found, state
-        return self._starts[key]
+    def _scene(self, cells: int, step: float, duration: float) -> WheelsetScene:
+        """The scene with another net, step and duration (s)."""
+        contact = self.scene.contact.model_copy(update={"cells": cells or 3})
+        run = self.scene.run.model_copy(update={"step": step, "duration": duration})
+        return self.scene.model_copy(update={"contact": contact, "run": run})
 
     def run(self, engine: str, cells: int, step: float, duration: float) -> list[Path]:
         """A path for every speed."""
-        return [
-            equations.run(state, duration, step)
-            for equations, state in (self._started(engine, cells, speed) for speed in self.speeds)
-        ]
+        return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[Path]:
         """The same by DOP853."""
-        return [_exact(*self._started("reference", cells, speed), step, duration) for speed in self.speeds]
+        scene = self._scene(cells, step, duration)
+        return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[Path]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity of all paths side by side."""
         place, times = QUANTITIES[self.quantity][0], run[0].times
-        columns = [one.states[:, [place]] if self.quantity in COORDINATES else one.contacts[:, :, place] for one in run]
+        columns = [one.states[:, [place]] if self.quantity in STATES else one.contacts[:, :, place] for one in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
@@ -87,10 +71,7 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     if not done.success:
         raise RunFailed("reference", done.message)
     states = np.ascontiguousarray(done.y.T)
-    contacts, out = equations.blank(len(times)), np.empty(STATES)
-    for one, contact in zip(states, contacts, strict=True):
-        rates(one, *equations.given, out, contact)
-    return Path(times, states, contacts)
+    return Path(times, states, equations.at(states)[1])
 
 
 def own(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> OwnWheelset:
@@ -114,8 +95,6 @@ def own(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) ->
         run.step,
         longest,
         cells,
-        wheelset,
-        contact.law,
+        scene,
         speeds,
-        (run.displacement, run.yaw),
     )

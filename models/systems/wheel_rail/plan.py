@@ -12,30 +12,20 @@ def check(scene: WheelRailScene, engines: tuple[str, ...]) -> None:
 def describe(scene: WheelRailScene) -> str:
     """The scene's plan as text: profiles, track, wheelset, positions, cases."""
     p, w, at = scene.profiles, scene.wheelset, scene.positions
-    lines = [
-        scene.title,
-        _line("scene", f"{scene.file}, study {scene.study}"),
-        _line(
-            "wheel",
-            f"{p.wheel}, radius {1e3 * w.radius:g} mm, backs {1e3 * p.back_to_back:g} mm apart, taping line "
-            f"{1e3 * p.taping:g} mm from a back",
-        ),
-        _line(
-            "rail",
-            f"{p.rail}, turned by {p.inclination:g} rad, gauge {1e3 * p.gauge:g} mm at "
-            f"{1e3 * p.gauge_depth:g} mm below the top",
-        ),
-        _line("wheelset", f"{w.load / 1e3:g} kN on each wheel, {w.speed:g} m/s"),
-        _line("positions", f"{at.count} from {1e3 * at.start:g} to {1e3 * at.stop:g} mm to the right"),
-    ]
-    return "\n".join([*lines, *(_line(name, case_text(case.yaw, case.friction)) for name, case in scene.cases.items())])
+    lines = {
+        "scene": f"{scene.file}, study {scene.study}",
+        "wheel": f"{p.wheel}, radius {1e3 * w.radius:g} mm, backs {1e3 * p.back_to_back:g} mm apart, taping line "
+        f"{1e3 * p.taping:g} mm from a back",
+        "rail": f"{p.rail}, turned by {p.inclination:g} rad, gauge {1e3 * p.gauge:g} mm at "
+        f"{1e3 * p.gauge_depth:g} mm below the top",
+        "wheelset": f"{w.load / 1e3:g} kN on each wheel, {w.speed:g} m/s",
+        "positions": f"{at.count} from {1e3 * at.start:g} to {1e3 * at.stop:g} mm to the right",
+    }
+    cases = ((name, case_text(case.yaw, case.friction)) for name, case in scene.cases.items())
+    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in (*lines.items(), *cases))])
 
 
 def case_text(yaw: float, friction: float) -> str:
     """A case in words."""
     turned = f"yaw {yaw:g} mrad for each mm" if yaw else "no yaw"
     return f"{turned}, " + (f"rolling with friction {friction:g}" if friction else "pressed without friction")
-
-
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"

@@ -90,30 +90,16 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Wh
         if not least <= value <= most:
             raise InputError(file, place, value, f"must be from {least:g} to {most:g} {unit}")
     for name, case in scene.cases.items():
-        _check_case(scene, name, case)
-    return _with_files(scene)
-
-
-def _check_case(scene: WheelRailScene, name: str, case: Case) -> None:
-    largest = float(np.abs(case.yaw * scene.positions.values()).max())
-    if largest > LARGEST_YAW:
-        raise InputError(
-            scene.file,
-            f"cases.{name}.yaw",
-            case.yaw,
-            f"turns the wheelset by {largest:.3g} rad, more "
-            f"than {LARGEST_YAW:g}: the yaw is in rad for each metre of displacement",
-        )
-    if case.friction > LARGEST_FRICTION:
-        raise InputError(scene.file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
-
-
-def _with_files(scene: WheelRailScene) -> WheelRailScene:
-    """The scene with the paths of its profiles' files."""
-    named = {kind: getattr(scene.profiles, kind) for kind in ("wheel", "rail")}
-    files = {kind: str(scene.path(name, f"profiles.{kind}")) for kind, name in named.items() if Path(name).suffix}
-    if scene.profiles.smoothing and not files:
-        raise InputError(
-            scene.file, "profiles.smoothing", scene.profiles.smoothing, "has no meaning for built-in profiles"
-        )
-    return scene.model_copy(update={"profiles": scene.profiles.model_copy(update=files)})
+        largest = float(np.abs(case.yaw * scene.positions.values()).max())
+        if largest > LARGEST_YAW:
+            turned = (
+                f"turns the wheelset by {largest:.3g} rad, more than {LARGEST_YAW:g}: the yaw is in rad for each metre "
+                "of displacement"
+            )
+            raise InputError(file, f"cases.{name}.yaw", case.yaw, turned)
+        if case.friction > LARGEST_FRICTION:
+            raise InputError(file, f"cases.{name}.friction", case.friction, f"must be at most {LARGEST_FRICTION:g}")
+    profiles = scene.profiles
+    if profiles.smoothing and not any(Path(name).suffix for name in (profiles.wheel, profiles.rail)):
+        raise InputError(file, "profiles.smoothing", profiles.smoothing, "has no meaning for built-in profiles")
+    return scene.model_copy(update={"profiles": profiles.located(scene)})

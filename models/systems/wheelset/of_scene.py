@@ -1,20 +1,20 @@
 """From a scene to its wheelset, and to the equations of motion of each implementation."""
 
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from models.contact.standard_profiles import RAILS, WHEELS
+import numpy as np
+
 from models.core.errors import InputError
 from models.core.scene_effects import extended
 from models.core.scene_file import existing, parse
-from models.rail.equations import Equations
-from models.rail.laid_profiles import Profiles
-from models.rail.linear import NoCriticalSpeed, critical_speed
+from models.rail.equations import YAW, Equations
+from models.rail.linear import critical_or_why
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.scene import WheelsetScene
 
-BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 SETS = {"chosen": CHOSEN}
 IMPLEMENTATIONS = {
     "reference": "models.rail.equations.Equations",
@@ -37,7 +37,7 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
     if base is None:
         path = existing(name, Path(scene.folder), scene.file, "wheelset.parameters")
         base = _judged(parse(path), path.name, "")
-    profiles = _profiles(scene, base)
+    profiles = base.profiles if scene.profiles is None else scene.profiles.located(scene)
     if profiles is not None and FLANGE in override:
         raise InputError(
             scene.file,
@@ -47,37 +47,6 @@ def wheelset_of(scene: WheelsetScene) -> Wheelset:
         )
     values = {key: getattr(base, key) for key in Wheelset.model_fields} | {"profiles": profiles}
     return extended(_judged(values | override, scene.file, "wheelset.override"), scene)
-
-
-def _profiles(scene: WheelsetScene, base: Wheelset) -> Profiles | None:
-    """Profiles of the scene, with the paths of their files, or else the parameter set's own."""
-    if scene.profiles is None:
-        return base.profiles
-    found = scene.profiles
-    for kind in ("wheel", "rail"):
-        name = getattr(found, kind)
-        if Path(name).suffix:
-            found = found.model_copy(update={kind: str(scene.path(name, f"profiles.{kind}"))})
-        elif name not in BUILT_IN[kind]:
-            allowed = "must be a file or built in"
-            raise InputError(scene.file, f"profiles.{kind}", name, allowed, tuple(BUILT_IN[kind]))
-    return found
-
-
-def any_of(scene: WheelsetScene, *keys: str) -> bool:
-    """Whether any of these parameters of the scene's wheelset is above zero."""
-    wheelset = wheelset_of(scene)
-    return any(getattr(wheelset, key) > 0.0 for key in keys)
-
-
-def override(table: dict[str, Any], values: dict[str, float]) -> None:
-    """Put parameters into a scene's table in place of its set's own."""
-    table.setdefault("wheelset", {}).setdefault("override", {}).update(values)
-
-
-def usual(*keys: str) -> dict[str, float]:
-    """Parameters of the chosen wheelset."""
-    return {key: getattr(CHOSEN, key) for key in keys}
 
 
 def _judged(values: dict[str, Any], file: str, table: str) -> Wheelset:
@@ -100,12 +69,25 @@ def equations_of(scene: WheelsetScene, engine: str, speed: float) -> Equations:
     return implementation(engine)(wheelset_of(scene), speed, scene.contact.law, scene.contact.cells)
 
 
+@lru_cache(32)
+def _started(
+    engine: str, wheelset: Wheelset, speed: float, law: Any, cells: int, shift: float, yaw: float
+) -> tuple[Equations, np.ndarray]:
+    equations = implementation(engine)(wheelset, speed, law, cells)
+    state = equations.displaced(shift)
+    state[YAW] = yaw
+    return equations, state
+
+
+def started(scene: WheelsetScene, engine: str, speed: float) -> tuple[Equations, np.ndarray]:
+    """Equations at a speed (m/s), and the state (10,) that the scene's paths begin with; kept for further paths."""
+    contact, run = scene.contact, scene.run
+    return _started(engine, wheelset_of(scene), speed, contact.law, contact.cells, run.displacement, run.yaw)
+
+
 def path_speeds(scene: WheelsetScene) -> list[float]:
     """Speeds (m/s) of the paths: the scene's, or around the critical one, or the last speed where there is none."""
     if scene.run.speeds:
         return list(scene.run.speeds)
-    try:
-        critical = critical_speed(wheelset_of(scene))
-    except NoCriticalSpeed:
-        return [float(scene.speeds.all()[-1])]
-    return [round(share * critical, 2) for share in BESIDE]
+    critical, _ = critical_or_why(wheelset_of(scene))
+    return [round(share * critical, 2) for share in BESIDE] if critical else [float(scene.speeds.all()[-1])]

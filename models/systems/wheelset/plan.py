@@ -2,7 +2,7 @@
 
 from models.core.errors import InputError
 from models.core.scene_effects import lines as effect_lines
-from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
+from models.rail.linear import critical_or_why, klingel
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
 from models.systems.wheelset.scene import WheelsetScene
@@ -12,7 +12,6 @@ LAWS = {"linear": "Kalker's linear theory, without bound", "fastsim": "FASTSIM, 
 
 def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
     """Refuse, before any file is written, what reading alone does not find: a wheelset or a step that cannot be."""
-    wheelset_of(scene)
     for speed in path_speeds(scene):
         equations = equations_of(scene, "reference", speed)
         try:
@@ -23,44 +22,31 @@ def check(scene: WheelsetScene, engines: tuple[str, ...]) -> None:
 
 def describe(scene: WheelsetScene) -> str:
     """The scene's plan as text: wheelset, contact, suspension, speeds, and what is built in which engine."""
-    wheelset, own = wheelset_of(scene), scene.wheelset
-    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
+    wheelset = wheelset_of(scene)
+    changed = ", ".join(f"{name} = {value:g}" for name, value in scene.wheelset.override.items())
     ellipse, run, speeds = wheelset.ellipse, scene.run, scene.speeds.all()
-    lines = [
-        scene.title,
-        _line("scene", f"{scene.file}, study {scene.study}"),
-        _line("wheelset", own.parameters + (f", but {changed}" if changed else "")),
-        _line(
-            "",
-            f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, spin",
-        ),
-        _line("wheels", _wheels(wheelset)),
-        _line(
-            "contact",
-            f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
-            f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}",
-        ),
-        _line(
-            "flange",
-            "that of the profile"
-            if wheelset.profiles
-            else f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m",
-        ),
-        _line("held by", _suspension(wheelset)),
-        _line("Klingel", f"wavelength {klingel(wheelset):.5g} m"),
-        _line("critical", _critical(wheelset)),
-        _line("speeds", f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s"),
-        _line(
-            "paths",
-            f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
-            f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
-        ),
-    ]
-    return "\n".join([*lines, *effect_lines(scene), "", *ENGINES])
-
-
-def _line(head: str, text: str) -> str:
-    return f"  {head:<10} {text}"
+    critical, why = critical_or_why(wheelset)
+    lines = {
+        "scene": f"{scene.file}, study {scene.study}",
+        "wheelset": scene.wheelset.parameters + (f", but {changed}" if changed else ""),
+        "": f"{wheelset.mass:g} kg, {wheelset.load:g} N on both rails, 5 freedoms: lateral, vertical, roll, yaw, spin",
+        "wheels": _wheels(wheelset),
+        "contact": f"{LAWS[scene.contact.law].format(scene.contact.cells)}; at rest a = {1e3 * ellipse.a:.3g} "
+        f"mm, b = {1e3 * ellipse.b:.3g} mm; friction {wheelset.friction:g}",
+        "flange": "that of the profile"
+        if wheelset.profiles
+        else f"after {1e3 * wheelset.flange_clearance:g} mm, {wheelset.flange_stiffness:g} N/m",
+        "held by": _suspension(wheelset),
+        "Klingel": f"wavelength {klingel(wheelset):.5g} m",
+        "critical": f"{critical:.5g} m/s by the linear theory of two motions"
+        if critical
+        else f"none: the wheelset {why}",
+        "speeds": f"{len(speeds)} from {speeds.min():g} to {speeds.max():g} m/s",
+        "paths": f"at {' and '.join(f'{speed:g}' for speed in path_speeds(scene))} m/s, {run.duration:g} s in "
+        f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
+    }
+    told = [f"  {head:<10} {text}" for head, text in lines.items()]
+    return "\n".join([scene.title, *told, *effect_lines(scene), "", *ENGINES])
 
 
 def _wheels(wheelset: Wheelset) -> str:
@@ -75,21 +61,9 @@ def _wheels(wheelset: Wheelset) -> str:
 def _suspension(wheelset: Wheelset) -> str:
     """Springs and dampers of one side along each axis, in words."""
     w = wheelset
-    parts = [
-        f"{axis} {spring:g} N/m and {damper:g} N s/m"
-        for axis, spring, damper in zip(
-            "xyz", (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z), strict=True
-        )
-        if spring or damper
-    ]
+    sizes = ((axis, getattr(w, f"stiffness_{axis}"), getattr(w, f"damping_{axis}")) for axis in "xyz")
+    parts = [f"{axis} {spring:g} N/m and {damper:g} N s/m" for axis, spring, damper in sizes if spring or damper]
     return f"on each side, {w.half_spacing:g} m from the middle: {', '.join(parts)}" if parts else "nothing: it is free"
-
-
-def _critical(wheelset: Wheelset) -> str:
-    try:
-        return f"{critical_speed(wheelset):.5g} m/s by the linear theory of two motions"
-    except NoCriticalSpeed as error:
-        return f"none: the wheelset {error.allowed}"
 
 
 ENGINES = (

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as typed_items
 import mujoco
 import numpy as np
 from mujoco import rollout
@@ -18,11 +17,12 @@ from mujoco import rollout
 from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn import counted
+from models.engines.exudyn_coordinates import solve
+from models.engines.exudyn_system import items
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import quiet
 from models.sensors.rotations import from_matrix, logarithm, product
 
-items: Any = typed_items
 KINDS = exu.OutputVariableType
 Gyro = Callable[[np.ndarray], np.ndarray]
 """Local rates (n, 3) in rad/s at times (n,) in s."""
@@ -56,8 +56,8 @@ def in_mujoco(method: str, period: float, count: int, every: int, start: np.ndar
             torques,
             control_spec=int(mujoco.mjtState.mjSTATE_QFRC_APPLIED),
         )
-    found = np.vstack([start, path[0, every - 1 :: every, 1:5]])
-    return _sound("mujoco", found, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
+    attitudes = np.vstack([start, path[0, every - 1 :: every, 1:5]])
+    return _sound("mujoco", attitudes, {"steps": count, "force calls": (4 if method == "RK4" else 1) * count})
 
 
 def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndarray, gyro: Gyro) -> Attitudes:
@@ -71,13 +71,17 @@ def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndar
     pushed = np.diff(rates, axis=0) / period if known.holds else (gyro(times + NUDGE) - gyro(times - NUDGE)) / 2 / NUDGE
     implicit = name in ("GeneralizedAlpha", "TrapezoidalIndex2")
     mbs, sensor = _sphere(start, rates[0], pushed.tolist(), period, implicit, known.holds)
-    options = _options(period, count, every)
-    solved = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, name))
+    options = exu.SimulationSettings()
+    options.solution.file.write, options.solution.sensors.active = False, True
+    options.solution.sensors.writePeriod = period * every
+    options.timeIntegration.automaticStepSize = False
+    options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
+    solved = solve(mbs, options, count, period, name)
     kept = mbs.GetSensorStoredData(sensor)[:, 1:]
     if not solved or len(kept) != count // every + 1:
         raise RunFailed("exudyn", "the solver reported failure", period * every * len(kept))
-    found = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
-    return _sound("exudyn", found, counted(mbs))
+    attitudes = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
+    return _sound("exudyn", attitudes, counted(mbs))
 
 
 def _sphere(
@@ -87,18 +91,10 @@ def _sphere(
     mbs = exu.SystemContainer().AddSystem()
     still, turning = [0.0] * 3, np.concatenate([[0.0], rate])
     if implicit:
-        node = mbs.AddNode(
-            items.NodeRigidBodyEP(
-                referenceCoordinates=still + start.tolist(),
-                initialVelocities=still + (0.5 * product(start, turning)).tolist(),
-            )
-        )
+        kind, attitude, rates = items.NodeRigidBodyEP, start, 0.5 * product(start, turning)
     else:
-        node = mbs.AddNode(
-            items.NodeRigidBodyRotVecLG(
-                referenceCoordinates=still + logarithm(start).tolist(), initialVelocities=still + rate.tolist()
-            )
-        )
+        kind, attitude, rates = items.NodeRigidBodyRotVecLG, logarithm(start), rate
+    node = mbs.AddNode(kind(referenceCoordinates=still + attitude.tolist(), initialVelocities=still + rates.tolist()))
     body = mbs.AddObject(items.ObjectRigidBody(nodeNumber=node, mass=1.0, inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     row = [0]
 
@@ -126,21 +122,9 @@ def _sphere(
     return mbs, sensor
 
 
-def _options(period: float, count: int, every: int) -> Any:
-    options = exu.SimulationSettings()
-    options.solution.file.write, options.solution.sensors.active = False, True
-    options.solution.sensors.writePeriod = period * every
-    ti = options.timeIntegration
-    ti.numberOfSteps, ti.endTime, ti.verboseMode = count, period * count, 0
-    ti.adaptiveStep = ti.automaticStepSize = False
-    ti.generalizedAlpha.spectralRadius = 0.9
-    ti.explicit.computeEndOfStepAccelerations = False
-    return options
-
-
-def _sound(engine: str, found: np.ndarray, counts: dict[str, int]) -> Attitudes:
+def _sound(engine: str, attitudes: np.ndarray, counts: dict[str, int]) -> Attitudes:
     """Attitudes of unit length, where they are numbers that are nearly so."""
-    size = np.linalg.norm(found, axis=1, keepdims=True)
+    size = np.linalg.norm(attitudes, axis=1, keepdims=True)
     if not (np.abs(size - 1) < 0.01).all():
         raise RunFailed(engine, "a quaternion is no rotation", 0.0)
-    return Attitudes(found / size, counts)
+    return Attitudes(attitudes / size, counts)

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -28,6 +27,7 @@ from models.engines.mujoco_callback import installed
 from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
+from validation.contact.slow_wheels import counting
 from validation.price.force_calls import AT_START
 from validation.price.problems.road_excited import STAGES, setting
 
@@ -136,8 +136,7 @@ class RollingWheels:
         self.title = f"A wheel with FASTSIM at {speed:g} m/s, released from sliding, {DURATION:g} s"
         self.wheels = Wheels(1, cells=CELLS, speed=speed)
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
-        springs = [np.array(values) for values in (self.wheels.stiffness, self.wheels.damping)]
-        self._table = np.array([self.wheels.masses, *springs])
+        self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
         self._true, other = (self.read(self._by(*one).state) for one in SOLVERS)
         self.uncertainty = self._off(other)
@@ -150,13 +149,12 @@ class RollingWheels:
 
     def _explicit(self) -> list[tuple[tuple[str, str], tuple[float, ...]]]:
         """Curves with their steps (s), by the stability of each method."""
-        found = []
-        for engine, methods in EXPLICIT.items():
-            for method in methods:
-                like = "Euler" if method == "discrete" else method
-                fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
-                found.append(((engine, method), tuple(DURATION / round(more * fewest) for more in FINER)))
-        return found
+        curves = []
+        for engine, method in ((engine, method) for engine, methods in EXPLICIT.items() for method in methods):
+            like = "Euler" if method == "discrete" else method
+            fewest = math.ceil(1.02 * DURATION / limit(like, 10 * MS, LONG_RUN * MS, linear(self.wheels)))
+            curves.append(((engine, method), tuple(DURATION / round(more * fewest) for more in FINER)))
+        return curves
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and its step (s) or tolerance."""
@@ -184,9 +182,9 @@ class RollingWheels:
 
     def read(self, state: Array) -> dict[str, Array]:
         """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
-        found = np.zeros(FREEDOMS)
-        add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), found)
-        return {"creep force": found[:2], "displacement": state[: Y + 1]}
+        force = np.zeros(FREEDOMS)
+        add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
+        return {"creep force": force[:2], "displacement": state[: Y + 1]}
 
     def _off(self, found: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
@@ -198,11 +196,10 @@ class RollingWheels:
             steps = round(DURATION / value)
             march(state, numbers, self._table, DURATION / steps, steps)
             return Result(state, {"steps": steps, "force calls": 4 * steps})
-        out = np.empty(state.size)
 
         def derivative(t: float, y: Array) -> Array:
-            rates(y, numbers, self._table, out)
-            return out.copy()
+            rates(y, numbers, self._table, out := np.empty(y.size))
+            return out
 
         done = solve_ivp(derivative, (0.0, DURATION), state, method, rtol=value, atol=1e-6 * value)
         if not done.success:
@@ -221,16 +218,8 @@ class RollingWheels:
 
     def _exudyn(self, setting: Setting, method: str) -> Solver:
         calls, law = [0], Forces(self.wheels)
-
-        def of(q: Any, v: Any) -> Any:
-            calls[0] += 1
-            return law.of(q, v)
-
-        def slopes(q: Any, v: Any, by_q: float, by_v: float) -> Array:
-            calls[0] += PLACES
-            return law.slopes(q, v, by_q, by_v)
-
-        rolling = Rolling(self.wheels, of, slopes=slopes if setting.method.endswith(WITH_SLOPES) else None)
+        slopes = counting(law.slopes, calls, PLACES) if setting.method.endswith(WITH_SLOPES) else None
+        rolling = Rolling(self.wheels, counting(law.of, calls), slopes=slopes)
         steps = round(DURATION / (LARGEST if setting.adaptive else setting.value))
         tolerance = setting.value if setting.adaptive else 0.0
 

@@ -1,51 +1,34 @@
 """A wheelset on straight track: quantities are its states and contacts, a case per speed of a path."""
 
-import time
 from typing import Any
 
 import numpy as np
 
 from models.advice.choice.answer import Answer, Quantity
-from models.rail import wheel_forces as wf
-from models.rail.equations import ROLL, SPIN, STATES, YAW, Y, Z
-from models.systems.wheelset.of_scene import equations_of, path_speeds
+from models.rail.equations import STATES
+from models.systems.wheelset.of_scene import path_speeds
+from models.systems.wheelset.run import run
 from models.systems.wheelset.scene import WheelsetScene
 
 ENGINE, WINDOWED = "reference", True
-PLACES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {
-    "normal": (wf.LOAD, "N"),
-    "fx": (wf.FX, "N"),
-    "fy": (wf.FY, "N"),
-    "mz": (wf.MZ, "N m"),
-    "power": (wf.POWER, "W"),
-}
-"""Of every patch: a path begins with the first patch, all its times one after the other."""
 
 
 def answer(scene: WheelsetScene, engine: str) -> Answer:
-    """Run every path."""
-    paths, seconds, own = [], 0.0, scene.run
-    for speed in path_speeds(scene):
-        equations = equations_of(scene, engine, speed)
-        start = equations.displaced(own.displacement)
-        start[YAW] = own.yaw
-        begun = time.process_time()
-        paths.append(equations.run(start, own.duration, own.step))
-        seconds += time.process_time() - begun
-    found = {name: Quantity(unit, tuple(path.states[:, k] for path in paths)) for name, (k, unit) in PLACES.items()}
-    patches = range(paths[0].contacts.shape[1])
-    found |= {
-        name: Quantity(unit, tuple(path.contacts[:, i, k] for path in paths for i in patches))
-        for name, (k, unit) in CONTACTS.items()
+    """Run every path. Of quantities of patches a path begins with the first one, all its times one after the other."""
+    paths = [run(scene, engine, speed) for speed in path_speeds(scene)]
+    quantities = {
+        str(name): Quantity(
+            channel.attrs["units"], tuple(case for path in paths for case in np.atleast_2d(path[str(name)].T))
+        )
+        for name, channel in paths[0].data.data_vars.items()
     }
-    count = int(np.sum([len(path.times) - 1 for path in paths]))
-    return Answer(found, {"steps": count, "calls": 4 * count, "states": STATES, "terms": _cells(scene)}, seconds)
-
-
-def _cells(scene: WheelsetScene) -> int:
-    """Of FASTSIM's nets under both wheels."""
-    return 2 * scene.contact.cells**2 if scene.contact.law == "fastsim" else 0
+    counts = {key: sum(path.counts()[key] for path in paths) for key in ("steps", "force calls")}
+    cells = 2 * scene.contact.cells**2 if scene.contact.law == "fastsim" else 0  # of FASTSIM's nets under both wheels
+    return Answer(
+        quantities,
+        {"steps": counts["steps"], "calls": counts["force calls"], "states": STATES, "terms": cells},
+        sum(path.seconds for path in paths),
+    )
 
 
 def steps(scene: WheelsetScene) -> int:

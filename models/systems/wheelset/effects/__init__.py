@@ -1,4 +1,117 @@
-"""Effects of scenes of a wheelset, one file each: see ``models.core.scene_effects``.
+"""Effects of scenes of a wheelset: see ``models.core.scene_effects``.
 
 Counts are those of a wheelset in an implementation: its springs and dampers, tables of profiles, calls of FASTSIM.
 """
+
+from collections.abc import Callable
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.scene_effects import Entry, Table
+
+
+def _of_parameters(says: str, keys: tuple[str, ...], cost: str, counts: dict[str, int], **more: Any) -> Entry:
+    """An effect that parameters of the scene's wheelset above zero name; its usual values are the chosen wheelset's."""
+
+    def there(scene: Any) -> bool:
+        from models.systems.wheelset.of_scene import wheelset_of
+
+        wheelset = wheelset_of(scene)
+        excluded = "profiles" in more.get("excludes", ()) and wheelset.profiles is not None
+        return not excluded and any(getattr(wheelset, key) > 0.0 for key in keys)
+
+    def overriding(value: Callable[[str], float]) -> Callable[[Table, Any], None]:
+        def change(table: Table, scene: Any) -> None:
+            override = table.setdefault("wheelset", {}).setdefault("override", {})
+            override.update({key: value(key) for key in keys})
+
+        return change
+
+    def usual(key: str) -> float:
+        from models.rail.wheelset import CHOSEN
+
+        return float(getattr(CHOSEN, key))
+
+    return Entry(
+        says,
+        f"wheelset.override.{keys[0]}",
+        cost,
+        counts,
+        there=there,
+        leave_out=overriding(lambda key: 0.0),
+        put_in=overriding(usual),
+        **more,
+    )
+
+
+def _has_profiles(scene: Any) -> bool:
+    from models.systems.wheelset.of_scene import wheelset_of
+
+    return wheelset_of(scene).profiles is not None
+
+
+def _without_profiles(table: Table, scene: Any) -> None:
+    """Cones, heads of one radius, and flanges that are springs; InputError where the parameters have profiles."""
+    if scene.profiles is None:
+        raise InputError(
+            scene.file, "wheelset.parameters", scene.wheelset.parameters, "has profiles: name a file without them"
+        )
+    del table["profiles"]
+
+
+def _with_profiles(table: Table, scene: Any) -> None:
+    """S1002 on UIC60, in place of the flanges of cones."""
+    table["profiles"] = {}
+    table.get("wheelset", {}).get("override", {}).pop("flange_stiffness", None)
+
+
+HELD = "a product per direction; actuators in MuJoCo, spring-dampers in Exudyn"
+IN_ENGINES = {"exudyn": {"spring-dampers": 2}, "mujoco": {"actuators": 4}}
+TABLE = {
+    "contact_damping": _of_parameters(
+        "Normal forces that grow with the speed of approach",
+        ("contact_damping",),
+        "one product per wheel and call",
+        {"contact damping": 1},
+    ),
+    "fastsim": Entry(
+        "Creep forces that friction bounds, by FASTSIM",
+        "contact.law",
+        "a net of cells per strip and call, about 20 microseconds",
+        {"creep nets": 1},
+        there=lambda scene: scene.contact.law == "fastsim",
+        leave_out=lambda table, scene: table.update(contact={"law": "linear"}),
+        put_in=lambda table, scene: table.update(contact={"law": "fastsim"}),
+    ),
+    "flange": _of_parameters(
+        "A flange that touches its rail beyond a clearance",
+        ("flange_stiffness",),
+        "one comparison per wheel and call",
+        {"flanges": 1},
+        excludes=("profiles",),
+        why="which have flanges of their own",
+    ),
+    "primary_dampers": _of_parameters(
+        "Dampers that hold the axle to its frame",
+        ("damping_x", "damping_y", "damping_z"),
+        HELD,
+        {"dampers": 3},
+        in_engines=IN_ENGINES,
+    ),
+    "primary_springs": _of_parameters(
+        "Springs that hold the axle to its frame",
+        ("stiffness_x", "stiffness_y", "stiffness_z"),
+        HELD,
+        {"springs": 3},
+        in_engines=IN_ENGINES,
+    ),
+    "profiles": Entry(
+        "Measured cross-sections in place of cones on round heads",
+        "profiles",
+        "tables of contact places by lateral displacement, made once",
+        {"profiles": 1},
+        there=_has_profiles,
+        leave_out=_without_profiles,
+        put_in=_with_profiles,
+    ),
+}

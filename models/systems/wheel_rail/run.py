@@ -1,0 +1,131 @@
+"""Where a held wheelset touches its rails, and with which forces: one case of a scene at every position."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from models.contact.wheel_on_rail import DEEP
+from models.core.errors import InputError, RunFailed
+from models.core.result import Channel, Result, result
+from models.rail.contact_table import Place, Placed, rolling_radius_difference
+from models.systems.wheel_rail.scene import WheelRailScene
+
+WHEELS = ("right", "left")
+TOO_DEEP = ("distance", "load")
+"""What the theories complain of where the contact grows out of its surroundings."""
+POSITION = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
+"""Quantities of a position, with their units."""
+DEGREES = -180.0 / np.pi
+PATCH: dict[str, tuple[str, float, str]] = {
+    "on_rail": ("mm", 1e3, "on_rail"),
+    "in_track": ("mm", 1e3, "y"),
+    "on_wheel": ("mm", 1e3, "wheel_centre"),
+    "ahead": ("mm", 1e3, "x"),
+    "angle": ("deg", DEGREES, "centre_angle"),
+    "normal": ("kN", 1e-3, "normal"),
+    "peak": ("MPa", 1e-6, "peak"),
+    "area": ("mm^2", 1e6, "area"),
+    "half_length": ("mm", 5e2, "length"),
+    "half_width": ("mm", 5e2, "width"),
+    "rolling_radius": ("mm", 1e3, "rolling_radius"),
+    "touch_on_rail": ("mm", 1e3, "touch_on_rail"),
+    "touch_on_wheel": ("mm", 1e3, "wheel_y"),
+    "touch_angle": ("deg", DEGREES, "angle"),
+    "fx": ("kN", 1e-3, "fx"),
+    "fy": ("kN", 1e-3, "fy"),
+    "mz": ("N m", 1.0, "mz"),
+    "mz_on_rail": ("mm", 1e3, "touch_on_rail"),
+    "mz_ahead": ("mm", 1e3, "touch_x"),
+    "xi_x": ("-", 1.0, "xi_x"),
+    "xi_y": ("-", 1.0, "xi_y"),
+    "spin": ("1/m", 1.0, "spin"),
+    "approach": ("um", 1e6, "approach"),
+}
+"""Quantities of a patch: unit, factor to it and attribute of ``Place``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contact at every position that has one, why others (mm) have none, seconds of the processor that each took."""
+
+    placed: list[Placed] = field(default_factory=list)
+    failed: dict[float, str] = field(default_factory=dict)
+    seconds: list[float] = field(default_factory=list)
+
+
+def run(
+    scene: WheelRailScene,
+    engine: str = "",
+    case: str = "",
+    told: Callable[[float, float], Any] = lambda shift, share: None,
+) -> Result:
+    """A case, the first of the scene's if none is named, at every position; the detail is its ``Contacts``.
+
+    Channels of positions lie over the shift, those of patches over shift, wheel and patch, the one that carries most
+    first; not a number where there is no further patch. Positions that fail are doubts. told : called before each
+    shift with it (mm) and the share that is done. Raises InputError for profiles that are none.
+    """
+    name = case or next(iter(scene.cases))
+    held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
+    for i, shift in enumerate(scene.positions.values().tolist()):
+        told(1e3 * shift, i / scene.positions.count)
+        begun = time.process_time()
+        try:
+            contacts.placed.append(held.at(shift, yaw * shift))
+        except (InputError, RunFailed) as error:
+            deep = isinstance(error, InputError) and error.place in TOO_DEEP
+            contacts.failed[1e3 * shift] = (
+                f"a load of {held.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
+                if deep
+                else str(error)
+            )
+        contacts.seconds.append(time.process_time() - begun)
+    return _labelled(scene, name, contacts)
+
+
+def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:
+    positions = [numbers(placed) for placed in contacts.placed]
+    most = max((len(position[wheel]) for position in positions for wheel in WHEELS), default=0)
+    missing = dict.fromkeys(PATCH, np.nan)
+    rows = [(*position[wheel], *[missing] * most)[:most] for position in positions for wheel in WHEELS]
+    channels = {
+        key: Channel("shift", np.array([position[key] for position in positions], float), unit)
+        for key, unit in POSITION.items()
+    }
+    axes = {"shift": channels.pop("shift"), "wheel": Channel("wheel", list(WHEELS))}
+    channels |= {
+        key: Channel(
+            ("shift", "wheel", "patch"),
+            np.array([[patch[key] for patch in row] for row in rows], float).reshape(len(positions), len(WHEELS), most),
+            unit,
+        )
+        for key, (unit, _, _) in PATCH.items()
+    }
+    doubts = [f"{shift:g} mm: {why}" for shift, why in contacts.failed.items()]
+    return result(scene, channels, axes, seconds=sum(contacts.seconds), doubts=doubts, detail=contacts, case=case)
+
+
+def patches(placed: Placed, wheel: str) -> tuple[Place, ...]:
+    """The patches of one wheel, the one that carries most first."""
+    return tuple(sorted(getattr(placed, wheel), key=lambda place: -place.normal))
+
+
+def numbers(placed: Placed) -> dict[str, Any]:
+    """Every quantity of a position, and of every patch of both wheels."""
+    return {
+        "shift": 1e3 * placed.shift,
+        "yaw": 1e3 * placed.yaw,
+        "roll": 1e3 * placed.roll,
+        "spin_speed": placed.spin_speed,
+        "radius_difference": 1e3 * rolling_radius_difference(placed),
+        **{
+            wheel: [
+                {key: factor * getattr(place, name) for key, (_, factor, name) in PATCH.items()}
+                for place in patches(placed, wheel)
+            ]
+            for wheel in WHEELS
+        },
+    }

@@ -1,0 +1,69 @@
+"""Wheelsets with parameters at random, and the critical speed of any by every implementation."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from models.rail.eigenvalues import free, growth
+from models.rail.linear import LOWEST_SPEED, critical_or_why
+from models.rail.wheelset import CHOSEN, GRAVITY, Wheelset
+from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
+
+Speeds = dict[str, dict[str, float | None]]
+"""Critical speeds (m/s) by wheelset and implementation, None where there is none."""
+SEED = 2026
+DRAWN = 6
+"""Wheelsets with parameters at random, beside the chosen one, one unstable at every speed and one at none."""
+RANGES = {
+    "mass": (800.0, 2000.0),
+    "spin_inertia": (50.0, 200.0),
+    "yaw_inertia": (500.0, 1500.0),
+    "radius": (0.35, 0.55),
+    "half_gauge": (0.7, 0.8),
+    "conicity": (0.02, 0.3),
+    "head_radius": (0.15, 0.4),
+    "load": (6e4, 2e5),
+    "half_spacing": (0.8, 1.2),
+    "stiffness_x": (1e5, 3e6),
+    "stiffness_y": (1e5, 3e6),
+    "stiffness_z": (3e5, 2e6),
+    "damping_x": (5e2, 1e4),
+    "damping_y": (5e2, 1e4),
+    "damping_z": (1e3, 2e4),
+    "friction": (0.1, 0.5),
+}
+STIFF = CHOSEN.changed(stiffness_x=1e8, stiffness_y=1e8, damping_x=1e5, damping_y=1e5)
+HEAVY = free(CHOSEN).changed(mass=1e4, yaw_inertia=3e4)
+"""So heavy without suspension that the weight's own stiffness does not hold it even at 1 m/s."""
+AROUND, BELOW = 0.02, 5
+"""Half the bracket of a critical speed that is only looked up again, by the speed; lower speeds that are tried."""
+
+
+def drawn() -> dict[str, Wheelset]:
+    """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
+    draw, found = np.random.default_rng(SEED), dict[str, Wheelset]()
+    while len(found) < DRAWN:
+        values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
+        if values["load"] > 1.5 * GRAVITY * values["mass"]:
+            found[f"drawn {len(found) + 1}"] = CHOSEN.changed(**values)
+    return found
+
+
+def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:
+    """Critical speed (m/s) of each implementation; None where there is none. near : engines look about the first."""
+    speeds: dict[str, float | None] = {}
+    for engine in IMPLEMENTATIONS:
+        of, first = partial(growth, implementation(engine)), speeds.get("reference")
+        speeds[engine] = _near(partial(of, wheelset), first) if near and first else critical_or_why(wheelset, of)[0]
+    return speeds
+
+
+def _near(growth: Callable[[float], float], speed: float) -> float:
+    """The critical speed (m/s) within AROUND of another; an end of that, or a lower speed, where it is not in it."""
+    low, high = (1.0 - AROUND) * speed, (1.0 + AROUND) * speed
+    for below in np.geomspace(LOWEST_SPEED, low, BELOW):
+        if growth(float(below)) >= 0.0:
+            return float(below)
+    return high if growth(high) < 0.0 else float(brentq(growth, low, high, xtol=1e-12 * speed, rtol=1e-12))
