@@ -27,8 +27,7 @@ from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import cluster, processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
-from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import state_names
 from models.systems.pitch_plane.scene import Scene
 from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement

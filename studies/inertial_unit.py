@@ -21,9 +21,9 @@ from models.core.noise import GYRO, normal
 from models.core.result import Result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
-from models.drift.section_forces import CHANNELS, section_forces
+from models.drift.score import CHANNELS, section_forces
 from models.fatigue.damage import SLOPE, pseudo_damage
-from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance, bias
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance, bias
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 

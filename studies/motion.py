@@ -17,9 +17,18 @@ from models.core.strict import Strict, quantity, read
 from models.core.tables import ACCELERATIONS
 from models.core.time_series import read_time_series, write_time_series
 from models.core.whole_files import write_whole
-from models.sensors.high_pass import check_cut_off
 from models.sensors.rate_filter import filter_rates
-from models.sensors.rigid_body_motion import LIMIT, Motion, Quality, Start, motion, quality, spin, tilt_displacement
+from models.sensors.rigid_body_motion import (
+    LIMIT,
+    Motion,
+    Quality,
+    Start,
+    check_cut_off,
+    motion,
+    quality,
+    spin,
+    tilt_displacement,
+)
 from models.sensors.rotations import GimbalLock, from_cardan
 from models.sensors.sensor_array import SensorArray, sensor_array
 from models.systems.pitch_plane.effects.accelerometers import Parameters, names

@@ -8,11 +8,10 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.plan import doubt_lines, trust_line
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.run import state_names, summary
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
 
 Progress = Callable[[str, float], None]
 

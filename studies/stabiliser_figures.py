@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from models.drawing.figures import plt
-from models.drift.score import BAND, TUMBLED, Limits
-from models.drift.section_forces import CHANNELS
+from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 
 Row = dict[str, Any]
 

@@ -25,6 +25,7 @@ from models.core.time_series import write_time_series
 from models.core.whole_files import whole_file, write_whole
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.drift.score import (
+    CHANNELS,
     COARSEST,
     LEAST,
     TUMBLED,
@@ -36,11 +37,9 @@ from models.drift.score import (
     uncertainty,
     verdict,
 )
-from models.drift.section_forces import CHANNELS
 from models.fatigue.damage import CONVENTION, SLOPE
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.trust import trust
 from models.vehicles.pitch_plane import Parameters
 from studies.virtual_measurement import PAPER, check_road, check_steps, follower, measure, stride, write_measurement

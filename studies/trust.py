@@ -21,10 +21,9 @@ from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
 from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
 

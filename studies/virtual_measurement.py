@@ -9,12 +9,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.time_series import write_time_series
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.run import state_names
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, build
 
 PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 """The perturbed model of Appendix B, as factors on the parameters."""

@@ -11,7 +11,7 @@ import pytest
 import models
 from models.core.scene_effects import module_of, names_of
 from models.core.systems import DEFAULT
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, registered, user_functions

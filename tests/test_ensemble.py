@@ -23,8 +23,7 @@ from models.ensemble import store
 from models.ensemble.runner import PathFailed, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.workers import cluster, processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
-from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import force_scene, road_scene, write_forces
 

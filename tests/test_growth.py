@@ -11,13 +11,11 @@ from models.core.noise import normal
 from models.core.systems import load
 from models.drift import growth as law
 from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.plan import describe, trust_line
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
-from models.systems.pitch_plane.tangent import Path, path_of, swing, tilted
+from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.tangent import Path, covariance, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
 from studies.asked import SCENES
 from studies.trust import run as run_study
@@ -116,7 +114,7 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
         for wheel in range(2):
             values = np.zeros_like(assembly.input.values)
             values[sample, wheel] = 20.0
-            table = path.table(replace(assembly.input, values=values))
+            table = replace(path, forces=replace(assembly.input, values=values)).inputs
             stages = [table] * 3 if rule == "held" else [table[0:-1:2], table[1::2], table[2::2]]
             pushes = np.stack(stages, axis=1).reshape(-1, 1, 2)
             responses.append(path.carry(np.zeros((1, 8)), pushes)[1][-1, 0])

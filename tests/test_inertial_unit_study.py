@@ -8,9 +8,9 @@ import pytest
 from models.core.errors import InputError
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.section_forces import CHANNELS, section_forces
+from models.drift.score import CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
-from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused, RunFailed
-from models.engines import beside_reference
+from models.engines import outside
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from validation import conformity
 from validation.common import checks, wrong_engines
 from validation.common.scenes import force_scene, road_scene, write_forces
@@ -199,8 +200,8 @@ def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_ar
 
 def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
-    monkeypatch.setattr(beside_reference, "_expected", lambda *given: 1e9)
-    monkeypatch.setattr(beside_reference, "CEILING", 1e9)
+    monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
+    monkeypatch.setattr(outside, "CEILING", 1e9)
     assert len(wrong_engines.passed()) == len(wrong_engines.WRONG)
 
 

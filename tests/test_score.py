@@ -8,6 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.result import Result
 from models.drift.score import (
+    CHANNELS,
     Errors,
     Limits,
     Own,
@@ -17,9 +18,9 @@ from models.drift.score import (
     low_pass,
     own_figures,
     rms,
+    section_forces,
     verdict,
 )
-from models.drift.section_forces import CHANNELS, section_forces
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.scenes import force_scene, road_scene, write_forces

@@ -16,12 +16,11 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.result import provenance
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.outside import register
-from models.engines.protocol import Settings
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from validation.common import checks
 from validation.common.rows import Independence, Row, System, at_most, behaves, not_run
 from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces

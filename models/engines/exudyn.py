@@ -13,12 +13,11 @@ import exudyn as exu
 import exudyn.itemInterface as items
 import numpy as np
 
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
-from models.engines.protocol import Settings, Trajectory, balanced, guard, landings_followed
-from models.vehicles.description import PitchSpring, Point, Strut
-from models.vehicles.linear import matrices
+from models.engines.protocol import balanced, guard, landings_followed
+from models.vehicles.description import PitchSpring, Point, Strut, matrices
 
 exu.config.printToConsole = False
 Reader = Callable[[Any, float, float], float]

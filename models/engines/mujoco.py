@@ -17,9 +17,9 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.mujoco_quiet import quiet
-from models.engines.protocol import Settings, Trajectory, guard, landings_followed
+from models.engines.protocol import guard, landings_followed
 from models.vehicles.description import Strut, Vehicle
 
 INTEGRATORS = {

@@ -5,9 +5,7 @@ and can be asked for its acceleration at any state, for the build audit.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,11 +13,9 @@ from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
 from models.core.steps import divides, fitting
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
 from models.engines.stability import check_step
-
-if TYPE_CHECKING:
-    from models.engines.assembly import Assembly
 
 BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
 """Rows at which a multiplier is checked, rows at the start that may ring, and the accepted share of its rms.
@@ -32,76 +28,20 @@ SIZE_BOUND = 1e4
 """A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How to integrate: integrator by its engine's name, step and duration in s."""
-
-    integrator: str
-    step: float
-    duration: float
-    tolerance: float = 1e-9
-    spectral_radius: float = 0.6
-
-    @property
-    def steps(self) -> int:
-        """Number of fixed steps that cover the duration."""
-        return round(self.duration / self.step)
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """times (n,), states (n, 8), and what the run cost in counts.
-
-    enforced (n, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
-    (N m, nose up); None where nothing is.
-    """
-
-    times: np.ndarray
-    states: np.ndarray
-    enforced: np.ndarray | None = None
-    counts: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def moment(self) -> np.ndarray | None:
-        """Moment (n,) in N m that the prescribed pitch takes."""
-        return None if self.enforced is None else self.enforced[:, -1]
-
-    @property
-    def force(self) -> np.ndarray | None:
-        """Force (n,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
-        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]
-
-
-class Model(Protocol):
-    """A vehicle built in one engine."""
-
-    def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
-        ...
-
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
-        ...
-
-    def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
-        ...
-
-
-def build(engine: str, assembly: "Assembly", settings: Settings) -> Model:
+def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Build an assembly in an engine by name; raises Refused where the engine would answer wrongly."""
     check(engine, assembly, settings)
     return unchecked(engine, assembly, settings)
 
 
-def unchecked(engine: str, assembly: "Assembly", settings: Settings) -> Model:
+def unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Build it without asking whether the engine would answer rightly."""
     if engine in OUTSIDE:
         return import_module("models.engines.outside").build(engine, assembly, settings)
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
 
-def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
+def check(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Refuse combinations that no integrator treats correctly."""
     integrator = CATALOGUE[engine][settings.integrator]
     if (engine, settings.integrator) in MISSING:
@@ -221,7 +161,7 @@ def _reason(finite: bool, sane: bool) -> str:
 
 
 def landings_followed(
-    engine: str, assembly: "Assembly", settings: Settings, times: np.ndarray, states: np.ndarray
+    engine: str, assembly: Assembly, settings: Settings, times: np.ndarray, states: np.ndarray
 ) -> None:
     """Raise RunFailed where fixed steps were too long for what tyres that only push met: a step that is stable on the
     road may still jump over a landing.

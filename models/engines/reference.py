@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 
 from models.core.errors import RunFailed
 from models.core.signals import Stacked
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, Trajectory, guard, landings_followed
+from models.engines.protocol import guard, landings_followed
 from models.machine.compiled import named, njit
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 

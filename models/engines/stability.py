@@ -14,17 +14,12 @@ is stiffest: a tilt shortens the struts' arms. What is not linear is left to the
 import math
 from collections.abc import Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.core.errors import Refused
-from models.vehicles.description import Vehicle
-from models.vehicles.linear import matrices
-
-if TYPE_CHECKING:
-    from models.engines.assembly import Assembly
-    from models.engines.protocol import Settings
+from models.engines.assembly import Assembly, Settings
+from models.vehicles.description import Vehicle, matrices
 
 Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """M, D, K, the part of D that an engine knows of (no callbacks) and the part of that which sits on single joints
@@ -151,7 +146,7 @@ def limit(integrator: str, step: float, duration: float, linear: Linear) -> floa
     return stable
 
 
-def check_step(engine: str, assembly: "Assembly", settings: "Settings") -> None:
+def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Refuse a step at which a mode of the vehicle would grow, naming the limit and the fastest pole."""
     linear = linearised(assembly.vehicle, assembly.guided)
     grown = growth(settings.integrator, settings.step, settings.duration, linear)

@@ -11,10 +11,10 @@ import numpy as np
 from models.core.scene_effects import module_of, names_of, without
 from models.core.systems import DEFAULT
 from models.core.time_series import write_time_series
-from models.engines.protocol import Model, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Model
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions

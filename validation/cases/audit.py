@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.scene import settings_of
 from validation.common import checks
 from validation.common.rows import Row, System, at_most
 

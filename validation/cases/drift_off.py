@@ -17,10 +17,9 @@ from models.engines.assembly import Assembly
 from models.engines.protocol import build
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import ANGLE, interpolation, model, noise
 from models.vehicles.pitch_plane import Parameters
 from validation.common.rows import Row, System, Table, within

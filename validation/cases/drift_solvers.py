@@ -14,12 +14,12 @@ import numpy as np
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.drift.growth import growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
-from models.drift.section_forces import section_forces
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.drift.score import section_forces
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from validation.common.rows import Row, System, Table, finding, within
 from validation.common.scenes import force_scene, road_scene, write_forces
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from models.core.time_series import write_time_series
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Settings
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.pitch_plane import equilibrium
 from validation.common.rows import Row, System, Table, at_most, finding

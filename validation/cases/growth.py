@@ -15,13 +15,11 @@ from models.core.signals import Sampled
 from models.drift import growth as law
 from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.tangent import Path as ErrorPath
-from models.systems.pitch_plane.tangent import measured_growth, swing
+from models.systems.pitch_plane.tangent import covariance, measured_growth, swing
 from validation.common.rows import Row, System, Table, at_most, finding, within
 from validation.common.scenes import force_scene, road_scene, write_forces
 

@@ -18,10 +18,9 @@ import numpy as np
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.engines.assembly import Assembly
 from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import growth
 from validation.common.rows import Row, System, Table, behaves, finding, within
 from validation.common.scenes import force_scene, road_scene, write_forces

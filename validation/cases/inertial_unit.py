@@ -9,9 +9,9 @@ import numpy as np
 
 from models.core.noise import GYRO, normal
 from models.core.time_series import write_time_series
-from models.drift.section_forces import section_forces
+from models.drift.score import section_forces
 from models.sensors import inertial_unit as unit
-from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias
 from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
 from models.systems.pitch_plane.run import run as simulate
 from studies.virtual_measurement import follower, write_measurement

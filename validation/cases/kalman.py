@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from models.drift.innovations import LEVEL as ALARMS
 from models.drift.innovations import consistency
-from models.drift.section_forces import CHANNELS
+from models.drift.score import CHANNELS
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
 from validation.drift import kalman_runs as runs

@@ -8,15 +8,14 @@ import numpy as np
 
 from models.core.result import Result
 from models.core.scene_effects import without
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
 from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import truth, two_tracks
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, vehicle_of

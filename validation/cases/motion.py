@@ -20,11 +20,10 @@ from models.sensors.rigid_body_motion import (
 )
 from models.sensors.rotations import from_cardan, skew
 from models.sensors.sensor_array import SensorArray, sensor_array
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects.accelerometers import names
 from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.scene import settings_of
 from validation.common.bands import mean_square
 from validation.common.rows import Row, System, Table, at_most, behaves, within
 from validation.hard_cases.case import IMPLEMENTATIONS

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Row, System, Table, within
 from validation.common.scenes import road_scene

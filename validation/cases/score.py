@@ -10,8 +10,7 @@ from models.core.noise import normal
 from models.core.result import Result
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.score import errors
-from models.drift.section_forces import CHANNELS
+from models.drift.score import CHANNELS, errors
 from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build

@@ -10,12 +10,10 @@ from models.core.noise import normal
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
 from models.vehicles.pitch_plane import Parameters
 from studies.virtual_measurement import Follow, follower, write_measurement
 from studies.virtual_measurement import measure as measure_road

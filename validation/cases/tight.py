@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Independence, Row, System, at_most
 from validation.common.scenes import gap, road_scene

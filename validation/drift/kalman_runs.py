@@ -13,17 +13,15 @@ from models.core.noise import PITCH_SENSOR, normal
 from models.core.result import Result
 from models.core.strict import read
 from models.core.time_series import write_time_series
-from models.drift.section_forces import CHANNELS, section_forces
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.drift.score import CHANNELS, section_forces
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects.kalman_filter import guide_of, pull
-from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
-from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE
+from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE, Estimate, Measurement, estimate
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.scenes import road_scene, write_forces
 

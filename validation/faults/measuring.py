@@ -14,8 +14,7 @@ from models.measured import resampling, units
 from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
-from models.sensors.sensor_array import SensorArray, sensor_array
-from models.sensors.virtual_accelerometers import in_space
+from models.sensors.sensor_array import SensorArray, in_space, sensor_array
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
 

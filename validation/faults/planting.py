@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.engines.assembly import Assembly
-from models.engines.protocol import Model, Settings, Trajectory, build
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.engines.protocol import build
 from validation.common.checks import Make
 from validation.faults import changes as change
 from validation.faults import patches

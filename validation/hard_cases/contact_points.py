@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 
 from models.core.signals import Sampled
-from models.engines.assembly import Assembly
-from models.engines.protocol import Trajectory
+from models.engines.assembly import Assembly, Trajectory
 from models.systems.pitch_plane.effects.contact_points import contact_points
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case

@@ -9,7 +9,7 @@ import numpy as np
 from models.core.result import Result
 from models.drift.growth import drift_off_time
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene

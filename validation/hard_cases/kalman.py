@@ -13,8 +13,7 @@ from models.core.noise import PITCH_SENSOR, normal
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.pitch_filter import PITCH, Measurement, estimate
-from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
+from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RELATIVE, Measurement, PitchStep, estimate
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from validation.hard_cases import setups

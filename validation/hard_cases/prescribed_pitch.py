@@ -9,9 +9,8 @@ import numpy as np
 
 from models.core.signals import Sampled, Signal
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Trajectory
 from models.engines.mujoco import _spec
-from models.engines.protocol import Trajectory
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 

@@ -13,9 +13,8 @@ import numpy as np
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.time_series import write_time_series
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly
-from models.engines.protocol import Trajectory
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Assembly, Trajectory
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.hard_cases import setups

@@ -13,10 +13,9 @@ from mujoco import rollout
 from numba import carray, cfunc, types
 
 from models.engines import mujoco as adapter
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import offsets
-from models.engines.protocol import Settings
 from models.machine.stack import array_at, double_at
 
 PARAMETERS = 17

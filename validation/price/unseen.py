@@ -21,7 +21,7 @@ from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommenda
 from models.advice.price.search import Tried
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.engines.protocol import build as build_model
 from models.machine.timing import interleave, paired_ratio
 from models.systems.pitch_plane.scene import Scene, build

@@ -10,12 +10,11 @@ from models.advice.price import Answer, Ladder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
 from models.core.steps import divides
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
 
 ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
 """Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""

@@ -5,9 +5,8 @@ from typing import Any
 
 from models.advice.choice.answer import Answer, Quantity
 from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 
 ENGINE, WINDOWED = "reference", True
 CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
