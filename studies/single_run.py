@@ -10,8 +10,9 @@ from models.core.errors import RunFailed
 from models.core.result import Result
 from models.systems.pitch_plane.plan import doubt_lines, trust_line
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.run import state_names, summary
+from models.systems.pitch_plane.run import summary
 from models.systems.pitch_plane.scene import Scene, assemble
+from models.vehicles.pitch_plane import STATE_NAMES
 
 Progress = Callable[[str, float], None]
 
@@ -124,7 +125,7 @@ def _differences(axis: Any, results: dict[str, Result]) -> None:
             axis.semilogy(
                 result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"
             )
-    axis.set_title(f"largest difference of the {len(state_names())} states [m, rad, m/s, rad/s]")
+    axis.set_title(f"largest difference of the {len(STATE_NAMES)} states [m, rad, m/s, rad/s]")
     axis.legend(loc="lower right", ncols=2)
 
 

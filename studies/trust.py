@@ -25,7 +25,14 @@ from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
-from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
+from models.systems.pitch_plane.virtual_measurement import (
+    check_road,
+    check_steps,
+    follower,
+    measure,
+    stride,
+    write_measurement,
+)
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]

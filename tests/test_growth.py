@@ -17,9 +17,10 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.tangent import Path, covariance, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from studies.asked import SCENES
 from studies.trust import run as run_study
-from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.scenes import VEHICLES, force_scene, road_scene
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +28,9 @@ def folder(tmp_path_factory):
     """Six seconds of wheel forces at 1 kHz and 100 Hz."""
     place = tmp_path_factory.mktemp("forces")
     true = simulate(road_scene(step=1e-3, duration=6.0), "reference")
-    write_forces(true, place, 1e-3)
+    write_measurement(true, place, 1e-3)
     (place / "slow").mkdir()
-    write_forces(true, place / "slow", 1e-2)
+    write_measurement(true, place / "slow", 1e-2)
     return place
 
 

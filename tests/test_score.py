@@ -23,7 +23,8 @@ from models.drift.score import (
 )
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import force_scene, road_scene
 
 DURATION = 4.0
 OWN = Own(
@@ -52,7 +53,7 @@ GUIDED, SPRUNG, FREE = ("wheel_forces", "prescribed_pitch"), ("wheel_forces", "p
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("score")
     truth = simulate(road_scene(duration=DURATION), "reference")
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     return folder, truth
 
 

@@ -21,9 +21,10 @@ from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import ANGLE, interpolation, model, noise
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from models.vehicles.pitch_plane import Parameters
 from validation.common.rows import Row, System, Table, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
@@ -99,7 +100,7 @@ def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
 
 def _truth(one: Combination, folder: Path, road: dict[str, Any], step: float = STEP) -> Result:
     true = simulate(road_scene(step=step, duration=one.duration, road=road), "reference")
-    write_forces(true, folder, 1 / one.rate)
+    write_measurement(true, folder, 1 / one.rate)
     return true
 
 

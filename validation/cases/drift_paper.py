@@ -8,7 +8,7 @@ from typing import Any
 from models.core.systems import load
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from studies.six_runs import followed, row
+from models.systems.pitch_plane.six_runs import followed, row
 from validation.common.rows import Row, System, Table, finding, within
 
 TITLE = "The paper's six runs"

@@ -20,8 +20,9 @@ from models.engines.protocol import build
 from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Row, System, Table, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
@@ -81,7 +82,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _truth(folder: Path, duration: float, rate: float) -> Result:
     true = simulate(road_scene(step=2.5e-4, duration=duration), "reference")
-    write_forces(true, folder, 1 / rate)
+    write_measurement(true, folder, 1 / rate)
     return true
 
 

@@ -13,9 +13,10 @@ from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from models.vehicles.pitch_plane import equilibrium
 from validation.common.rows import Row, System, Table, at_most, finding
-from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.scenes import VEHICLES, force_scene, road_scene
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
@@ -176,7 +177,7 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
     measured = simulate(road_scene(step=PERIOD, duration=ROUGH + 0.1), "reference")
-    write_forces(measured, folder, PERIOD)
+    write_measurement(measured, folder, PERIOD)
     scene = force_scene(folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=PERTURBED, effects=GUIDE)
     true = truth(scene)
     table: list[list[Any]] = []

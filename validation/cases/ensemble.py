@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from models.ensemble.runner import run_paths
-from models.ensemble.statistics import deviation, quantile
+from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
@@ -44,7 +45,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LONG
         measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-        write_forces(measured, forces, STEP)
+        write_measurement(measured, forces, STEP)
         truth = measured["pitch"]
         scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
@@ -325,8 +326,6 @@ def _data(
     truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any], prices: dict[str, float]
 ) -> dict[str, Any]:
     """What the tables and the figure show."""
-    from studies.ensemble import percentiles
-
     errors = found["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
     quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
@@ -386,8 +385,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []
+    from models.drawing.drift import draw_fan
     from models.drawing.figures import plt
-    from studies.ensemble import draw_fan
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))

@@ -20,8 +20,9 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.tangent import Path as ErrorPath
 from models.systems.pitch_plane.tangent import covariance, measured_growth, swing
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Row, System, Table, at_most, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
@@ -66,7 +67,7 @@ def _measured(
     """The virtual measurement, its forces written at RATE."""
     source = {"source": "study", **(road or ROADS[STUDY])}
     true = simulate(road_scene(parameters, 1e-3, duration, source), "reference")
-    write_forces(true, folder, 1 / RATE)
+    write_measurement(true, folder, 1 / RATE)
     return true
 
 
@@ -366,7 +367,7 @@ def _step_rows(folder: Path) -> list[Row]:
 def _linear_rows(folder: Path) -> list[Row]:
     """Linearised, measurement and all, the perturbed vehicle must not drift."""
     true = simulate(_linear(road_scene(step=1e-3, duration=60.0), {}), "reference")
-    write_forces(true, folder, 1 / RATE)
+    write_measurement(true, folder, 1 / RATE)
     start = dict(zip(("z1", "z2", "z3", "pitch"), true.states[0, :4].tolist(), strict=True))
     run = simulate(_linear(force_scene(folder, step=1e-3, duration=60.0, override=PAPER), start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())

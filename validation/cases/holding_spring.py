@@ -22,8 +22,9 @@ from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import growth
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Row, System, Table, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
@@ -77,7 +78,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _measure(folder: Path) -> Measured:
     true = simulate(road_scene(step=STEP, duration=DURATION), "reference")
-    write_forces(true, folder, STEP)
+    write_measurement(true, folder, STEP)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     quiet = assemble(force_scene(folder, step=STEP, duration=DURATION))
     noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=PAPER, effects=noise))

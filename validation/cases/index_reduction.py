@@ -14,10 +14,11 @@ from models.engines.protocol import build
 from models.engines.reference import derivative_of
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
 from validation.common.rows import Row, System, at_most, behaves, finding, not_run
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 from validation.hard_cases.prescribed_pitch import AsItComes
 
 TITLE = "Drift by index reduction, and drift by noise"
@@ -97,7 +98,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _drive(folder: Path, duration: float) -> Files:
     """Measure on the study road, write forces, pitch, and the pitch that a gyro's integrated rate gives."""
     measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-    write_forces(measured, folder, STEP)
+    write_measurement(measured, folder, STEP)
     walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
     return Files(folder, duration, measured["pitch"])

@@ -14,8 +14,8 @@ from models.sensors import inertial_unit as unit
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias
 from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
 from models.systems.pitch_plane.run import run as simulate
-from studies.virtual_measurement import follower, write_measurement
-from studies.virtual_measurement import measure as measure_road
+from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
+from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
 from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import road_scene

@@ -14,9 +14,10 @@ from models.drift.score import CHANNELS, errors
 from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
-from studies.stabilisers import Bench, Options, run
+from models.systems.pitch_plane.stabilised import Bench, Options, compare
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
@@ -114,7 +115,7 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     """The same run at rest and sinking as a whole: its heave runs away, and no section force knows."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        write_forces(simulate(road_scene(duration=duration), "reference"), folder, 1e-3)
+        write_measurement(simulate(road_scene(duration=duration), "reference"), folder, 1e-3)
         found = {engine: _sinking(engine, folder, duration) for engine in engines}
     rows = []
     for engine, (drift, worst) in found.items():
@@ -185,9 +186,9 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
 def _study(folder: Path) -> list[dict[str, Any]]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
-    summary = run(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
-    assert not summary["failed"], summary["failed"]
-    return summary["rows"]
+    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
+    assert not failed, failed
+    return rows
 
 
 def _verdicts(found: list[dict[str, Any]]) -> list[Row]:
@@ -355,7 +356,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """The study's figure to decide from."""
     if not data["study"]:
         return []
-    from studies.stabiliser_figures import decision
+    from models.drawing.drift import decision
 
     scene = load(SCENE)
     options = read(Options, scene.options, "", "options")

@@ -14,9 +14,9 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.virtual_measurement import Follow, follower, write_measurement
+from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from models.vehicles.pitch_plane import Parameters
-from studies.virtual_measurement import Follow, follower, write_measurement
-from studies.virtual_measurement import measure as measure_road
 from validation.common import checks
 from validation.common.rows import Row, System, at_most, finding, within
 from validation.common.scenes import VEHICLES, road_scene

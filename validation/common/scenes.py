@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Result
-from models.core.time_series import write_time_series
 from models.systems.pitch_plane.scene import Scene, build
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
@@ -45,7 +44,7 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """The vehicle driven by the forces that ``write_forces`` left in the folder."""
+    """The vehicle driven by the forces that ``write_measurement`` left in the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {
@@ -57,16 +56,6 @@ def force_scene(
         "",
         folder,
     )
-
-
-def write_forces(measured: Result, folder: Path, period: float) -> None:
-    """Wheel forces and pitch of a road-excited run as the files that force-excited scenes read."""
-    every = round(period / float(measured.times[1] - measured.times[0]))
-    columns = {name: measured[name][::every] for name in ("f1", "f2", "pitch")}
-    write_time_series(
-        folder / "wheel_forces.csv", {"front": ("N", columns["f1"]), "rear": ("N", columns["f2"])}, period
-    )
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", columns["pitch"])}, period)
 
 
 def data_folder() -> Path | None:

@@ -23,7 +23,8 @@ from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE,
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.common.scenes import road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import road_scene
 
 ANGLE = float(np.deg2rad(0.1))
 """Deviation (rad) of the inertial unit, white at 1 kHz."""
@@ -48,7 +49,7 @@ def at_period(deviation: float, period: float) -> float:
 def measured(folder: Path, duration: float, period: float) -> Result:
     """The virtual measurement on the study road, its files left in the folder; rows ``period`` (s) apart."""
     found = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
-    write_forces(found, folder, period)
+    write_measurement(found, folder, period)
     return found.every(period)
 
 

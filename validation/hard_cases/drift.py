@@ -13,7 +13,8 @@ from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
 
@@ -37,7 +38,7 @@ def measured(grade: float = 0.0) -> Result:
 
 def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0) -> Scene:
     """The vehicle under the forces of that run, started with a wrong pitch rate (rad/s)."""
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=DURATION, effects=effects)
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
@@ -183,7 +184,7 @@ def _off(run: Result, truth: Result) -> int | None:
 def before_drift_naive(folder: Path) -> str:
     """Two step sizes of the reference, compared over 30 s."""
     truth = simulate(road_scene(duration=30.0), "reference")
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
