@@ -8,7 +8,6 @@ d4 and I times a factor between 0.9 and 1.1, as in Fig. 7 of the paper).
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import ANGLE, interpolation, model, noise
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from models.vehicles.pitch_plane import Parameters
-from validation.common.rows import Row, System, Table, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, within
 from validation.common.scenes import force_scene, road_scene
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
@@ -44,7 +43,7 @@ class Combination:
 
     name: str
     source: str
-    road: dict[str, Any]
+    road: Data
     rate: float
     duration: float
     size: float = 0.0
@@ -71,13 +70,13 @@ COMBINATIONS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """A row per combination; quick: the first one, by few paths."""
     found = [_combination(one, folder, quick) for one in (COMBINATIONS[:1] if quick else COMBINATIONS)]
     return [_row(one) for one in found], {"combinations": found}
 
 
-def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
+def _combination(one: Combination, folder: Path, quick: bool) -> Data:
     """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
     members = {"noise": _noise, "interpolation": _between, "model": _models}[one.source]
     predicted, measured = members(one, folder, QUICK_PATHS if quick else PATHS)
@@ -98,7 +97,7 @@ def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
     }
 
 
-def _truth(one: Combination, folder: Path, road: dict[str, Any], step: float = STEP) -> Result:
+def _truth(one: Combination, folder: Path, road: Data, step: float = STEP) -> Result:
     true = simulate(road_scene(step=step, duration=one.duration, road=road), "reference")
     write_measurement(true, folder, 1 / one.rate)
     return true
@@ -126,7 +125,7 @@ def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | N
     return [predicted for predicted, _ in pairs], [measured for _, measured in pairs]
 
 
-def _undisturbed(one: Combination, folder: Path, road: dict[str, Any]) -> tuple[float | None, float]:
+def _undisturbed(one: Combination, folder: Path, road: Data) -> tuple[float | None, float]:
     true = _truth(one, folder, road)
     assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
     return interpolation(assembly).passes(), _drift_off(assembly, true)
@@ -156,7 +155,7 @@ def _drift_off(assembly: Assembly, true: Result) -> float:
     return float(run.times[off.argmax()]) if off.any() else np.inf
 
 
-def _row(found: dict[str, Any]) -> Row:
+def _row(found: Data) -> Row:
     key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
     scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
     what = (
@@ -167,7 +166,7 @@ def _row(found: dict[str, Any]) -> Row:
     return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
@@ -198,7 +197,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Measured over predicted."""
     from models.drawing.figures import plt
 

@@ -3,13 +3,12 @@
 from collections.abc import Collection
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from models.core.systems import load
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import followed, row
-from validation.common.rows import Row, System, Table, finding, within
+from validation.common.rows import Data, Measured, System, Table, finding, within
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
@@ -81,7 +80,7 @@ FIGURES = (
 """Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
@@ -126,7 +125,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Data]:
     """Figures of the study's runs in the reference by name: of some, or of all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = followed(scene, Path(folder))
@@ -146,7 +145,7 @@ def _order(coarse: float, fine: float) -> float:
     return log2(coarse / fine)
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
     rows = tuple(
         (

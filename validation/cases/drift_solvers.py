@@ -21,7 +21,7 @@ from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.rows import Row, System, Table, finding, within
+from validation.common.rows import Data, Measured, Row, System, Table, finding, within
 from validation.common.scenes import force_scene, road_scene
 
 TITLE = "What drift depends on: samples and noise, not solvers"
@@ -70,7 +70,7 @@ SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
@@ -86,7 +86,7 @@ def _truth(folder: Path, duration: float, rate: float) -> Result:
     return true
 
 
-def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
+def _solvers(folder: Path, solvers: Any) -> list[Data]:
     """Drift-off (s) by solver: undisturbed with linear and with smooth samples, and noisy with linear ones.
 
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
@@ -97,7 +97,7 @@ def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
     found = []
     tight = solvers[1::2]
     fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
-    inputs: tuple[tuple[str, str, dict[str, Any], Any], ...] = (
+    inputs: tuple[tuple[str, str, Data, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
         ("noisy", "linear", noise, fixed),
@@ -129,7 +129,7 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
     return {"drift-off": float(run.times[off.argmax()]) if off.any() else DURATION, "error": float(error[-1])}
 
 
-def _smoothing(folder: Path) -> list[dict[str, Any]]:
+def _smoothing(folder: Path) -> list[Data]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
     true = _truth(folder, NOISY, NOISY_RATE)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
@@ -145,7 +145,7 @@ def _smoothing(folder: Path) -> list[dict[str, Any]]:
 
 def _treated(
     name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
-) -> dict[str, Any]:
+) -> Data:
     forces = quiet.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
@@ -206,7 +206,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
 
 
-def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
+def _solver_rows(solvers: list[Data]) -> list[Row]:
     """Who drifts off when."""
     rows = []
     for name in ("linear", "noisy"):
@@ -246,7 +246,7 @@ def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
+def _smoothing_rows(smoothing: list[Data]) -> list[Row]:
     """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
     rows = []
     for one in smoothing:
@@ -287,7 +287,7 @@ def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
         (one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
@@ -327,5 +327,5 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return found
 
 
-def _when(one: dict[str, Any]) -> str:
+def _when(one: Data) -> str:
     return "never" if one["drift-off"] >= DURATION else f"{one['drift-off']:.2f}"

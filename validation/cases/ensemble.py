@@ -18,7 +18,7 @@ from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threa
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, aim, at_most, behaves, finding, within
 from validation.common.scenes import force_scene, road_scene
 
 TITLE = "Noise paths by the thousand"
@@ -40,7 +40,7 @@ TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 SAME = "the same bits"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LONG
@@ -161,7 +161,7 @@ def _alone(function: Callable[..., Any], *args: Any) -> Any:
         return pool.submit(function, *args).result()
 
 
-def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
+def _large(job: NoisePaths, many: int, blocks: Path) -> Data:
     """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
     import resource
 
@@ -184,7 +184,7 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
     }
 
 
-def _scale_rows(large: dict[str, Any]) -> list[Row]:
+def _scale_rows(large: Data) -> list[Row]:
     what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
     return [
         within(
@@ -322,9 +322,7 @@ def _half_step_row(forces: Path) -> Row:
     )
 
 
-def _data(
-    truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any], prices: dict[str, float]
-) -> dict[str, Any]:
+def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Data, prices: dict[str, float]) -> Data:
     """What the tables and the figure show."""
     errors = found["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
@@ -343,7 +341,7 @@ def _data(
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
     if not data:
         return []
@@ -381,7 +379,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []

@@ -6,13 +6,20 @@ The closed law takes the growth rate from the fast pitch rate of the true run; M
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.result import Result
 from models.core.signals import Sampled
-from models.drift import growth as law
+from models.drift.growth import (
+    CUTOFF,
+    growth_rate,
+    growth_until,
+    heave_variance,
+    pitch_rate_of_forces,
+    pitch_variance,
+    rigid_pitch,
+)
 from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
 from models.systems.pitch_plane.noise_paths import noise_paths
@@ -21,7 +28,7 @@ from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.tangent import Path as ErrorPath
 from models.systems.pitch_plane.tangent import covariance, measured_growth, swing
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.rows import Row, System, Table, at_most, finding, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, within
 from validation.common.scenes import force_scene, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
@@ -48,7 +55,7 @@ PAPER = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
 LAW = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
     true = _measured(folder, LENGTH)
     spread = _spread(true, folder, quick)
@@ -61,9 +68,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + _engine_rows(folder) + _step_rows(folder) + _linear_rows(folder), {"spread": spread, "roads": roads}
 
 
-def _measured(
-    folder: Path, duration: float, road: dict[str, Any] | None = None, parameters: str = "itwm_drift"
-) -> Result:
+def _measured(folder: Path, duration: float, road: Data | None = None, parameters: str = "itwm_drift") -> Result:
     """The virtual measurement, its forces written at RATE."""
     source = {"source": "study", **(road or ROADS[STUDY])}
     true = simulate(road_scene(parameters, 1e-3, duration, source), "reference")
@@ -76,24 +81,24 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true: Result, folder: Path, quick: bool) -> dict[str, Any]:
+def _spread(true: Result, folder: Path, quick: bool) -> Data:
     """Standard deviations at 1 to 10 s: Monte Carlo (in the full run), covariance along the path, and the laws."""
     times, assembly = np.arange(1, LENGTH + 1), assemble(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
     p, quiet = assembly.parameters, _without_noise(assembly, folder)
-    q = law.rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     carried = covariance(quiet, DEVIATION)
-    alone = law.pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
+    alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
     found = {
-        f"law, {name}": np.sqrt(law.pitch_variance(times, law.growth_until(rate, 1 / RATE, p)[at], q)).tolist()
+        f"law, {name}": np.sqrt(pitch_variance(times, growth_until(rate, 1 / RATE, p)[at], q)).tolist()
         for name, rate in rates.items()
     }
     found |= {
         "time": times.tolist(),
         "covariance": carried.deviation("pitch")[at].tolist(),
-        "t^1.5": np.sqrt(law.pitch_variance(times, 0.0, q)).tolist(),
-        "heave law": np.sqrt(law.heave_variance(times, p, DEVIATION, 1 / RATE)).tolist(),
+        "t^1.5": np.sqrt(pitch_variance(times, 0.0, q)).tolist(),
+        "heave law": np.sqrt(heave_variance(times, p, DEVIATION, 1 / RATE)).tolist(),
         "heave covariance": carried.deviation("z3")[at].tolist(),
     }
     if not quick:
@@ -124,36 +129,34 @@ def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> Er
     return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
 
 
-def _growth(
-    folder: Path, road: dict[str, Any], windows: int = WINDOWS, parameters: str = "itwm_drift"
-) -> dict[str, Any]:
+def _growth(folder: Path, road: Data, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Data:
     """Growth rates of one road: from the run, from the forces, by cut-off, and measured in windows in both frames."""
     true = _measured(folder, WINDOW * windows, road, parameters)
     assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
-    alone = law.pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
+    alone = pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
     starts = np.rint(np.arange(windows) * WINDOW * RATE).astype(int)
     paths = {
         mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
         for mode in ("force", "force-body")
     }
     measured = {mode: np.array([measured_growth(path) for path in own]).T for mode, own in paths.items()}
-    rigid = law.rigid_pitch(p)
+    rigid = rigid_pitch(p)
     return {
-        "run": law.growth_rate(rate, 1 / RATE, p),
-        "forces": law.growth_rate(alone, 1 / RATE, p),
-        "cut-offs": [law.growth_rate(rate, 1 / RATE, p, law.CUTOFF * factor) for factor in (0.5, 2.0)],
+        "run": growth_rate(rate, 1 / RATE, p),
+        "forces": growth_rate(alone, 1 / RATE, p),
+        "cut-offs": [growth_rate(rate, 1 / RATE, p, CUTOFF * factor) for factor in (0.5, 2.0)],
         "measured": float(measured["force"][0].mean()),
         "scatter": float(measured["force"][0].std(ddof=1)),
         "body": float(measured["force-body"][0].mean()),
         "body error": float(measured["force-body"][1].max()),
         "swing": float(np.mean([swing(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
-        "swing law": law.growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
+        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
     }
 
 
-def _spread_rows(spread: dict[str, Any]) -> list[Row]:
+def _spread_rows(spread: Data) -> list[Row]:
     """The spread of noise against its laws, second by second."""
     seen = "pitch" if "pitch" in spread else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
@@ -217,7 +220,7 @@ def _spread_rows(spread: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _growth_rows(roads: dict[str, Any]) -> list[Row]:
+def _growth_rows(roads: Data) -> list[Row]:
     rows = []
     for name, road in roads.items():
         key = name.replace(" ", "-").replace(",", "")
@@ -262,7 +265,7 @@ def _growth_rows(roads: dict[str, Any]) -> list[Row]:
         at_most(
             "growth.cut-off",
             SYSTEM,
-            f"change of the growth rate by half or twice the cut-off of {law.CUTOFF} Hz, largest",
+            f"change of the growth rate by half or twice the cut-off of {CUTOFF} Hz, largest",
             worst,
             "",
             0.05,
@@ -272,7 +275,7 @@ def _growth_rows(roads: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _body_row(key: str, what: str, road: dict[str, Any]) -> Row:
+def _body_row(key: str, what: str, road: Data) -> Row:
     """No growth for a vehicle that does not couple heave to pitch; one that does is told, not judged.
 
     Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
@@ -299,8 +302,8 @@ def _twin_rows(folder: Path) -> list[Row]:
     true = _measured(folder, 5.0, parameters="asymmetric_twin")
     assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
-    q = law.rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
-    expected = np.sqrt(float(law.pitch_variance(5.0, law.growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
+    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
     return [
         within(
@@ -391,7 +394,7 @@ def _linear(scene: Scene, start: dict[str, float]) -> Scene:
     return build({**table, "vehicle": vehicle, "start": start}, "", Path(scene.folder))
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Spread over time, and growth rates by road."""
     spread = data["spread"]
     names = [
@@ -421,7 +424,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
     from models.drawing.figures import plt
 

@@ -23,7 +23,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.trust import growth
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.rows import Row, System, Table, behaves, finding, within
+from validation.common.rows import Data, Measured, Row, System, Table, behaves, finding, within
 from validation.common.scenes import force_scene, road_scene
 
 TITLE = "The smallest spring that holds a force-excited run"
@@ -55,7 +55,7 @@ TOLD = (Setting(1.0, False), Setting(0.0, True))
 
 
 @dataclass(frozen=True)
-class Measured:
+class FreeRuns:
     """The true pitch (n,), and the runs without a spring that start where the true one does, by ``disturbed``."""
 
     pitch: np.ndarray
@@ -63,7 +63,7 @@ class Measured:
     law: float
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
@@ -76,17 +76,17 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"law": measured.law, "found": found}
 
 
-def _measure(folder: Path) -> Measured:
+def _measure(folder: Path) -> FreeRuns:
     true = simulate(road_scene(step=STEP, duration=DURATION), "reference")
     write_measurement(true, folder, STEP)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     quiet = assemble(force_scene(folder, step=STEP, duration=DURATION))
     noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=PAPER, effects=noise))
     law = holding_stiffness(quiet.parameters, growth(quiet).rate)
-    return Measured(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
+    return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
 
 
-def _error(one: Setting, stiffness: float, measured: Measured, engine: str = "reference") -> float:
+def _error(one: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
     """Largest pitch error (rad) of a run on a spring (N m/rad)."""
     free = measured.runs[one.disturbed]
     damping = 2 * one.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
@@ -95,7 +95,7 @@ def _error(one: Setting, stiffness: float, measured: Measured, engine: str = "re
     return float(np.abs(run.states[:, 3] - measured.pitch).max())
 
 
-def _ends(one: Setting, measured: Measured, engine: str) -> list[Row]:
+def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
@@ -115,7 +115,7 @@ def _ends(one: Setting, measured: Measured, engine: str) -> list[Row]:
     return rows
 
 
-def _smallest(one: Setting, measured: Measured) -> float:
+def _smallest(one: Setting, measured: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
     low, high = 0.5 * measured.law, 1.3 * measured.law
     if _error(one, high, measured) > HELD:
@@ -133,7 +133,7 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
     return within(key, SYSTEM, what, law / stiffness, "", 1.0, 0.3, "30 % is asked", "closed form")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Stiffness found in each setting."""
     rows = tuple(
         (name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")

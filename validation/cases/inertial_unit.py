@@ -3,21 +3,33 @@
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from models.core.noise import GYRO, normal
 from models.core.time_series import write_time_series
 from models.drift.score import section_forces
-from models.sensors import inertial_unit as unit
-from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias
+from models.sensors.inertial_unit import (
+    DEGREES_PER_HOUR,
+    angle_variance,
+    bias,
+    error_rotation,
+    euler_mean_square,
+    euler_quaternions,
+    ito_norm,
+    mean_error,
+    mean_scalar,
+    mean_trace,
+    measured_attitude,
+    random_walk,
+    true_attitude,
+)
 from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import road_scene
 from validation.measured import recording
 
@@ -38,7 +50,7 @@ TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 START = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000
     rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
@@ -56,7 +68,7 @@ def turning(count: int, period: float) -> np.ndarray:
 def _clean() -> list[Row]:
     """Attitude from exact rates: about a fixed axis in steps of any length, and on a cone at 1 kHz."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
-    held = unit.true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
+    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
     rates, true = cone(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
     return [
@@ -107,13 +119,10 @@ def _apart(one: np.ndarray, other: np.ndarray) -> float:
 
 def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
     """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
-    true = unit.true_attitude(rates, period, START)[-1]
+    true = true_attitude(rates, period, START)[-1]
     chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
     return np.concatenate(
-        [
-            unit.error_rotation(unit.measured_attitude(rates, period, deviation, START, chunk, SEED)[-1], true)
-            for chunk in chunks
-        ]
+        [error_rotation(measured_attitude(rates, period, deviation, START, chunk, SEED)[-1], true) for chunk in chunks]
     )
 
 
@@ -168,30 +177,30 @@ def _three_axes(paths: int) -> list[Row]:
     rates, root = turning(count, PERIOD), PERIOD**0.5
     equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
     found = errors(rates, PERIOD, UNEQUAL / root, paths)
-    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), unit.mean_error(UNEQUAL, rates, PERIOD, START)
-    resting = unit.mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
+    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), mean_error(UNEQUAL, rates, PERIOD, START)
+    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
     all_equal = np.full(3, EQUAL)
-    same = float(np.trace(unit.mean_error(all_equal, rates, PERIOD, START)))
+    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START)))
     return [
-        _mean("trace", "E[tr E], three equal axes, turning body", trace, unit.mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
+        _mean("trace", "E[tr E], three equal axes, turning body", trace, mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
         _mean(
             "scalar",
             "E[q1] of the error, three equal axes, turning body",
             equal[:, 0],
-            unit.mean_scalar(all_equal, SPAN),
+            mean_scalar(all_equal, SPAN),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean(
             "scalar.unequal",
             "E[q1] of the error, unequal axes, turning body",
             found[:, 0],
-            unit.mean_scalar(UNEQUAL, SPAN),
+            mean_scalar(UNEQUAL, SPAN),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _small(
             "matrix.equal",
             "matrix law with equal noise against 3 exp(-s^2 t)",
-            abs(same - unit.mean_trace(EQUAL, SPAN)),
+            abs(same - mean_trace(EQUAL, SPAN)),
             "",
             "both are exact",
         ),
@@ -231,9 +240,9 @@ def _norms(paths: int) -> list[Row]:
     for axes in (1, 3):
         noise = np.zeros((steps, paths, 3))
         noise[:, :, :axes] = normal(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
-        q = unit.euler_quaternions(EQUAL * period**0.5 * noise, START)
+        q = euler_quaternions(EQUAL * period**0.5 * noise, START)
         square = np.sum(q**2, axis=1)
-        law = unit.euler_mean_square(EQUAL, axes, period, steps)
+        law = euler_mean_square(EQUAL, axes, period, steps)
         rows += [
             _mean(
                 f"norm.{axes}",
@@ -253,16 +262,16 @@ def _norms(paths: int) -> list[Row]:
                 f"direction.{axes}",
                 f"E[q1] once it is normalised, {axes} noisy axes",
                 q[:, 0] / square**0.5,
-                unit.mean_scalar(np.full(axes, EQUAL), span),
+                mean_scalar(np.full(axes, EQUAL), span),
                 "exp(-k s^2 t / 8), as after Stratonovich",
             ),
             within(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the Euler law at 4e6 steps, {axes} noisy axes",
-                unit.euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
+                euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-                unit.ito_norm(np.full(axes, EQUAL), span),
+                ito_norm(np.full(axes, EQUAL), span),
                 1e-6,
                 "exp(k s^2 t / 8), eq. (28)",
                 "closed form",
@@ -271,9 +280,9 @@ def _norms(paths: int) -> list[Row]:
     return rows
 
 
-def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
+def _ten_minutes(paths: int) -> Measured:
     """The paper's example: 600 s at 1 kHz, 0.1 rad/s white on each sample, on a car's motion."""
-    walk = unit.random_walk(DEVIATION, RATE)
+    walk = random_walk(DEVIATION, RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [
@@ -316,7 +325,7 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
     every = round(RATE)
     t = np.arange(round(TEN_MINUTES * RATE)) / RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
-    true = unit.true_attitude(rates, 1 / RATE, START)[::every]
+    true = true_attitude(rates, 1 / RATE, START)[::every]
     found = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(
         mean_square(
@@ -335,8 +344,8 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
 
 def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees about the global axes of one noisy path, at the times of ``true`` (601, 4)."""
-    found = unit.measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
-    return np.degrees(logarithm(unit.error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
+    found = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
+    return np.degrees(logarithm(error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
@@ -397,7 +406,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
+def _recording(paths: int) -> Measured:
     """A minute in a real car: gyro against camera, and the noise law on its motion."""
     path = recording.find()
     if path is None:
@@ -411,7 +420,7 @@ def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
     rates, period = own.rates[::5], 5 * recording.PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
     found = errors(rates, period, deviation, paths)
-    law = unit.mean_error(deviation * period**0.5, rates, period, START)
+    law = mean_error(deviation * period**0.5, rates, period, START)
     return [
         finding(
             "inertial_unit.recording",
@@ -435,24 +444,24 @@ def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
     ], {"off": off[::20].tolist()}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """The ten minutes over time."""
     if not data["ten minutes"]:
         return []
-    rms, walk = data["ten minutes"]["rms"], math.degrees(unit.random_walk(DEVIATION, RATE))
+    rms, walk = data["ten minutes"]["rms"], math.degrees(random_walk(DEVIATION, RATE))
     rows = tuple((f"{t}", f"{rms[t]:.2f}", f"{walk * t**0.5:.2f}") for t in (1, 10, 60, 300, 600))
     note = f"0.1 rad/s on each sample of 1 kHz, {data['ten minutes']['count']} paths; samples are held (Stratonovich)."
     return [Table("The ten-minute example", note, ("time [s]", "rms angle per axis [deg]", "s sqrt(t) [deg]"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
     from models.drawing.figures import plt
 
     found = []
     if data["ten minutes"]:
         figure, axes = plt.subplots(1, 3, figsize=(10, 3.4), sharey=True)
-        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(unit.random_walk(DEVIATION, RATE))
+        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
         times = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):
             axis.plot(times, paths[:, :, i].T, color="#0072b2", linewidth=0.6)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,8 @@ from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
 from validation.common.bounces import Bounces, energy
-from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.checks import acceleration_gap
+from validation.common.rows import Measured, Row, System, at_most, finding, within
 from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 
 TITLE = "Tyres that only push"
@@ -40,7 +40,7 @@ ROUNDING = "the same tableau and laws; sums are taken in another order"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
     vehicles = VEHICLES[-1:] if quick else VEHICLES
     rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
@@ -75,7 +75,7 @@ def _accelerations(parameters: str) -> list[Row]:
         own = scene(parameters, geometry, 2.0, 1e-3, road=True)
         assembly = assemble(own)
         for engine in ENGINES:
-            error = checks.acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
+            error = acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
                 at_most(

@@ -25,7 +25,7 @@ from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, within
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted
 
@@ -48,7 +48,7 @@ RIGID = {
 BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
     rows += [_plain(), _order(), _tilt()]
@@ -345,7 +345,7 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     }
 
 
-def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
+def _held(curves: Data, quick: bool) -> list[Row]:
     """The symmetric part as a measurement: the error stays where it is."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
@@ -396,7 +396,7 @@ def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
     return [*rows, grown]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """What a flat arrangement costs."""
     rows = tuple(
         (f"{line[0]:g}", *(f"{value:.3g}" for value in line[1:]))
@@ -413,7 +413,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Noise gain by height, and the error of the rate over time."""
     from models.drawing.figures import plt
 

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.drift.point_mass import continuous, discrete, paths
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, within
 
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
@@ -30,7 +29,7 @@ WHY = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
     exact = {
         "continuous": [_continuous_error(x) for x in DAMPED],
@@ -175,7 +174,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
     note = (
@@ -185,7 +184,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Standard deviations over time, and how the Euler scheme nears them."""
     from models.drawing.figures import plt
 

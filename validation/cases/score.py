@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.stabilised import Bench, Options, compare
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, finding, within
 from validation.common.scenes import force_scene, road_scene
 from validation.hard_cases.case import IMPLEMENTATIONS
 
@@ -51,7 +50,7 @@ PROTOTYPE = {
 """Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
     rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
     with TemporaryDirectory() as name:
@@ -183,7 +182,7 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study(folder: Path) -> list[dict[str, Any]]:
+def _study(folder: Path) -> list[Data]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
     _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
@@ -191,7 +190,7 @@ def _study(folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _verdicts(found: list[dict[str, Any]]) -> list[Row]:
+def _verdicts(found: list[Data]) -> list[Row]:
     """Known-good and known-bad runs get their words; the blind one is judged where it can know."""
     rows = []
     for row in found:
@@ -239,11 +238,11 @@ def _verdicts(found: list[dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def _id(row: dict[str, Any]) -> str:
+def _id(row: Data) -> str:
     return ".".join((row["method"].replace(" ", "-").replace("/", "-"), row["road"], row["engine"]))
 
 
-def _blind(found: list[dict[str, Any]]) -> list[Row]:
+def _blind(found: list[Data]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
     return [
         within(
@@ -264,7 +263,7 @@ def _blind(found: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _long(folder: Path) -> list[dict[str, Any]]:
+def _long(folder: Path) -> list[Data]:
     """The prototype's methods over 60 s at 1 kHz on the road, in the reference."""
     scene = load(SCENE, LONG)
     (folder / "long").mkdir()
@@ -272,13 +271,13 @@ def _long(folder: Path) -> list[dict[str, Any]]:
     return [_scored(bench, name) for name in PROTOTYPE]
 
 
-def _scored(bench: Bench, name: str) -> dict[str, Any]:
+def _scored(bench: Bench, name: str) -> Data:
     effects = bench.methods[name]
     found: Result = bench.simulate("reference", effects)
     return bench.row(name, effects, found)
 
 
-def _beside(long: list[dict[str, Any]]) -> list[Row]:
+def _beside(long: list[Data]) -> list[Row]:
     """Pitch errors of 60 s beside the prototype's; a tumbled run has no damage to show."""
     rows = []
     for row in long:
@@ -307,7 +306,7 @@ def _beside(long: list[dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Every stabiliser on both roads, and the same over 60 s beside the prototype."""
     found = []
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
@@ -336,7 +335,7 @@ HEADINGS = (
 )
 
 
-def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+def _cells(row: Data) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in CHANNELS)
     return (
         row.get("engine", "reference"),
@@ -352,7 +351,7 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """The study's figure to decide from."""
     if not data["study"]:
         return []

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,8 @@ from models.systems.pitch_plane.virtual_measurement import Follow, follower, wri
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from models.vehicles.pitch_plane import Parameters
 from validation.common import checks
-from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.checks import trajectory_gap
+from validation.common.rows import Measured, Row, System, at_most, finding, within
 from validation.common.scenes import VEHICLES, road_scene
 
 TITLE = "Stabilisers"
@@ -40,7 +40,7 @@ EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
 BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
@@ -130,7 +130,7 @@ def _exact(follow: Follow, duration: float) -> list[Row]:
             f"stabilisers.{name}.{engine}",
             SYSTEM,
             f"{engine}, {words}: largest difference of any state to the reference",
-            checks.trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
+            trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
             "SI",
             1e-12,
             "the same stages see the same side of the band and the same moment",

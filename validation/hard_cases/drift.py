@@ -15,8 +15,8 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
-from validation.hard_cases import setups
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.setups import largest
 
 DURATION = 8.0
 TILT = 0.1
@@ -172,7 +172,7 @@ def before_drift(engine: str, folder: Path) -> float:
     other = "mujoco" if engine == "reference" else "reference"
     one, two = (simulate(scene, name) for name in (engine, other))
     held = slice(None, _off(one, measured()))
-    return setups.largest(one.states[held] - two.states[held]) / setups.largest(two.states[held])
+    return largest(one.states[held] - two.states[held]) / largest(two.states[held])
 
 
 def _off(run: Result, truth: Result) -> int | None:
