@@ -34,7 +34,7 @@ CHUNK = 4096
 """Steps between two looks at the guard."""
 
 
-def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
+def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
     """Bodies and joints without those of ``guided`` coordinates, which stand still at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -188,7 +188,7 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: Collection[int] = ()) -> mujoco.MjModel:
     """The model with its input table in its numeric data, behind what ``mujoco_callback`` reads before it."""
-    spec = _spec(assembly.vehicle, settings, guided)
+    spec = specification(assembly.vehicle, settings, guided)
     if drive.controls is not None:
         _held(spec, assembly.vehicle, 0.0 if drive.arms is not None else -1.0)
     if drive.law is None:

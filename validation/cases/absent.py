@@ -13,7 +13,7 @@ from models.core.systems import DEFAULT
 from models.core.time_series import write_time_series
 from models.engines.assembly import Model
 from models.engines.protocol import build
-from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
@@ -83,9 +83,7 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
 
 def counts(own: Scene, engine: str) -> dict[str, int]:
     """What a scene builds in an engine, and how many channels it saves."""
-    assembly = assemble(own)
-    built = build(engine, assembly, settings_of(own, engine))
-    return {**built.plan(), "channels": len(outputs(assembly, built.run(), built))}
+    return {**model(own, engine).plan(), "channels": len(run(own, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:

@@ -379,7 +379,7 @@ def _section_forces() -> list[Row]:
     with TemporaryDirectory() as name:
         place = Path(name)
         measured = measure_road(scene)
-        write_measurement(measured, 1 / scene.run.step, 1, place)
+        write_measurement(measured, place, scene.run.step)
         true = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
         part = measured.times / scene.run.duration
         wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)

@@ -49,7 +49,7 @@ def measure(quick: bool, folder: Path) -> Measured:
             scene = road_scene(parameters, STEP, duration)
             measured, work = measure_road(scene), Path(name) / parameters
             work.mkdir()
-            write_measurement(measured, 1 / STEP, 1, work)
+            write_measurement(measured, work, STEP)
             follow, p = follower(scene, work), scene.vehicle_parameters()
             rows += _missing_mass(parameters, p, measured, follow, work)
             rows += _shifted_centre(parameters, p, measured, follow, work)

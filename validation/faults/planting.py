@@ -152,7 +152,7 @@ ADAPTER = (
     Fault(
         "gravity missing on one wheel",
         MUJOCO,
-        inside=attribute("models.engines.mujoco:_spec", patches.weightless_wheel),
+        inside=attribute("models.engines.mujoco:specification", patches.weightless_wheel),
     ),
     Fault(
         "strut measured along the rotating body",

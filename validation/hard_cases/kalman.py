@@ -12,10 +12,11 @@ from scipy.linalg import expm
 from models.core.noise import PITCH_SENSOR, normal
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RELATIVE, Measurement, PitchStep, estimate
+from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE, Measurement, PitchStep, estimate
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
+from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
+from validation.drift.kalman_runs import relative
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import driven, largest, static_forces, vehicle
 
@@ -34,7 +35,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
     count = round(DURATION / PERIOD) + 1
     base = vehicle()
     forces = static_forces(base, count, PERIOD, held=False).values
-    write_time_series(folder / "forces.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
+    write_wheel_forces(folder, *forces.T, PERIOD)
     seen = base.initial[3] + ANGLE * normal(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     seen[lost] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
@@ -46,7 +47,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
             "run": {"duration": DURATION, "step": 1e-3},
             "start": {"z1": start[0], "z2": start[1], "pitch": start[3]},
             "effects": {
-                "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+                "wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"},
                 "force_noise": {"deviation": FORCE, "seed": 7},
                 "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own},
             },
@@ -105,10 +106,7 @@ def nothing(engine: str, folder: Path) -> float:
 
 def _exact() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW."""
-    base = vehicle(geometry="linear").without_tyres()
-    pushes = np.zeros((8, 2))
-    pushes[4, 0], pushes[5, 1] = -1 / base.parameters.m1, -1 / base.parameters.m2
-    a, b = RELATIVE @ first_order(linearised(base.vehicle))[:, KEPT], RELATIVE @ pushes
+    a, b = relative(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
     return a, b, expm(block * SLOW)[:6, 6:]

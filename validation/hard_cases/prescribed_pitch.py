@@ -10,7 +10,7 @@ import numpy as np
 from models.core.signals import Sampled, Signal
 from models.engines import exudyn as exudyn_engine
 from models.engines.assembly import Assembly, Trajectory
-from models.engines.mujoco import _spec
+from models.engines.mujoco import specification
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import (
@@ -104,7 +104,7 @@ def soft_naive(folder: Path) -> str:
 def _soft_error(step: float) -> float:
     """Rms error (N m) of the moment of a soft equality constraint on the pitch joint."""
     assembly, count = scene(), round(DURATION / step)
-    spec = _spec(assembly.vehicle, settings("mujoco", step, DURATION, "Euler"))
+    spec = specification(assembly.vehicle, settings("mujoco", step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="chassis pitch", name2="", data=[0.0] * 12)
     model = spec.compile()

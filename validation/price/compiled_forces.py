@@ -59,7 +59,7 @@ class CompiledForces:
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
         bare = replace(assembly.vehicle, struts=())
-        spec = adapter._spec(bare, settings)
+        spec = adapter.specification(bare, settings)
         assert assembly.input is not None
         table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
         header = [2.0 / settings.step, len(table), *assembly.parameters.array()]

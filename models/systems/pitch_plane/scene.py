@@ -133,6 +133,13 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
     return scene.model_copy(update={"effects": effects})
 
 
+def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
+    """The scene with some values of its tables changed, by the tables' names."""
+    table = scene.table()
+    tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
+    return build({**table, **tables_now}, scene.file, Path(scene.folder))
+
+
 def _check_engine(name: str, scene: Scene) -> None:
     """Known names, and no setting that the integrator would not read."""
     if name not in CATALOGUE:

@@ -34,7 +34,7 @@ from models.drift.score import (
 )
 from models.fatigue.damage import SLOPE
 from models.systems.pitch_plane.run import run
-from models.systems.pitch_plane.scene import Scene, assemble, build
+from models.systems.pitch_plane.scene import Scene, assemble, changed
 from models.systems.pitch_plane.trust import trust
 from models.systems.pitch_plane.virtual_measurement import (
     PAPER,
@@ -104,12 +104,11 @@ def roads(scene: Scene, options: Options) -> dict[str, Scene]:
     """The scene's own road, and where a grade is asked for, the same road on it."""
     if options.grade is None:
         return {"road": scene}
-    table = scene.table()
-    if "grade" in table["effects"]["road"]:
+    road = scene.table()["effects"]["road"]
+    if "grade" in road:
         allowed = "this study puts the road on options.grade itself: drop this key"
-        raise InputError(scene.file, "effects.road.grade", table["effects"]["road"]["grade"], allowed)
-    table["effects"]["road"]["grade"] = options.grade
-    return {"road": scene, "grade": build(table, scene.file, Path(scene.folder))}
+        raise InputError(scene.file, "effects.road.grade", road["grade"], allowed)
+    return {"road": scene, "grade": changed(scene, effects={"road": {**road, "grade": options.grade}})}
 
 
 def compare(
