@@ -68,6 +68,12 @@ class Start:
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    @staticmethod
+    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "Start":
+        """Of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
+        level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
+        return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
+
 
 @dataclass(frozen=True)
 class Motion:

@@ -173,7 +173,7 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     rest = assemble(build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}}))
     p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE)
     count = round(duration / COARSE) + 1
-    write_wheel_forces(folder, *np.tile([[p.k1 * start[0]], [p.k2 * start[1]]], (1, count)), COARSE)
+    write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE)
     seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE)
     own = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}

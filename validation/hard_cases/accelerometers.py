@@ -10,7 +10,8 @@ from models.engines.protocol import build
 from models.sensors.rigid_body_motion import Start, angular_acceleration, motion, quality, spin
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
-from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.effects.accelerometers import readings_of
+from models.systems.pitch_plane.run import run as simulate
 from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.hard_cases.setups import driven, largest, rms, settings, vehicle
 
@@ -46,12 +47,10 @@ def _read(
         effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
     )
     assembly = base if initial is None else driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
-    model = build(engine, assembly, settings(engine, PERIOD, 0.3))
-    run = model.run()
-    channels = outputs(assembly, run, model)
-    felt = np.stack(
-        [np.column_stack([channels[f"a{axis}{i + 1}"][2] for axis in "xyz"]) for i in range(len(sensors))], axis=1
-    )
+    own = settings(engine, PERIOD, 0.3)
+    model = build(engine, assembly, own)
+    run = simulate(assembly.scene, engine, own, assembly)
+    felt = readings_of(run, assembly.scene.effects["accelerometers"])
     true = np.array([model.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
     return felt, run.states, true
 
@@ -137,8 +136,7 @@ def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.nda
     p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
     felt, states, _ = _read(engine, ROOFED, initial=start)
-    orientation = tuple(from_cardan(0.0, pitch, 0.0).tolist())
-    return felt, states, Start((0.0, rate, 0.0), orientation)
+    return felt, states, Start.pitched(pitch, rate)
 
 
 def tumbling(engine: str, folder: Path) -> float:

@@ -10,7 +10,6 @@ from models.core.result import Result
 from models.core.signals import Sampled
 from models.engines.assembly import Assembly, Mode
 from models.engines.protocol import build
-from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases.case import Case
@@ -43,12 +42,11 @@ def down(engine: str, folder: Path) -> float:
     for parameters in VEHICLES:
         base = vehicle(parameters)
         p = base.parameters
-        found = run(engine, base, 1e-3, 0.1)
-        channels = outputs(base, found)
+        found = simulate(base.scene, engine, settings(engine, 1e-3, 0.1), base)
         front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
         rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
         for name, load in (("f1", front), ("f2", rear)):
-            worst = max(worst, largest(channels[name][2] - load))
+            worst = max(worst, largest(found[name] - load))
     return worst
 
 

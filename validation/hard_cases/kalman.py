@@ -35,7 +35,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
     count = round(DURATION / PERIOD) + 1
     base = vehicle()
     forces = static_forces(base, count, PERIOD, held=False).values
-    write_wheel_forces(folder, *forces.T, PERIOD)
+    write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
     seen = base.initial[3] + ANGLE * normal(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     seen[lost] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)

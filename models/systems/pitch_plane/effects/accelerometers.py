@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from models.core.noise import ACCELEROMETERS, normal
+from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels, Model, Trajectory
 from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read
@@ -56,6 +57,11 @@ class Parameters(Strict):
 def names(p: Parameters) -> list[tuple[str, ...]]:
     """Channels of each sensor in the scene's order: ax1, ay1, az1, then those of the next one."""
     return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
+
+
+def readings_of(result: Result, p: Parameters) -> np.ndarray:
+    """Readings (n, sensors, 3) in m/s^2 of a run's result."""
+    return np.stack([np.column_stack([result[channel] for channel in channels]) for channels in names(p)], axis=1)
 
 
 @dataclass(frozen=True)
