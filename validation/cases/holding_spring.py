@@ -17,22 +17,20 @@ import numpy as np
 
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.engines.assembly import Assembly
-from models.engines.protocol import build
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import growth
-from models.systems.pitch_plane.virtual_measurement import write_measurement
+from models.systems.pitch_plane.virtual_measurement import perturbed
+from models.vehicles.parameters.itwm_drift import PARAMETERS
 from validation.common.rows import Data, Measured, Row, System, Table, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene
+from validation.common.scenes import drive, force_scene
 
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
 DURATION, STEP, HELD = 60.0, 1e-3, 0.2
 """Length and step of the runs (s), pitch error of a run that is held (rad)."""
-PAPER = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
-"""The perturbed model of Appendix B."""
 NOISE = 30.7
 """N, on each sample at 1 kHz."""
 HALVINGS = 7
@@ -77,11 +75,10 @@ def measure(quick: bool, folder: Path) -> Measured:
 
 
 def _measure(folder: Path) -> FreeRuns:
-    true = simulate(road_scene(step=STEP, duration=DURATION), "reference")
-    write_measurement(true, folder, STEP)
+    true = drive(folder, DURATION, STEP, STEP)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     quiet = assemble(force_scene(folder, step=STEP, duration=DURATION))
-    noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=PAPER, effects=noise))
+    noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=perturbed(PARAMETERS), effects=noise))
     law = holding_stiffness(quiet.parameters, growth(quiet).rate)
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
 
@@ -91,8 +88,7 @@ def _error(one: Setting, stiffness: float, measured: FreeRuns, engine: str = "re
     free = measured.runs[one.disturbed]
     damping = 2 * one.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    run = build(engine, held, settings_of(free.scene, engine)).run()
-    return float(np.abs(run.states[:, 3] - measured.pitch).max())
+    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - measured.pitch).max())
 
 
 def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:

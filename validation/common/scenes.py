@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Result
+from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
 STUDY_ROAD = {"source": "study", "speed": 20.0}
@@ -35,6 +37,20 @@ def road_scene(
     )
 
 
+def drive(
+    folder: Path,
+    duration: float,
+    period: float = 1e-3,
+    step: float = 1e-3,
+    parameters: str = "itwm_drift",
+    road: dict[str, Any] | None = None,
+) -> Result:
+    """The virtual measurement on a road, in the reference: its files, sampled every ``period`` (s), in the folder."""
+    measured = run(road_scene(parameters, step, duration, road), "reference")
+    write_measurement(measured, folder, period)
+    return measured
+
+
 def force_scene(
     folder: Path,
     parameters: str = "itwm_drift",
@@ -44,7 +60,7 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """The vehicle driven by the forces that ``write_measurement`` left in the folder."""
+    """The vehicle driven by the forces that ``drive`` left in the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {
