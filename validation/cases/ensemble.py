@@ -17,9 +17,8 @@ from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import Data, Figures, Measured, Row, System, Table, aim, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene
+from validation.common.scenes import drive, force_scene
 
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
@@ -44,8 +43,7 @@ def measure(quick: bool, folder: Path) -> Measured:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LONG
-        measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-        write_measurement(measured, forces, STEP)
+        measured = drive(forces, duration, STEP, STEP)
         truth = measured["pitch"]
         scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
@@ -124,9 +122,8 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     try:
         run_paths(job, 12, blocks, block=3, progress=stop)
     except KeyboardInterrupt:
-        return _same_row(
-            "resumed", "12 paths, interrupted half-way and resumed", found, run_paths(job, 12, blocks, block=3)
-        )
+        again = run_paths(job, 12, blocks, block=3)
+        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found, again)
     raise AssertionError("the interrupt was lost")
 
 
@@ -186,69 +183,51 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> Data:
 
 def _scale_rows(large: Data) -> list[Row]:
     what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
-    return [
-        within(
-            "ensemble.scale.path-steps",
-            SYSTEM,
-            f"{what}: steps of all paths",
-            float(large["path-steps"]),
-            "",
-            MANY * LONG / STEP,
-            0.0,
-            "a count",
-            "none",
+    share = f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores"
+    counted = (
+        ("path-steps", "steps of all paths", float(large["path-steps"]), "", MANY * LONG / STEP, "a count"),
+        ("failed", "paths that left all bounds", float(large["failed"]), "", 0.0, "a tumbling vehicle stays finite"),
+        (
+            "kept",
+            "bytes of results, by paths",
+            large["kept"],
+            "byte",
+            STATE * (LONG + 1.0) + MARKS,
+            "a count: a state of eight numbers every second, and when it drifts off or fails",
         ),
-        within(
-            "ensemble.scale.failed",
-            SYSTEM,
-            f"{what}: paths that left all bounds",
-            float(large["failed"]),
-            "",
-            0.0,
-            0.0,
-            "a tumbling vehicle stays finite",
-            "none",
-        ),
-        aim(
-            "ensemble.scale.seconds",
-            SYSTEM,
-            f"{what}: start of the processes to the last path, once, with "
-            f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores",
+    )
+    aimed = (
+        (
+            "seconds",
+            f"start of the processes to the last path, once, with {share}",
             large["seconds"],
             "s",
             SECONDS,
             "target on two free cores; what other programs take of them adds to it",
         ),
-        aim(
-            "ensemble.scale.processor",
-            SYSTEM,
-            f"{what}: processor time of all processes by two cores, once",
+        (
+            "processor",
+            "processor time of all processes by two cores, once",
             large["busy"] / 2,
             "s",
             SECONDS,
             "what it takes on two free cores, whoever else uses them now",
         ),
-        aim(
-            "ensemble.scale.memory",
-            SYSTEM,
-            f"{what}: largest memory of all processes together, once",
+        (
+            "memory",
+            "largest memory of all processes together, once",
             large["bytes"],
             "byte",
             MEMORY,
             "target; libraries included, of which a machine's own are a part",
         ),
-        within(
-            "ensemble.scale.kept",
-            SYSTEM,
-            f"{what}: bytes of results, by paths",
-            large["kept"],
-            "byte",
-            STATE * (LONG + 1.0) + MARKS,
-            0.0,
-            "a count: a state of eight numbers every second, and when it drifts off or fails",
-            "none",
-        ),
-    ]
+    )
+    steps, failed, kept = (
+        within(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit, expected, 0.0, why, "none")
+        for id, words, value, unit, expected, why in counted
+    )
+    aims = [aim(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", *rest) for id, words, *rest in aimed]
+    return [steps, failed, *aims, kept]
 
 
 def _engines(

@@ -62,8 +62,8 @@ def measure(quick: bool, folder: Path) -> Measured:
         return _spread_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
     roads = {name: _growth(folder, road) for name, road in ROADS.items()}
     roads["asymmetric twin"] = _growth(folder, ROADS[STUDY], parameters="asymmetric_twin")
-    rows = _spread_rows(spread) + _growth_rows(roads) + _twin_rows(folder)
-    return rows + _engine_rows(folder) + _step_rows(folder) + _linear_rows(folder), {"spread": spread, "roads": roads}
+    rows = [*_spread_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
+    return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
 
 
 def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
@@ -277,7 +277,7 @@ def _body_row(key: str, what: str, road: Data) -> Row:
     )
 
 
-def _twin_rows(folder: Path) -> list[Row]:
+def _twin_row(folder: Path) -> Row:
     """A vehicle whose ends differ: arms about the common centre of mass."""
     true = drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
@@ -285,19 +285,8 @@ def _twin_rows(folder: Path) -> list[Row]:
     q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
-    return [
-        within(
-            "growth.twin",
-            SYSTEM,
-            "asymmetric twin: covariance along the path at 5 s by the closed law",
-            float(found / expected),
-            "",
-            1.0,
-            0.05,
-            "as for the published vehicle",
-            "closed form",
-        )
-    ]
+    what, why = "asymmetric twin: covariance along the path at 5 s by the closed law", "as for the published vehicle"
+    return within("growth.twin", SYSTEM, what, float(found / expected), "", 1.0, 0.05, why, "closed form")
 
 
 def _engine_rows(folder: Path) -> list[Row]:
@@ -326,28 +315,18 @@ def _engine_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _step_rows(folder: Path) -> list[Row]:
+def _step_row(folder: Path) -> Row:
     """Half the step, the same noise: the difference by the spread."""
     runs = {
         step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
         for step in (5e-4, 2.5e-4)
     }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
-    return [
-        at_most(
-            "growth.step",
-            SYSTEM,
-            "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread",
-            gap,
-            "",
-            1e-4,
-            "noise belongs to the samples",
-            "closed form",
-        )
-    ]
+    what = "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread"
+    return at_most("growth.step", SYSTEM, what, gap, "", 1e-4, "noise belongs to the samples", "closed form")
 
 
-def _linear_rows(folder: Path) -> list[Row]:
+def _linear_row(folder: Path) -> Row:
     """Linearised, measurement and all, the perturbed vehicle must not drift."""
     linear = {"geometry": "linear"}
     true = simulate(changed(road_scene(duration=60.0), vehicle=linear), "reference")
@@ -356,18 +335,9 @@ def _linear_rows(folder: Path) -> list[Row]:
     wrong = force_scene(folder, duration=60.0, override=perturbed(PARAMETERS))
     run = simulate(changed(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
-    return [
-        at_most(
-            "growth.linear",
-            SYSTEM,
-            "largest pitch error of the perturbed model, linearised, in 60 s",
-            off,
-            "rad",
-            0.05,
-            "drift needs the cosine: with it this run drifts off after 12 s",
-            "none",
-        )
-    ]
+    what = "largest pitch error of the perturbed model, linearised, in 60 s"
+    why = "drift needs the cosine: with it this run drifts off after 12 s"
+    return at_most("growth.linear", SYSTEM, what, off, "rad", 0.05, why, "none")
 
 
 def tables(data: Data) -> list[Table]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.noise import GYRO, normal
 from models.core.time_series import write_time_series
-from models.drift.score import section_forces
+from models.drift.score import rms, section_forces
 from models.sensors.inertial_unit import (
     DEGREES_PER_HOUR,
     angle_variance,
@@ -24,18 +24,18 @@ from models.sensors.inertial_unit import (
     random_walk,
     true_attitude,
 )
-from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
+from models.sensors.rotations import exponential, integrate, logarithm, matrix
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
 from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import road_scene
+from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
 from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-SEED = 30
 LEVEL = 3.3
 """Standard errors within which a mean lies 999 times in 1,000."""
 UNEQUAL = np.array([0.1, 0.3, 0.6])
@@ -43,11 +43,8 @@ UNEQUAL = np.array([0.1, 0.3, 0.6])
 EQUAL = 0.5
 PERIOD, SPAN = 5e-3, 2.0
 """s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
-CHUNK = 500
-"""Paths that stand side by side in memory."""
 TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 """s, Hz, rad/s per sample: the paper's own example."""
-START = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def measure(quick: bool, folder: Path) -> Measured:
@@ -57,12 +54,6 @@ def measure(quick: bool, folder: Path) -> Measured:
     example, data = _ten_minutes(0 if quick else 60)
     recorded, seen = _recording(paths)
     return [*rows, *example, *recorded, *([] if quick else _section_forces())], {"ten minutes": data, "recording": seen}
-
-
-def turning(count: int, period: float) -> np.ndarray:
-    """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
-    t = period * np.arange(count)
-    return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
 
 
 def _clean() -> list[Row]:
@@ -75,14 +66,14 @@ def _clean() -> list[Row]:
         _small(
             "clean.axis",
             "constant rate, 10 s at 1 kHz: largest error of the attitude",
-            _apart(held[-1], exponential(10 * rate)),
+            apart(held[-1], exponential(10 * rate)),
             "rad",
             "each step is the exact exponential",
         ),
         _small(
             "clean.cone",
             "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error",
-            _apart(coned, true),
+            apart(coned, true),
             "rad",
             "fourth order in the sampling period, without noise",
         ),
@@ -99,31 +90,6 @@ def _clean() -> list[Row]:
 def _small(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
     """Row for an error beside a closed form."""
     return at_most(f"inertial_unit.{id}", SYSTEM, quantity, value, unit, bound, why, "closed form")
-
-
-def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
-    spin, half = 2.0, 0.3
-    about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
-    tilt = exponential(np.array([half, 0.0, 0.0]))
-    rates = spin * np.column_stack(
-        [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
-    )
-    return rates, product(product(about, tilt), conjugate(about))
-
-
-def _apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(logarithm(product(conjugate(one), other))).max())
-
-
-def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
-    """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
-    true = true_attitude(rates, period, START)[-1]
-    chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
-    return np.concatenate(
-        [error_rotation(measured_attitude(rates, period, deviation, START, chunk, SEED)[-1], true) for chunk in chunks]
-    )
 
 
 def _one_axis(paths: int) -> list[Row]:
@@ -207,7 +173,7 @@ def _three_axes(paths: int) -> list[Row]:
         _small(
             "matrix",
             "mean rotation matrix, unequal noise, turning body: worst entry by its standard error",
-            _standard_errors(found, exact),
+            standard_errors(found, exact),
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
@@ -217,20 +183,13 @@ def _three_axes(paths: int) -> list[Row]:
             "inertial_unit.matrix.resting",
             SYSTEM,
             "the same against the law of a body at rest",
-            _standard_errors(found, resting),
+            standard_errors(found, resting),
             "",
             f"far beyond {LEVEL}",
             "the rows above can tell the laws apart",
             "closed form",
         ),
     ]
-
-
-def _standard_errors(found: np.ndarray, law: np.ndarray) -> float:
-    """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
-    samples = matrix(found)
-    error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
-    return float((np.abs(samples.mean(axis=0) - law) / error).max())
 
 
 def _norms(paths: int) -> list[Row]:
@@ -378,32 +337,27 @@ def _section_forces() -> list[Row]:
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
         place = Path(name)
-        measured = measure_road(scene)
+        measured, follow = measure_road(scene), follower(scene, place)
         write_measurement(measured, place, scene.run.step)
-        true = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
+        true = simulate(follow({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
         part = measured.times / scene.run.duration
         wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)
         write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
-        guided = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
-    found = section_forces(guided["f3"], guided["f4"], guided["pitch"])
-    turned = section_forces(true["f3"], true["f4"], guided["pitch"])
-    before = section_forces(true["f3"], true["f4"], true["pitch"])
+        guided = simulate(follow({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
+    pairs = ((guided, guided), (true, guided), (true, true))
+    found, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
     return [
         _small(
             f"section.{name}",
             f"{name} of a run guided by a pitch that goes wrong by {size} rad in 10 s, against "
             "the true force turned by that angle, by the change",
-            _rms(found[name] - turned[name]) / _rms(turned[name] - before[name]),
+            rms(found[name] - turned[name]) / rms(turned[name] - before[name]),
             "",
             "f3 and f4 are those of the true run: a slow angle error leaves no inertia force",
             0.01,
         )
         for name in ("f3x", "f4x")
     ]
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _recording(paths: int) -> Measured:
@@ -436,7 +390,7 @@ def _recording(paths: int) -> Measured:
         _small(
             "recording.law",
             "mean rotation matrix of noise on its motion: worst entry by its standard error",
-            _standard_errors(found, law),
+            standard_errors(found, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
             LEVEL,
@@ -456,7 +410,7 @@ def tables(data: Data) -> list[Table]:
 
 def draw(data: Data) -> Figures:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import heading, plt
 
     found = []
     if data["ten minutes"]:
@@ -469,14 +423,12 @@ def draw(data: Data) -> Figures:
                 axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
             axis.set(title=f"about the global {'xyz'[i]} axis [deg]", xlabel="time [s]")
         axes[0].legend(loc="upper left")
-        figure.suptitle(
-            "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz", x=0.01, ha="left", fontweight="bold"
-        )
+        heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
         found.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
     if data["recording"]:
         figure, axis = plt.subplots(figsize=(6, 3.2))
         axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
         axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
-        figure.suptitle("A minute in a real car: attitude from the gyro alone", x=0.01, ha="left", fontweight="bold")
+        heading(figure, "A minute in a real car: attitude from the gyro alone")
         found.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
     return found

@@ -70,37 +70,14 @@ def _exact(name: str) -> list[Row]:
     squares = (rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
     what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
+    shown = (
+        ("alpha", "angular acceleration from clean readings", alpha, "rad/s^2"),
+        ("rates", "rates up to sign from the symmetric part, squares", float(np.abs(squares).max()), "rad^2/s^2"),
+        ("consistency", "share of the readings that no rigid body explains", quality(array, clean).share, ""),
+    )
     return [
-        at_most(
-            f"{key}.alpha",
-            SYSTEM,
-            f"angular acceleration from clean readings, {what}",
-            alpha,
-            "rad/s^2",
-            BOUND,
-            why,
-            "closed form",
-        ),
-        at_most(
-            f"{key}.rates",
-            SYSTEM,
-            f"rates up to sign from the symmetric part, squares, {what}",
-            float(np.abs(squares).max()),
-            "rad^2/s^2",
-            BOUND,
-            why,
-            "closed form",
-        ),
-        at_most(
-            f"{key}.consistency",
-            SYSTEM,
-            f"share of the readings that no rigid body explains, {what}",
-            quality(array, clean).share,
-            "",
-            BOUND,
-            why,
-            "closed form",
-        ),
+        at_most(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit, BOUND, why, "closed form")
+        for id, words, value, unit in shown
     ]
 
 
@@ -149,16 +126,9 @@ def _tilt() -> Row:
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     found = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
-    return at_most(
-        "motion.tilt",
-        SYSTEM,
-        f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2",
-        float(np.abs(found - law).max() / law[-1]),
-        "",
-        1e-10,
-        "a constant is integrated exactly",
-        "closed form",
-    )
+    what = f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2"
+    worst = float(np.abs(found - law).max() / law[-1])
+    return at_most("motion.tilt", SYSTEM, what, worst, "", 1e-10, "a constant is integrated exactly", "closed form")
 
 
 def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
@@ -360,18 +330,8 @@ def _held(curves: Data, quick: bool) -> list[Row]:
     ]
     if quick:  # too short to tell growth from settling
         return rows
-    grown = within(
-        "motion.held.growth",
-        SYSTEM,
-        "rms of the last third by that of the second sixth",
-        late / early,
-        "",
-        1.0,
-        0.2,
-        f"{why}; integration alone would grow by 1.8",
-        "closed form",
-    )
-    return [*rows, grown]
+    what, why = "rms of the last third by that of the second sixth", f"{why}; integration alone would grow by 1.8"
+    return [*rows, within("motion.held.growth", SYSTEM, what, late / early, "", 1.0, 0.2, why, "closed form")]
 
 
 def tables(data: Data) -> list[Table]:

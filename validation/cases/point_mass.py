@@ -186,7 +186,7 @@ def tables(data: Data) -> list[Table]:
 
 def draw(data: Data) -> Figures:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import heading, plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
@@ -204,9 +204,6 @@ def draw(data: Data) -> Figures:
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
     axes[1].set(title="Euler scheme against the limit, relative", xlabel="steps n")
     axes[1].legend()
-    figure.suptitle(
-        "A point mass under white force noise: 32 N at 1 kHz on 780 kg", x=0.01, ha="left", fontweight="bold"
-    )
-    return [
-        ("Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n).", figure)
-    ]
+    heading(figure, "A point mass under white force noise: 32 N at 1 kHz on 780 kg")
+    caption = "Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n)."
+    return [(caption, figure)]
