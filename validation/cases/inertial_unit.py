@@ -62,28 +62,14 @@ def _clean() -> list[Row]:
     held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
     rates, true = cone(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
+    off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
+    fixed, turned = "constant rate, 10 s at 1 kHz: largest error of the attitude", exponential(10 * rate)
+    swept = "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error"
+    order = "fourth order in the sampling period, without noise"
     return [
-        _small(
-            "clean.axis",
-            "constant rate, 10 s at 1 kHz: largest error of the attitude",
-            apart(held[-1], exponential(10 * rate)),
-            "rad",
-            "each step is the exact exponential",
-        ),
-        _small(
-            "clean.cone",
-            "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error",
-            apart(coned, true),
-            "rad",
-            "fourth order in the sampling period, without noise",
-        ),
-        _small(
-            "clean.norm",
-            "largest departure of the quaternion's norm from 1",
-            float(np.abs(np.linalg.norm(coned, axis=1) - 1).max()),
-            "",
-            "normalised in each step",
-        ),
+        _small("clean.axis", fixed, apart(held[-1], turned), "rad", "each step is the exact exponential"),
+        _small("clean.cone", swept, apart(coned, true), "rad", order),
+        _small("clean.norm", "largest departure of the quaternion's norm from 1", off, "", "normalised in each step"),
     ]
 
 
@@ -192,6 +178,9 @@ def _three_axes(paths: int) -> list[Row]:
     ]
 
 
+STRATONOVICH = "exp(-k s^2 t / 8), as after Stratonovich"
+
+
 def _norms(paths: int) -> list[Row]:
     """Ito: the quaternion that is never normalised grows by the law, and its mean is the true one."""
     rows, steps, span = [], 100, 4.0
@@ -202,28 +191,14 @@ def _norms(paths: int) -> list[Row]:
         q = euler_quaternions(EQUAL * period**0.5 * noise, START)
         square = np.sum(q**2, axis=1)
         law = euler_mean_square(EQUAL, axes, period, steps)
+        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
+        means = (
+            ("norm", f"E[|q|^2] of explicit Euler, {noisy}, not normalised", square, law, "(1 + k s^2 D / 4)^n"),
+            ("mean", f"E[q1] of the same, {noisy}", true, 1.0, "after Ito the mean is the true quaternion"),
+            ("direction", f"E[q1] once it is normalised, {noisy}", true / square**0.5, scalar, STRATONOVICH),
+        )
         rows += [
-            _mean(
-                f"norm.{axes}",
-                f"E[|q|^2] of explicit Euler, {axes} noisy axes, not normalised",
-                square,
-                law,
-                "(1 + k s^2 D / 4)^n",
-            ),
-            _mean(
-                f"mean.{axes}",
-                f"E[q1] of the same, {axes} noisy axes",
-                q[:, 0],
-                1.0,
-                "after Ito the mean is the true quaternion",
-            ),
-            _mean(
-                f"direction.{axes}",
-                f"E[q1] once it is normalised, {axes} noisy axes",
-                q[:, 0] / square**0.5,
-                mean_scalar(np.full(axes, EQUAL), span),
-                "exp(-k s^2 t / 8), as after Stratonovich",
-            ),
+            *(_mean(f"{id}.{axes}", *figures) for id, *figures in means),
             within(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
@@ -256,27 +231,12 @@ def _ten_minutes(paths: int) -> Measured:
             why,
             "published",
         ),
-        within(
-            "inertial_unit.ten_minutes.axis",
-            SYSTEM,
-            "its rms angle per axis at 600 s",
-            axis,
-            "deg",
-            4.44,
-            5e-3,
-            "s sqrt(t)",
-            "closed form",
-        ),
-        within(
-            "inertial_unit.ten_minutes.total",
-            SYSTEM,
-            "its rms angle in all at 600 s",
-            axis * 3**0.5,
-            "deg",
-            7.69,
-            5e-3,
-            "s sqrt(3 t)",
-            "closed form",
+        *(
+            within(f"inertial_unit.ten_minutes.{id}", SYSTEM, what, angle, "deg", law, 5e-3, why, "closed form")
+            for id, what, angle, law, why in (
+                ("axis", "its rms angle per axis at 600 s", axis, 4.44, "s sqrt(t)"),
+                ("total", "its rms angle in all at 600 s", axis * 3**0.5, 7.69, "s sqrt(3 t)"),
+            )
         ),
     ]
     if not paths:
