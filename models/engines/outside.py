@@ -23,7 +23,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -136,22 +135,12 @@ class Integrated(Reference):
         """States (n, 8) at the times, and how often the right-hand side was asked for."""
         states, calls = np.empty((len(times), 8)), [0]
         y = states[0] = self.assembly.initial
-        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
-        small = 1e-9 * self.settings.step
-        for start, end in pairwise((0.0, *knots, times[-1])):
-            inside = slice(*np.searchsorted(times, (start + small, end + small)))
+        for start, end, inside in self._stretches(times, times[-1]):
             within = times[inside]
-            last = [] if len(within) and within[-1] > end - small else [end]
+            last = [] if len(within) and within[-1] > end - 1e-9 * self.settings.step else [end]
             grid = np.array([start, *within, *last])
-            answer = _asked(
-                self.name,
-                "integrate",
-                self.integrate,
-                self._rhs(start, end, calls),
-                grid,
-                y.copy(),
-                self.settings.tolerance,
-            )
+            asked = (self._rhs(start, end, calls), grid, y.copy(), self.settings.tolerance)
+            answer = _asked(self.name, "integrate", self.integrate, *asked)
             found = _numbers(self.name, "integrate", answer, (len(grid), 8))
             states[inside], y = found[1 : 1 + len(within)], found[-1]
             if not np.isfinite(y).all():

@@ -48,10 +48,11 @@ def check(engine: str, assembly: Assembly, settings: Settings) -> None:
         raise Refused(engine, MISSING[engine, settings.integrator])
     _whole(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
+        right = (name for name, known in CATALOGUE[engine].items() if known.constraints)
         raise Refused(
             engine,
             f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
-            f"be wrong without a word; use {_constrained(engine)}",
+            f"be wrong without a word; use {' or '.join(right)}",
         )
     if assembly.guided and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
         raise Refused(
@@ -63,10 +64,6 @@ def check(engine: str, assembly: Assembly, settings: Settings) -> None:
         if signal is not None:
             _reading(engine, integrator, settings, signal)
     check_step(engine, assembly, settings)
-
-
-def _constrained(engine: str) -> str:
-    return " or ".join(name for name, integrator in CATALOGUE[engine].items() if integrator.constraints)
 
 
 def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Signal) -> None:
@@ -150,14 +147,9 @@ def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforce
     sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
     first = np.flatnonzero(~(sane & forward & np.isfinite(times)))[0]
-    reason, last = _reason(bool(finite[first]), bool(sane[first])), first - 1
+    grown = "time ran backwards" if sane[first] else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
+    reason, last = grown if finite[first] else "the state became infinite or not a number", first - 1
     raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
-
-
-def _reason(finite: bool, sane: bool) -> str:
-    if not finite:
-        return "the state became infinite or not a number"
-    return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
 
 
 def landings_followed(

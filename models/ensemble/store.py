@@ -55,13 +55,11 @@ class Store:
         kept = _read_note(file)
         for key in (*own, *kept):
             if own.get(key) != kept.get(key):
-                raise InputError(
-                    file,
-                    key,
-                    kept.get(key),
-                    f"this folder belongs to another job: {own.get(key)!r} is "
-                    "asked for here; resume with what it was begun with, or begin in a new folder",
+                allowed = (
+                    f"this folder belongs to another job: {own.get(key)!r} is asked for here; resume with what it was "
+                    "begun with, or begin in a new folder"
                 )
+                raise InputError(file, key, kept.get(key), allowed)
 
     def path(self, block: int) -> Path:
         """File of a block."""

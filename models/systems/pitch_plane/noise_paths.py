@@ -194,9 +194,8 @@ class MujocoThreads(NoisePaths):
         from models.engines.mujoco_quiet import quiet
 
         start = np.concatenate(([0.0], self.base.initial))
-        controls = None
-        if models[0].drive.controls is not None:
-            controls = np.concatenate([model.padded(model.drive.controls) for model in models])
+        held = models[0].drive.controls is not None
+        controls = np.concatenate([model.padded(model.drive.controls) for model in models]) if held else None
         working = models[: self.threads]
         with models[0].callback(), quiet():
             found, _ = rollout.rollout(
