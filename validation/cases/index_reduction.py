@@ -12,13 +12,11 @@ from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
-from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene, assemble
-from models.systems.pitch_plane.virtual_measurement import write_measurement
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
 from validation.common.rows import Data, Figures, Measured, Row, System, at_most, behaves, finding, not_run
-from validation.common.scenes import force_scene, road_scene
+from validation.common.scenes import drive, force_scene
 from validation.hard_cases.prescribed_pitch import AsItComes
 
 TITLE = "Drift by index reduction, and drift by noise"
@@ -79,7 +77,7 @@ def measure(quick: bool, folder: Path) -> Measured:
     with TemporaryDirectory() as name:
         files = _drive(Path(name), 0.2 if quick else 4.0)
         gaps, laws = _gaps(files), _laws(files)
-        walked = _walked(files)
+        walked = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files)  # from a start on the constraint
         loose = _loose(_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
         *_gap_rows(gaps, laws, files.duration),
@@ -97,15 +95,15 @@ def measure(quick: bool, folder: Path) -> Measured:
 
 def _drive(folder: Path, duration: float) -> Files:
     """Measure on the study road, write forces, pitch, and the pitch that a gyro's integrated rate gives."""
-    measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-    write_measurement(measured, folder, STEP)
+    measured = drive(folder, duration, STEP, STEP)
     walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
     return Files(folder, duration, measured["pitch"])
 
 
-def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
-    """Pitch (n,) by formulation, each from the assembly's initial state."""
+def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
+    """Pitch minus true pitch (n,) by formulation, each from the assembly's initial state."""
+    duration = files.duration
     found = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
     for name, integrator in EXUDYN.items():
         found[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
@@ -113,7 +111,7 @@ def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] for name, states in found.items()}
+    return {name: states[:, 3] - files.pitch for name, states in found.items()}
 
 
 def _gaps(files: Files) -> dict[str, np.ndarray]:
@@ -121,14 +119,7 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
     guided = files.guided()
     start = guided.initial.copy()
     start[[3, 7]] += OFF, RATE_OFF
-    paths = _paths(replace(guided, initial=start), files.duration)
-    return {name: path - files.pitch for name, path in paths.items()}
-
-
-def _walked(files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus true pitch (n,) by formulation, guided by the gyro's pitch from a start on the constraint."""
-    paths = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files.duration)
-    return {name: path - files.pitch for name, path in paths.items()}
+    return _paths(replace(guided, initial=start), files)
 
 
 def _loose(files: Files) -> dict[str, np.ndarray]:
@@ -304,13 +295,11 @@ def draw(data: Data) -> Figures:
     right.legend(fontsize="small")
     for axis in (left, right):
         axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
-    return [
-        (
-            "Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
-            "no formulation and no solver sees it.",
-            figure,
-        )
-    ]
+    caption = (
+        "Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and no "
+        "formulation and no solver sees it."
+    )
+    return [(caption, figure)]
 
 
 DIRECTION = np.array([[0.0, 0.0, 0.0, 1.0]])

@@ -95,32 +95,12 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
         f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
         f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
     }
-    rows = [
-        at_most(
-            "kalman.alarms",
-            SYSTEM,
-            "right filters called inconsistent",
-            alarms,
-            "",
-            1,
-            f"of {count} runs; stated level {ALARMS:g} of all runs",
-            "closed form",
-        )
-    ]
+    stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
+    rows = [at_most("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "", 1, stated, "closed form")]
     for words, plant in planted.items():
         silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
-        rows.append(
-            at_most(
-                f"kalman.named.{words.split()[0]}",
-                SYSTEM,
-                f"filters whose innovations are {words}, not named",
-                silent,
-                "",
-                0,
-                f"of {count} runs",
-                "closed form",
-            )
-        )
+        id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words}, not named"
+        rows.append(at_most(id, SYSTEM, what, silent, "", 0, f"of {count} runs", "closed form"))
     return rows
 
 
@@ -192,20 +172,10 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
 
 
 def _short_rows(folder: Path) -> list[Row]:
-    found = stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]
+    error = stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
+    what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
-    return [
-        at_most(
-            "kalman.short",
-            SYSTEM,
-            "largest pitch error of a stabilised run of 3 s, wrong model and noise",
-            found["pitch"],
-            "rad",
-            5e-3,
-            why,
-            "none",
-        )
-    ]
+    return [at_most("kalman.short", SYSTEM, what, error, "rad", 5e-3, why, "none")]
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
@@ -295,6 +265,10 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     return rows
 
 
+LACKS = "the model lacks 5 % of the inertia"
+ESTIMATED = "share by which 1/I is estimated above the model's, mean"
+
+
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
     """Moments by the inertia term: with a right model, and the part of a wrong one that is no inertia."""
     own = [one["reference"] for one in damage]
@@ -316,36 +290,15 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
                     "none",
                 )
             )
-    total = float(np.mean([one["all, band"] for one in own]))
-    rows.append(
-        within(
-            "kalman.moment.wrong",
-            SYSTEM,
-            "all artificial moments, wrong model, up to 15 Hz",
-            total,
-            "",
-            0.05,
-            0.005,
-            "the model lacks 5 % of the inertia",
-            "closed form",
-        )
+    total, inertia = (np.array([one[key] for one in own]) for key in ("all, band", "inertia"))
+    shown = (
+        ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, LACKS),
+        ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
     )
-    inertia = [one["inertia"] for one in own]
-    why = f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"
-    rows.append(
-        within(
-            "kalman.inertia",
-            SYSTEM,
-            "share by which 1/I is estimated above the model's, mean",
-            float(np.mean(inertia)),
-            "",
-            -0.05,
-            3e-3,
-            why,
-            "closed form",
-        )
-    )
-    return rows
+    return rows + [
+        within(f"kalman.{id}", SYSTEM, what, float(np.mean(values)), "", wanted, band, why, "closed form")
+        for id, what, values, wanted, band, why in shown
+    ]
 
 
 def tables(data: Data) -> list[Table]:

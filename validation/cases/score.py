@@ -6,17 +6,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from models.core.noise import normal
-from models.core.result import Result
 from models.core.strict import read
 from models.core.systems import load
 from models.drift.score import CHANNELS, errors
 from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import build
-from models.systems.pitch_plane.stabilised import Bench, Options, compare
-from models.systems.pitch_plane.virtual_measurement import write_measurement
+from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
 from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene
+from validation.common.scenes import drive, force_scene
 from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
@@ -84,23 +81,20 @@ def _conventions() -> list[Row]:
             "rainflow reads turning points only; the sum is in another order",
             "native",
         ),
-        finding(
-            "score.damage.convention.walk",
-            SYSTEM,
-            "damage of a random walk with its residue closed, difference",
-            repeated["walk"],
-            "",
-            "0.34 between two libraries",
-            why,
-        ),
-        finding(
-            "score.damage.convention.white",
-            SYSTEM,
-            "the same for white noise",
-            repeated["white"],
-            "",
-            "0.001 between two libraries",
-            why,
+        *(
+            finding(
+                f"score.damage.convention.{name}",
+                SYSTEM,
+                what,
+                repeated[name],
+                "",
+                f"{told} between two libraries",
+                why,
+            )
+            for name, what, told in (
+                ("walk", "damage of a random walk with its residue closed, difference", 0.34),
+                ("white", "the same for white noise", 0.001),
+            )
         ),
     ]
 
@@ -114,7 +108,7 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     """The same run at rest and sinking as a whole: its heave runs away, and no section force knows."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        write_measurement(simulate(road_scene(duration=duration), "reference"), folder, 1e-3)
+        drive(folder, duration)
         found = {engine: _sinking(engine, folder, duration) for engine in engines}
     rows = []
     for engine, (drift, worst) in found.items():
@@ -158,14 +152,12 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """On a grade of 0.1 rad a spring is wrong and a prescribed pitch is right, in each implementation."""
     scene = load(SCENE, SHORT)
     options = read(Options, scene.options, "", "options")
-    table = scene.table()
-    table["effects"]["road"]["grade"] = options.grade
     (folder / "short").mkdir()
-    bench = Bench(build(table), "grade", options, folder / "short")
+    bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
     rows = []
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
-            row = bench.row(name, bench.methods[name], bench.simulate(engine, bench.methods[name]))
+            row = _scored(bench, name, engine)
             rows.append(
                 behaves(
                     f"score.grade.{name.split()[0]}.{engine}",
@@ -197,49 +189,29 @@ def _verdicts(found: list[Data]) -> list[Row]:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         place = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
-            wanted = "accepted" if name in GOOD else "rejected"
-            rows.append(
-                behaves(
-                    f"score.verdict.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, by damage",
-                    word,
-                    wanted,
-                    row["reason"],
-                    "closed form",
-                )
-            )
+            id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
+            rows.append(behaves(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD:
-            found_alone = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(
-                behaves(
-                    f"score.without-truth.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, without the truth",
-                    found_alone,
-                    "not accepted",
-                    row["reason without truth"],
-                    "none",
-                )
+            id, what, why = (
+                f"score.without-truth.{_id(row)}",
+                f"{place}, without the truth",
+                row["reason without truth"],
             )
+            told = "accepted" if alone == "accepted" else "not accepted"
+            rows.append(behaves(id, SYSTEM, what, told, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            rows.append(
-                finding(
-                    f"score.unseen.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, damage ratio of f3x where the run itself shows nothing",
-                    row["damage f3x"],
-                    "",
-                    word,
-                    "what an engineer without the truth cannot know",
-                    "none",
-                )
-            )
+            id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
+            why = "what an engineer without the truth cannot know"
+            rows.append(finding(id, SYSTEM, what, row["damage f3x"], "", word, why, "none"))
     return rows
 
 
+def _slug(name: str) -> str:
+    return name.replace(" ", "-").replace("/", "-")
+
+
 def _id(row: Data) -> str:
-    return ".".join((row["method"].replace(" ", "-").replace("/", "-"), row["road"], row["engine"]))
+    return ".".join((_slug(row["method"]), row["road"], row["engine"]))
 
 
 def _blind(found: list[Data]) -> list[Row]:
@@ -271,10 +243,9 @@ def _long(folder: Path) -> list[Data]:
     return [_scored(bench, name) for name in PROTOTYPE]
 
 
-def _scored(bench: Bench, name: str) -> Data:
+def _scored(bench: Bench, name: str, engine: str = "reference") -> Data:
     effects = bench.methods[name]
-    found: Result = bench.simulate("reference", effects)
-    return bench.row(name, effects, found)
+    return bench.row(name, effects, bench.simulate(engine, effects))
 
 
 def _beside(long: list[Data]) -> list[Row]:
@@ -282,7 +253,7 @@ def _beside(long: list[Data]) -> list[Row]:
     rows = []
     for row in long:
         pitch, upright, along = PROTOTYPE[row["method"]]
-        name = row["method"].replace(" ", "-").replace("/", "-")
+        name = _slug(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
         shown = (
             ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),

@@ -37,7 +37,8 @@ def _record(fault: Fault, benches: list[Bench]) -> Data:
         }
         for bench in benches
     }
-    return {"fault": fault.name, "place": _place(fault), "engines": fault.engines, "ratios": ratios}
+    place = next((name for name, group in PLACES.items() if fault in group), "nowhere")
+    return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
 
 
 def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
@@ -46,9 +47,7 @@ def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def _place(fault: Fault) -> str:
-    places = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
-    return next((name for name, group in places.items() if fault in group), "nowhere")
+PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
 
 
 def seen(record: Data, check: str, vehicle: str = TWIN) -> bool:
@@ -82,6 +81,7 @@ def rows(data: Data) -> list[Row]:
         for ratio in ratios.values()
     )
     single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
+    told = [f"{record['fault']} ({next(name for name in CHECKS if seen(record, name))})" for record in single]
     return [
         within(
             "planted.caught",
@@ -113,7 +113,7 @@ def rows(data: Data) -> list[Row]:
             len(single),
             "faults",
             "few",
-            "what would pass if that check were dropped: " + _listed(single),
+            "what would pass if that check were dropped: " + (", ".join(told) or "none"),
             "native",
         ),
     ]
@@ -152,12 +152,6 @@ def lines(data: Data) -> list[tuple[str, ...]]:
         )
         for record in data["faults"]
     ]
-
-
-def _listed(records: list[Data]) -> str:
-    """Faults with the one check that sees each."""
-    sees = [(record["fault"], next(name for name in CHECKS if seen(record, name))) for record in records]
-    return ", ".join(f"{fault} ({name})" for fault, name in sees) or "none"
 
 
 def tables(data: Data) -> list[Table]:

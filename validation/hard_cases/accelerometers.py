@@ -12,8 +12,8 @@ from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
 from models.systems.pitch_plane.effects.accelerometers import readings_of
 from models.systems.pitch_plane.run import run as simulate
-from validation.hard_cases.case import IMPLEMENTATIONS, Case
-from validation.hard_cases.setups import driven, largest, rms, settings, vehicle
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, driven, largest, rms, settings, vehicle
 
 PERIOD, NOISE = 1e-3, 0.1
 FLOOR = {
@@ -23,10 +23,9 @@ FLOOR = {
     "rr": (-0.9, 0.6, 0.2),
     "mid": (0.1, 0.0, 0.2),
 }
-RAISED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
+LIFTED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
 ROOFED = FLOOR | {"mid": (0.1, 0.0, -0.8)}
 BRACKET = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
-REFUSED: dict[str, Any] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 
 def _read(
@@ -84,8 +83,8 @@ def plane_naive(folder: Path) -> str:
 
 def nearly_plane(engine: str, folder: Path) -> float:
     """The fifth sensor 3 cm above the others, and noise: of what the noise of the readings must leave."""
-    felt, states, true = _read(engine, RAISED, noise=NOISE)
-    array = sensor_array(RAISED)
+    felt, states, true = _read(engine, LIFTED, noise=NOISE)
+    array = sensor_array(LIFTED)
     found = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
     least = array.gains(planar=True)[1]
     return rms(found - true) / (NOISE * least)
@@ -93,8 +92,8 @@ def nearly_plane(engine: str, folder: Path) -> float:
 
 def nearly_plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
-    felt, _, true = _read("reference", RAISED, noise=NOISE)
-    error = rms(_plain(RAISED, felt) - true)
+    felt, _, true = _read("reference", LIFTED, noise=NOISE)
+    error = rms(_plain(LIFTED, felt) - true)
     return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
 
 

@@ -15,8 +15,8 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
-from validation.hard_cases.setups import largest
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, largest
 
 DURATION = 8.0
 TILT = 0.1
@@ -191,8 +191,6 @@ def before_drift_naive(folder: Path) -> str:
     before = gap[: _off(coarse, truth)].max()
     return f"two step sizes of the reference differ by {before:.0e} rad before, {gap.max():.0e} after"
 
-
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 CASES = (
     Case(

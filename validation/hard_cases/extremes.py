@@ -7,8 +7,8 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case, Word
-from validation.hard_cases.setups import exact, largest, run, unchecked, vehicle
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, exact, largest, run, unchecked, vehicle
 
 IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
 """Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
@@ -29,17 +29,24 @@ def _settled(engine: str, base: Assembly, integrator: str = "") -> float:
 
 def undamped(engine: str, folder: Path) -> float:
     """No damper at all, 1 s, against the matrix exponential."""
+    return _ringing(engine)
+
+
+def _ringing(engine: str, integrator: str = "") -> float:
+    base, truth = _undamped()
+    return largest(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest(truth - base.initial)
+
+
+def _undamped() -> tuple[Assembly, np.ndarray]:
+    """The vehicle without dampers, off its equilibrium, and its states over 1 s."""
     base = _off(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    found = run(engine, base, 1e-3, 1.0).states
-    truth = exact(base, 1e-3, 1000)
-    return largest(found - truth) / largest(truth - base.initial)
+    return base, exact(base, 1e-3, 1000)
 
 
 def undamped_naive(folder: Path) -> str:
     """Explicit Euler past the check: every mode grows."""
-    base = _off(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    base, truth = _undamped()
     found = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
-    truth = exact(base, 1e-3, 1000)
     return (
         f"Exudyn's explicit Euler past the check: {largest(found - base.initial):.2g} where the truth "
         f"stays below {largest(truth - base.initial):.2g}, finite and unwarned"
@@ -48,10 +55,7 @@ def undamped_naive(folder: Path) -> str:
 
 def undamped_euler(engine: str, folder: Path) -> float:
     """The same with a first-order explicit method."""
-    base = _off(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    name = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine]
-    found, truth = run(engine, base, 1e-3, 1.0, name).states, exact(base, 1e-3, 1000)
-    return largest(found - truth) / largest(truth - base.initial)
+    return _ringing(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
 def light_wheel(engine: str, folder: Path) -> float:
@@ -81,7 +85,6 @@ def stiff_tyre_naive(folder: Path) -> str:
     return f"MuJoCo past the check: {largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
 
 
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
 AT_REST = "the vehicle is back in its equilibrium after 3 s"
 GONE = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
 

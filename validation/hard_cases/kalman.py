@@ -18,7 +18,7 @@ from models.systems.pitch_plane.scene import build
 from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
 from validation.drift.kalman_runs import relative
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import driven, largest, static_forces, vehicle
+from validation.hard_cases.setups import REFUSED, driven, largest, static_forces, vehicle
 
 PERIOD, DURATION = 5e-3, 6.0
 FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
@@ -172,7 +172,7 @@ CASES = (
         0.0,
         "there is nothing to follow",
         nothing,
-        dict.fromkeys(("reference", "exudyn", "mujoco"), "refused"),
+        REFUSED,
     ),
     Case(
         "process noise of a stiff vehicle",

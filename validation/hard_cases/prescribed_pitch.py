@@ -170,16 +170,17 @@ def undamped_multiplier_naive(folder: Path) -> str:
 
 def noisy(engine: str, folder: Path) -> float:
     """What noise of 1e-6 rad on the samples adds to the moment, in units of its finite-difference value."""
-    found = run(engine, scene(noise=NOISE), 1e-3, DURATION, CONSTRAINED[engine])
-    inertia = vehicle().parameters.I
-    return moment_error(found, truth()) / (inertia * NOISE * np.sqrt(6) / PERIOD**2)
+    return _noisy(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
     """The same at 0.125 ms."""
-    found = run(engine, scene(noise=NOISE), 1.25e-4, DURATION, CONSTRAINED[engine])
-    inertia = vehicle().parameters.I
-    return moment_error(found, truth()) / (inertia * NOISE * np.sqrt(6) / PERIOD**2)
+    return _noisy(engine, 1.25e-4)
+
+
+def _noisy(engine: str, step: float) -> float:
+    found = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED[engine])
+    return moment_error(found, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
 
 
 def noisy_naive(folder: Path) -> str:

@@ -19,8 +19,18 @@ from models.road.signal import RoadUnderWheels
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case, Word
-from validation.hard_cases.setups import exact, largest, run, settings, static_forces, unchecked, vehicle
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import (
+    RAISED,
+    REFUSED,
+    exact,
+    largest,
+    run,
+    settings,
+    static_forces,
+    unchecked,
+    vehicle,
+)
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
@@ -196,10 +206,6 @@ def uneven(engine: str, folder: Path) -> float:
     base = vehicle()
     forces = static_forces(base, 211, 1e-3, noise=500.0)
     return largest(run(engine, setups.driven(base, forces), 0.7e-3, 0.21).states)
-
-
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
-RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
 
 @cache

@@ -14,10 +14,14 @@ from models.engines.protocol import unchecked as build_unchecked
 from models.engines.stability import first_order, linearised
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
+from validation.hard_cases.case import IMPLEMENTATIONS, Word
 
 IMPLICIT = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
 """For each implementation an integrator that no step makes unstable."""
 CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+"""In every implementation."""
 
 
 def vehicle(

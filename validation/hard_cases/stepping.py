@@ -12,10 +12,12 @@ from models.engines import exudyn as exudyn_engine
 from models.engines import mujoco as mujoco_engine
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
 from validation.hard_cases.setups import (
     CONSTRAINED,
     IMPLICIT,
+    RAISED,
+    REFUSED,
     driven,
     exact,
     exact_decay,
@@ -173,9 +175,6 @@ def stamps_naive(folder: Path) -> str:
         f"shows an error of {largest(found.states - truth):.0e}"
     )
 
-
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
-RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
 ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
