@@ -7,7 +7,7 @@ import numpy as np
 
 from models.core.signals import Signal
 from models.vehicles import pitch_plane
-from models.vehicles.description import Vehicle
+from models.vehicles.description import PitchSpring, Vehicle
 
 Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
 GUIDED: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
@@ -59,6 +59,11 @@ class Assembly:
         """The same, with a pitch moment added on the chassis; it stands beside any forces, held ones too."""
         assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
         return replace(self, moment=signal)
+
+    def with_spring(self, spring: PitchSpring) -> "Assembly":
+        """The same, with one more rotational spring to the ground."""
+        springs = (*self.vehicle.pitch_springs, spring)
+        return replace(self, vehicle=replace(self.vehicle, pitch_springs=springs))
 
     def without_tyres(self) -> "Assembly":
         """The same, cut off the road."""

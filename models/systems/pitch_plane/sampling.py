@@ -36,6 +36,16 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
             raise InputError(scene.file, place, rate, allowed)
 
 
+def check_end(scene: Scene, place: str, file: str, end: float) -> None:
+    """Refuse a file that ends (s) before the run does."""
+    length = scene.run.duration
+    if end < length * (1 - 1e-9):
+        from models.core.time_series import other_unit
+
+        allowed = f"ends at {end:g} s, but the run lasts {length:g} s: shorten run.duration{other_unit(end, length)}"
+        raise InputError(scene.file, place, file, allowed)
+
+
 def numbers(times: np.ndarray, rate: float) -> np.ndarray:
     """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
     return np.floor(times * rate + SLACK).astype(np.int64)

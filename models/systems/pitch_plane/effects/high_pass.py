@@ -5,7 +5,6 @@ Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 
 chassis with the wheels on its arms, I + J (``models.drift.growth.rigid_pitch``): pitch drift moves the wheels along.
 """
 
-from dataclasses import replace
 from typing import Any
 
 from models.core.strict import Strict, quantity
@@ -29,6 +28,4 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle whose slow pitch is held back."""
-    spring = PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio))
-    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
-    return replace(assembly, vehicle=vehicle)
+    return assembly.with_spring(PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio)))

@@ -25,6 +25,7 @@ from models.core.tables import RADIANS, RADIANS_PER_SECOND
 from models.drift.growth import rigid_pitch, spring_of
 from models.drift.innovations import Consistency, consistency
 from models.engines.assembly import Assembly, Channels
+from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
 
 if TYPE_CHECKING:
@@ -95,9 +96,8 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     _check_bandwidth(assembly, p, guide)
     stiffness, damping = spring_of(assembly.parameters, p.bandwidth, p.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.lacking[:, None]
-    spring = PitchSpring("chassis", stiffness, damping)
-    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
-    guided = replace(assembly, vehicle=vehicle).with_moment(Sampled(moment, guide.period, held=False))
+    sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
+    guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
         guided,
         outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
@@ -182,7 +182,7 @@ def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Gui
 
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     """The file's columns with their deviations; refuses what the filter could not use."""
-    from models.core.time_series import other_unit, read_time_series
+    from models.core.time_series import read_time_series
     from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
 
     scene, place = assembly.scene, "effects.kalman_filter"
@@ -195,14 +195,7 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     for name, column in zip(given, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
-    if len(values) * period < scene.run.duration * (1 - 1e-9):
-        raise InputError(
-            scene.file,
-            f"{place}.file",
-            p.file,
-            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s"
-            f"{other_unit(len(values) * period, scene.run.duration)}",
-        )
+    check_end(scene, f"{place}.file", p.file, len(values) * period)
     assert assembly.input is not None and assembly.input.period is not None
     if not divides(*sorted((period, assembly.input.period))):
         raise InputError(

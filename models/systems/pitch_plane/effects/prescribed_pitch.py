@@ -16,6 +16,7 @@ from models.core.smoothing import smoothed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
 from models.engines.assembly import GUIDED, Assembly, Mode
+from models.systems.pitch_plane.sampling import check_end
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring",)
@@ -40,8 +41,6 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle with its pitch as an input, twice differentiable by a quintic spline."""
-    from models.systems.pitch_plane.effects.prescribed_pitch import prescribe
-
     return prescribe(assembly, "prescribed_pitch", p, "pitch", {"pitch": RADIANS})
 
 
@@ -53,7 +52,7 @@ def prescribe(
     ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
     factors of their units, in the order of the mode's coordinates. Raises InputError.
     """
-    from models.core.time_series import CHASSIS, other_unit, read_time_series, sparse
+    from models.core.time_series import CHASSIS, read_time_series, sparse
 
     scene = assembly.scene
     _check_scene(scene, columns)
@@ -61,14 +60,7 @@ def prescribe(
     if p.bandwidth is not None:
         values = smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
     motion = Smooth(values, period, derivatives=2, degree=5)
-    if motion.end < scene.run.duration * (1 - 1e-9):
-        raise InputError(
-            scene.file,
-            f"effects.{effect}.file",
-            p.file,
-            f"ends at {motion.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration"
-            f"{other_unit(motion.end, scene.run.duration)}",
-        )
+    check_end(scene, f"effects.{effect}.file", p.file, motion.end)
     assert assembly.input is not None
     guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
     guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
@@ -78,16 +70,8 @@ def prescribe(
 
 def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:
     if scene.effects["wheel_forces"].frame == "body":
-        raise InputError(
-            scene.file,
-            "effects.wheel_forces.frame",
-            "body",
-            "a prescribed pitch makes the frame a matter of the file: use 'inertial'",
-        )
+        allowed = "a prescribed pitch makes the frame a matter of the file: use 'inertial'"
+        raise InputError(scene.file, "effects.wheel_forces.frame", "body", allowed)
     for name in (full for column in columns for full in (column, f"{column}_rate") if full in scene.start):
-        raise InputError(
-            scene.file,
-            f"start.{name}",
-            scene.start[name],
-            f"the {name.removesuffix('_rate')} is prescribed, and its file says where it starts: drop this key",
-        )
+        allowed = f"the {name.removesuffix('_rate')} is prescribed, and its file says where it starts: drop this key"
+        raise InputError(scene.file, f"start.{name}", scene.start[name], allowed)
