@@ -5,7 +5,7 @@ An integrator has ``integrate(f, times, start, tolerance)``, which returns state
 ``(assembly, settings)`` and has ``run()``, which returns something with ``times`` (n,) and ``states`` (n, 8), and
 ``acceleration(time, state)`` (4,). Either says its ``order``, and ``adaptive = True`` if it keeps a tolerance instead
 of taking steps of fixed length. What it returns passes the guard that every run passes and is compared with the
-reference (beside_reference.py); what it raises is a failed run.
+reference (``beside_reference``); what it raises is a failed run.
 
 ::
 
