@@ -17,29 +17,26 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.result import Result, provenance
+from models.core.result import Channel, result
 from models.core.steps import divides
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
-from models.ensemble.statistics import deviation, quantile
+from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import cluster, processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
-from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
-from models.systems.pitch_plane.run import state_names
+from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.scene import Scene
-from studies.virtual_measurement import check_road, follower, measure, stride, write_measurement
+from models.systems.pitch_plane.virtual_measurement import check_road, follower, measure, write_measurement
+from models.vehicles.pitch_plane import STATE_NAMES
 
 Progress = Callable[[str, float], None]
 
 BLOCKS = "blocks"
 """Folder of the finished blocks, within that of the results; a study that has one can be resumed."""
 QUANTILES = (0.05, 0.5, 0.95)
-FAN = (5, 25, 50, 75, 95)
-"""Percentiles of the figure."""
 
 
 class Options(Strict):
@@ -57,20 +54,15 @@ class Options(Strict):
     noise_fraction: float = quantity("", "standard deviation of the noise by the largest force", default=0.002)
 
 
-def check(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Refuse, before anything is written, a scene that this study cannot follow."""
+def check(scene: Scene, engines: tuple[str, ...]) -> Options:
+    """The scene's options; refuses, before anything is written, one that this study cannot follow."""
     options = read(Options, scene.options, scene.file, "options")
     check_road(scene, engines, options.sampling_rate)
     for engine in {"reference", *engines}:
         settings = scene.settings(engine)
         if CATALOGUE[engine][str(settings.integrator)].adaptive or settings.step != scene.run.step:
-            raise InputError(
-                scene.file,
-                f"engines.{engine}",
-                None,
-                "an ensemble compares states at the fixed steps of "
-                "run.step: name no adaptive integrator and no other step",
-            )
+            allowed = "an ensemble compares states at run.step: name no adaptive integrator and no other step"
+            raise InputError(scene.file, f"engines.{engine}", None, allowed)
     if not (divides(scene.run.step, options.rows) and divides(options.rows, scene.run.duration)):
         allowed = f"must be a multiple of run.step = {scene.run.step:g} s and divide run.duration"
         raise InputError(scene.file, "options.rows", options.rows, allowed)
@@ -78,42 +70,51 @@ def check(scene: Scene, engines: tuple[str, ...]) -> None:
         if not 0 < time <= scene.run.duration or not divides(options.rows, time):
             allowed = f"each must be a multiple of options.rows = {options.rows:g} s within the run"
             raise InputError(scene.file, "options.times", time, allowed)
+    return options
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All paths in the reference, the first ones in the other engines; saves ``ensemble.nc``, table and figure."""
-    check(scene, engines)
-    options = read(Options, scene.options, scene.file, "options")
-    measured = measure(scene)
-    every = stride(scene, options.sampling_rate)
+    options = check(scene, engines)
+    measured, period = measure(scene), 1.0 / options.sampling_rate
     times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
 
     def tell(done: Done) -> None:
         progress(f"reference: {done}", done.done / done.paths)
 
     with TemporaryDirectory() as name, _workers(options) as pool:
-        noisy = _noisy(scene, options, measured, every, Path(name))
-        truth = measured["pitch"]
-        job = noise_paths(noisy, times, truth, options.threshold)
-        found = run_paths(job, options.paths, folder / BLOCKS, pool, progress=tell)
+        largest = write_measurement(measured, Path(name), period)
+        noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
+        noisy = follower(scene, Path(name))({}, {"force_noise": noise})
+        asked = (noisy, times, measured["pitch"], options.threshold)
+        found = run_paths(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
-            gaps[engine] = gap(found, _in_engine(engine, noisy, times, truth, options, pool), times)
-    write_measurement(measured, options.sampling_rate, every, folder)
+            if engine == "mujoco":
+                repeated = run_paths(mujoco_threads(*asked, options.workers), options.engine_paths)
+            else:
+                repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, block=1)
+            gaps[engine] = gap(found, repeated, times)
+    write_measurement(measured, folder, period)
     true = measured.states[np.rint(times / scene.run.step).astype(int)]
-    _save(folder, scene, job, times, found)
+    channels = {
+        "states": Channel(("path", "time", "state"), found["states"], "m, rad, m/s, rad/s"),
+        "drift_off": Channel("path", found["drift_off"], "s", "drift-off, infinite if never"),
+        "failed": Channel("path", found["failed"], "s", "last good time of a path that failed"),
+    }
+    axes = {"time": Channel("time", times, "s"), "state": Channel("state", list(STATE_NAMES))}
+    result(noisy, channels, axes, threshold=options.threshold).save(folder / "ensemble.nc")
     rows = _rows(options, times, found["states"] - true)
     table = text(options, scene, rows, found, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
-    told = {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()}
     return {
         "scene": scene.title,
         "folder": str(folder),
         "paths": options.paths,
         "rows": rows,
-        "gaps": told,
+        "gaps": {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()},
         "failed": {},
         "table": table,
     }
@@ -126,61 +127,13 @@ def _workers(options: Options) -> AbstractContextManager[Executor | None]:
     return processes(options.workers) if options.workers > 1 else nullcontext()
 
 
-def _noisy(scene: Scene, options: Options, measured: Result, every: int, folder: Path) -> Scene:
-    """The force-excited scene of all paths; its forces lie in ``folder``."""
-    largest = write_measurement(measured, options.sampling_rate, every, folder)
-    noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
-    return follower(scene, folder)({}, {"force_noise": noise})
-
-
-def _in_engine(engine: str, noisy: Scene, times: np.ndarray, truth: np.ndarray, options: Options, pool: Any) -> Arrays:
-    """The first paths in MuJoCo's threads, or in processes."""
-    if engine == "mujoco":
-        threads = mujoco_threads(noisy, times, truth, options.threshold, options.workers)
-        return run_paths(threads, options.engine_paths)
-    return run_paths(
-        noise_paths(noisy, times, truth, options.threshold, engine), options.engine_paths, executor=pool, block=1
-    )
-
-
-def _save(folder: Path, scene: Scene, job: NoisePaths, times: np.ndarray, found: Arrays) -> None:
-    """All saved states and drift-off times, labelled."""
-    import json
-
-    import xarray as xr
-
-    data = xr.Dataset(
-        {
-            "states": (("path", "time", "state"), found["states"], {"units": "m, rad, m/s, rad/s"}),
-            "drift_off": ("path", found["drift_off"], {"units": "s", "long_name": "drift-off, infinite if never"}),
-            "failed": ("path", found["failed"], {"units": "s", "long_name": "last good time of a path that failed"}),
-        },
-        coords={"time": ("time", times, {"units": "s"}), "state": list(state_names())},
-    )
-    data.attrs = {
-        "title": scene.title,
-        "threshold": job.threshold,
-        "scene_table": json.dumps(job.base.scene.table()),
-        "provenance": json.dumps(provenance()),
-    }
-    Result(data).save(folder / "ensemble.nc")
-
-
 def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[str, float]]:
     """Standard deviation and its standard error of pitch and heave at the asked times."""
-    rows = []
+    names, rows = ("time", "pitch", "pitch error", "heave", "heave error"), []
     for time in options.times:
         row = round(time / options.rows)
-        (pitch, pitch_error), (heave, heave_error) = deviation(errors[:, row, 3]), deviation(errors[:, row, 2])
-        rows.append(
-            {
-                "time": float(times[row]),
-                "pitch": pitch,
-                "pitch error": pitch_error,
-                "heave": heave,
-                "heave error": heave_error,
-            }
-        )
+        figures = (float(times[row]), *deviation(errors[:, row, 3]), *deviation(errors[:, row, 2]))
+        rows.append(dict(zip(names, figures, strict=True)))
     return rows
 
 
@@ -204,15 +157,13 @@ def text(
         lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
     lost = int(np.isfinite(found["failed"]).sum())
     lines += [f"  {lost} paths left all bounds and count as drifted off by then"] if lost else []
-    lines += [f"  {engine}: {_compared(options, worst)}" for engine, worst in gaps.items()]
+    for engine, worst in gaps.items():
+        differ = (
+            f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
+        )
+        none = "not compared, as every path drifts off before the first saved row"
+        lines.append(f"  {engine}: {none if math.isnan(worst) else differ}")
     return lines
-
-
-def _compared(options: Options, worst: float) -> str:
-    """How far another engine is from the reference, or why that cannot be said."""
-    if math.isnan(worst):
-        return "not compared, as every path drifts off before the first saved row"
-    return f"{options.engine_paths} of these paths differ by at most {worst:.0e} of the largest state before drift-off"
 
 
 def _time(value: float) -> str:
@@ -221,7 +172,8 @@ def _time(value: float) -> str:
 
 def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, folder: Path) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
-    from models.drawing.figures import plt, save
+    from models.drawing.drift import draw_fan
+    from models.drawing.figures import heading, plt, save
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
@@ -238,25 +190,9 @@ def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, option
     histogram.set_title(f"drift-off time, paths ({len(drift_off) - len(drifted)} never drift off)")
     if len(drifted):
         histogram.legend()
-    for axis in (fan, histogram):
-        axis.set_xlabel("time [s]")
-    title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    plt.setp((fan, histogram), xlabel="time [s]")
+    heading(figure, f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz")
     save(figure, folder / "ensemble.png")
-
-
-def percentiles(errors: np.ndarray) -> np.ndarray:
-    """Percentiles FAN of the magnitude of errors (paths, times), shape (5, times); failed paths are left out."""
-    return np.nanpercentile(np.abs(errors), FAN, axis=0)
-
-
-def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
-    """The bands of ``percentiles`` (5, times) of a pitch error (rad) over times (s)."""
-    low, quarter, middle, three, high = bands
-    axis.fill_between(times, low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
-    axis.fill_between(times, quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
-    axis.semilogy(times, middle, color="C0", label="median")
-    axis.set_title("magnitude of the pitch error [rad]")
 
 
 if __name__ == "__main__":

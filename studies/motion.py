@@ -6,6 +6,8 @@ one. A user's own file takes the place of the runs; nothing is known of the trut
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +15,25 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError, RunFailed
+from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.tables import ACCELERATIONS
 from models.core.time_series import read_time_series, write_time_series
 from models.core.whole_files import write_whole
-from models.sensors.high_pass import check_cut_off
+from models.drift.score import rms
 from models.sensors.rate_filter import filter_rates
-from models.sensors.rigid_body_motion import LIMIT, Motion, Quality, Start, motion, quality, spin, tilt_displacement
-from models.sensors.rotations import GimbalLock, from_cardan
+from models.sensors.rigid_body_motion import (
+    LIMIT,
+    Motion,
+    Quality,
+    Start,
+    check_cut_off,
+    motion,
+    quality,
+    spin,
+    tilt_displacement,
+)
+from models.sensors.rotations import GimbalLock
 from models.sensors.sensor_array import SensorArray, sensor_array
 from models.systems.pitch_plane.effects.accelerometers import Parameters, names
 from models.systems.pitch_plane.run import run as simulate
@@ -33,6 +46,8 @@ CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave":
 TILT = 1e-3
 """Tilt error (rad) of the false displacement in the table."""
 SENSORS = "effects.accelerometers.sensors"
+CUT_OFFS = ("turning_cut_off", "position_cut_off")
+"""Options of the high-passed way."""
 
 
 class Options(Strict):
@@ -59,11 +74,8 @@ class Source:
     @property
     def start(self) -> Start:
         """Where the record begins: as the run did, or at rest and level."""
-        if not self.truth:
-            return Start()
-        first = {name: float(values[0]) for name, values in self.truth.items()}
-        level = tuple(from_cardan(0.0, first["pitch"], 0.0).tolist())
-        return Start((0.0, first["rate"], 0.0), level, (0.0, 0.0, first["heave rate"]), (0.0, 0.0, first["heave"]))
+        first = (float(self.truth[name][0]) for name in ("pitch", "rate", "heave", "heave rate") if self.truth)
+        return Start.pitched(*first) if self.truth else Start()
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -80,9 +92,10 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
             continue
-        _save(source, folder)
+        _save(scene, source, folder)
         sources.append(source)
-    table = [*_on_array(array), *(line for source in sources for line in _lines(source, p)), *_closing(options)]
+    arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
+    table = [*arranged, *(line for source in sources for line in _lines(source, p)), *_closing(options)]
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)
     if sources:
@@ -104,26 +117,20 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
     p = scene.effects["accelerometers"]
     _array(scene, p.positions())
     if scene.run.output_step is not None:
-        raise InputError(
-            scene.file,
-            "run.output_step",
-            scene.run.output_step,
-            "this study reads its sensors at every step, and saves their samples alone: drop this key",
-        )
+        allowed = "this study reads its sensors at every step, and saves their samples alone: drop this key"
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
     if options.file is not None:
         source = _measured(scene, options, p)
         count, period = len(source.readings), source.period
     else:
         if options.zeroed:
-            raise InputError(
-                scene.file,
-                "options.zeroed",
-                True,
-                "virtual sensors read specific force, gravity "
-                "included: this key belongs to readings of your own (options.file)",
+            allowed = (
+                "virtual sensors read specific force, gravity included: this key belongs to readings of your own "
+                "(options.file)"
             )
+            raise InputError(scene.file, "options.zeroed", True, allowed)
         count, period = round(scene.run.duration * p.sampling_rate) + 1, 1 / p.sampling_rate
-    for name in ("turning_cut_off", "position_cut_off"):
+    for name in CUT_OFFS:
         check_cut_off(count, period, getattr(options, name), scene.file, f"options.{name}")
     return options, p
 
@@ -143,53 +150,42 @@ def _measured(scene: Scene, options: Options, p: Parameters) -> Source:
 
 
 def _from_file(name: str, path: Path, p: Parameters) -> Source:
-    columns = {channel: ACCELERATIONS for sensor in names(p) for channel in sensor}
-    values, period = read_time_series(path, columns)
+    values, period = read_time_series(path, dict.fromkeys(chain(*names(p)), ACCELERATIONS))
     return Source(name, values.reshape(len(values), -1, 3), period)
 
 
 def _run(scene: Scene, engine: str, folder: Path) -> Source:
     """One engine's run; its readings go through a file as measured ones do."""
     p = scene.effects["accelerometers"]
-    result = simulate(scene, engine)
+    made = simulate(scene, engine)
     path = folder / f"{engine} readings.csv"
-    write(result, {channel: channel for sensor in names(p) for channel in sensor}, p.sampling_rate, path)
+    write(made, {channel: channel for channel in chain(*names(p))}, p.sampling_rate, path)
     source = _from_file(engine, path, p)
-    rows = np.searchsorted(result.times, source.period * (np.arange(len(source.readings)) - 1e-3))
+    rows = np.searchsorted(made.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in CHANNELS.items()} | {"heave rate": "z3_rate"}
-    source.truth = {name: result[channel][rows] for name, channel in wanted.items()}
-    source.gyro = result["gyro"][rows] if "gyro" in result.data else None
+    source.truth = {name: made[channel][rows] for name, channel in wanted.items()}
+    source.gyro = made["gyro"][rows] if "gyro" in made.data else None
     return source
 
 
 def _recover(source: Source, array: SensorArray, options: Options, p: Parameters) -> None:
     """Every way from readings to motion, without a sensor that does not belong to the body."""
     source.quality = quality(array, source.readings, p.deviation)
-    readings = source.readings
-    if source.quality.suspect:
-        keep = [name != source.quality.suspect for name in array.names]
-        array = sensor_array({name: place for name, place in p.positions().items() if name != source.quality.suspect})
-        source.ways["all sensors, integrated"] = _moved(source, sensor_array(p.positions()), readings, options)
-        readings = readings[:, keep]
-    source.ways["integrated"] = _moved(source, array, readings, options)
+    suspect, readings = source.quality.suspect, source.readings
+    moved = partial(motion, period=source.period, start=source.start, zeroed=options.zeroed)
+    if suspect:
+        source.ways["all sensors, integrated"] = moved(array, readings)
+        readings = readings[:, [name != suspect for name in array.names]]
+        array = sensor_array({name: place for name, place in p.positions().items() if name != suspect})
+    source.ways["integrated"] = moved(array, readings)
     if p.deviation > 0:
         held, _ = filter_rates(spin(array, readings), source.period, np.array(source.start.rates), p.deviation)
-        source.ways["rates held by w w^T"] = _moved(source, array, readings, options, rates=held)
+        source.ways["rates held by w w^T"] = moved(array, readings, rates=held)
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
-        source.ways["rates from the gyro"] = _moved(source, array, readings, options, rates=turning)
-    source.ways["high-passed"] = _moved(
-        source,
-        array,
-        readings,
-        options,
-        turning_cut_off=options.turning_cut_off,
-        position_cut_off=options.position_cut_off,
-    )
-
-
-def _moved(source: Source, array: SensorArray, readings: np.ndarray, options: Options, **other: Any) -> Motion:
-    return motion(array, readings, source.period, source.start, zeroed=options.zeroed, **other)
+        source.ways["rates from the gyro"] = moved(array, readings, rates=turning)
+    cut_offs = {name: getattr(options, name) for name in CUT_OFFS}
+    source.ways["high-passed"] = moved(array, readings, **cut_offs)
 
 
 def _values(found: Motion) -> dict[str, np.ndarray]:
@@ -197,33 +193,30 @@ def _values(found: Motion) -> dict[str, np.ndarray]:
     return {"pitch": found.angles()[:, 1], "rate": found.rates[:, 1], "heave": found.position[:, 2]}
 
 
-def _save(source: Source, folder: Path) -> None:
-    """Recovered pitch, rate and heave of every way as a file each."""
-    for way, found in source.ways.items():
-        columns = {name: (CHANNELS[name][1], values) for name, values in _values(found).items()}
-        write_time_series(folder / f"{Path(source.name).stem}, {way}.csv", columns, source.period)
+def _save(scene: Scene, source: Source, folder: Path) -> None:
+    """Recovered pitch, rate and heave: a file of every way, and all of them as a result."""
+    stem, ways = Path(source.name).stem, {way: _values(moved) for way, moved in source.ways.items()}
+    for way, found in ways.items():
+        columns = {name: (CHANNELS[name][1], values) for name, values in found.items()}
+        write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
+    channels = {
+        name: Channel(("way", "time"), [found[name] for found in ways.values()], unit)
+        for name, (_, unit) in CHANNELS.items()
+    }
+    times = source.period * np.arange(len(source.readings))
+    axes = {"way": Channel("way", list(ways)), "time": Channel("time", times, "s")}
+    result(scene, channels, axes, engine=source.name).save(folder / f"{stem} motion.nc")
 
 
 def _numbers(source: Source) -> dict[str, Any]:
     """Share, suspect, and the largest and rms error of each way; without a truth the sizes of what was found."""
     assert source.quality is not None
-    found: dict[str, Any] = {
-        "source": source.name,
-        "share": source.quality.share,
-        "rigid": source.quality.rigid,
-        "suspect": source.quality.suspect,
-        "ways": {},
-    }
+    ways = {}
     for way, moved in source.ways.items():
         errors = {name: values - source.truth.get(name, 0.0) for name, values in _values(moved).items()}
-        found["ways"][way] = {
-            name: [float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))] for name, error in errors.items()
-        }
-    return found
-
-
-def _on_array(array: SensorArray) -> list[str]:
-    return ["  The sensors", *(f"    {line}" for line in array.describe())]
+        ways[way] = {name: [float(np.abs(error).max()), rms(error)] for name, error in errors.items()}
+    told = {name: getattr(source.quality, name) for name in ("share", "rigid", "suspect")}
+    return {"source": source.name, **told, "ways": ways}
 
 
 def _lines(source: Source, p: Parameters) -> list[str]:
@@ -276,7 +269,7 @@ def _closing(options: Options) -> list[str]:
 
 def _figure(source: Source, path: Path) -> None:
     """Pitch, heave, error of the pitch or its rate, and the misfit of the readings, of one source."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     times = source.period * np.arange(len(source.readings))
     figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), sharex=True)
@@ -295,11 +288,9 @@ def _figure(source: Source, path: Path) -> None:
     assert source.quality is not None
     axes[1, 1].plot(times, source.quality.misfit, color="C7", linewidth=0.4)
     axes[1, 1].set_title(f"readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s^2]")
-    for axis in axes[1]:
-        axis.set_xlabel("time [s]")
+    plt.setp(axes[1], xlabel="time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5)
-    title = f"Pitch and heave from accelerometers, {source.name}"
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(figure, f"Pitch and heave from accelerometers, {source.name}")
     save(figure, path)
 
 

@@ -1,6 +1,7 @@
 """One scene in one or all implementations: results, a figure, and how far the implementations agree."""
 
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,11 @@ import numpy as np
 
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.plan import doubt_lines, trust_line
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.run import state_names, summary
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.run import summary
+from models.systems.pitch_plane.scene import Scene, assemble
+from models.vehicles.pitch_plane import STATE_NAMES
 
 Progress = Callable[[str, float], None]
 
@@ -33,6 +34,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     assembly = assemble(scene)
     if results:
         _figure(scene, results, folder / "states.png")
+    texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
+    beside = [f"  {engine}: {text}" for engine, text in texts.items() if text]  # of engines from outside the tree
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -40,32 +43,18 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "largest difference of states": agreement(results),
         "doubts": list(assembly.doubts),
-        "table": [*trust_line(assembly), *doubt_lines(assembly), *_beside_reference(results)],
+        "table": [*trust_line(assembly), *doubt_lines(assembly), *beside],
     }
 
 
 def _line(result: Result) -> dict[str, Any]:
-    attributes = result.data.attrs
-    return {
-        "integrator": attributes["integrator"],
-        "step": attributes["step"],
-        "seconds": attributes["seconds"],
-        "counts": result.counts(),
-        "channels": summary(result),
-    }
-
-
-def _beside_reference(results: dict[str, Result]) -> list[str]:
-    """How far engines from outside the tree are from the reference, a line each."""
-    texts = {engine: result.data.attrs.get("beside reference") for engine, result in results.items()}
-    return [f"  {engine}: {text}" for engine, text in texts.items() if text]
+    told = {name: result.data.attrs[name] for name in ("integrator", "step", "seconds")}
+    return {**told, "counts": result.counts(), "channels": summary(result)}
 
 
 def agreement(results: dict[str, Result]) -> dict[str, float]:
     """Largest difference of any state (m, rad, m/s, rad/s) between each two results, on their common grid."""
-    names = list(results)
-    pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
-    return {f"{a} - {b}": difference(results[a], results[b]) for a, b in pairs}
+    return {f"{a} - {b}": difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
 def difference(one: Result, other: Result) -> float:
@@ -84,7 +73,7 @@ def same_times(one: Result, other: Result) -> bool:
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
-    from models.drawing.figures import COLOURS, LABELS, plt, save
+    from models.drawing.figures import COLOURS, LABELS, heading, plt, save
 
     panels = [
         ("z3", "heave of the chassis, down [m]", 1.0),
@@ -97,20 +86,14 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
     figure, axes = plt.subplots(rows, 1, figsize=(8.5, 1.9 * rows + 0.6), sharex=True)
     for axis, (channel, label, scale) in zip(axes, panels, strict=False):
         for i, (engine, result) in enumerate(results.items()):
-            axis.plot(
-                result.times,
-                scale * result[channel],
-                color=COLOURS[engine],
-                label=LABELS[engine],
-                linewidth=2.4 - 0.8 * i,
-                alpha=0.9,
-            )
+            style = {"color": COLOURS[engine], "label": LABELS[engine], "linewidth": 2.4 - 0.8 * i, "alpha": 0.9}
+            axis.plot(result.times, scale * result[channel], **style)
         axis.set_title(label)
     if len(results) > 1:
         _differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(results))
-    figure.suptitle(scene.title, x=0.01, ha="left", fontweight="bold")
+    heading(figure, scene.title)
     save(figure, path)
 
 
@@ -125,7 +108,7 @@ def _differences(axis: Any, results: dict[str, Result]) -> None:
             axis.semilogy(
                 result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"
             )
-    axis.set_title(f"largest difference of the {len(state_names())} states [m, rad, m/s, rad/s]")
+    axis.set_title(f"largest difference of the {len(STATE_NAMES)} states [m, rad, m/s, rad/s]")
     axis.legend(loc="lower right", ncols=2)
 
 

@@ -23,10 +23,9 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed
 from models.core.whole_files import write_whole
-from models.ensemble.named_files import named_files
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
-from models.ensemble.store import Arrays, code, locked
+from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import processes
 from studies.asked import engines_of, load_scene, ready, scene_path
 from studies.summary_numbers import numbers

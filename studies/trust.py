@@ -15,18 +15,17 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.result import Result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, changed
 from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
-from studies.virtual_measurement import check_road, check_steps, follower, measure, stride, write_measurement
+from models.systems.pitch_plane.virtual_measurement import check_road, check_steps, follower, measure, write_measurement
 
 Progress = Callable[[str, float], None]
 Row = dict[str, Any]
@@ -49,12 +48,10 @@ class Options(Strict):
 
 
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
-    """Predictions, an ensemble and two runs in the first engine; saves ``table.txt`` and ``error_growth.png``."""
-    check(scene, engines)
-    options = read(Options, scene.options, scene.file, "options")
+    """Predictions, an ensemble and two runs in the first engine; saves ``table.txt``, ``trust.nc``, a figure."""
+    options = check(scene, engines)
     base, truth, largest = _forces(scene, options, folder)
-    deviation = options.noise_fraction * largest
-    assembly = assemble(base)
+    deviation, assembly = options.noise_fraction * largest, assemble(base)
     other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
     curves = {
@@ -67,41 +64,35 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     if truth is not None:
         progress("runs", 0.2)
         clean = simulate(base, engines[0])
-        runs["interpolation"] = _error(clean, truth)
-        runs["inertia"] = _error(simulate(_with(base, {"I": other.I}), engines[0]), clean["pitch"])
+        wrong = simulate(changed(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
+        runs = {"interpolation": _error(clean, truth), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
     spread = _ensemble(base, deviation, options, engines[0])
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
+    _save(scene, rows, spread, folder / "trust.nc")
     progress("figure", 0.9)
     _figure(curves, runs, spread, options, folder / "error_growth.png")
     return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}
 
 
-def check(scene: Scene, engines: tuple[str, ...]) -> None:
-    """Refuse, before anything is written, what is neither a road nor a free run on wheel forces."""
+def check(scene: Scene, engines: tuple[str, ...]) -> Options:
+    """The scene's options; refuses, before anything is written, what is neither a road nor a free run on wheel
+    forces."""
     options = read(Options, scene.options, scene.file, "options")
     check_steps(scene, engines)
     if "road" in scene.effects:
         if options.sampling_rate is None:
             raise InputError(scene.file, "options.sampling_rate", None, "is missing: forces measured on a road need it")
         check_road(scene, engines, options.sampling_rate)
-        return
-    if set(scene.effects) != {"wheel_forces"}:
-        raise InputError(
-            scene.file,
-            "effects",
-            sorted(scene.effects),
-            "this study takes a road or wheel forces alone, and names noise itself",
-        )
-    if options.sampling_rate is not None:
-        raise InputError(
-            scene.file,
-            "options.sampling_rate",
-            options.sampling_rate,
-            "the file of wheel forces has its own: drop this key",
-        )
+    elif set(scene.effects) != {"wheel_forces"}:
+        allowed = "this study takes a road or wheel forces alone, and names noise itself"
+        raise InputError(scene.file, "effects", sorted(scene.effects), allowed)
+    elif options.sampling_rate is not None:
+        allowed = "the file of wheel forces has its own: drop this key"
+        raise InputError(scene.file, "options.sampling_rate", options.sampling_rate, allowed)
+    return options
 
 
 def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, np.ndarray | None, float]:
@@ -110,14 +101,8 @@ def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, np.nda
         return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
     measured = measure(scene)
-    largest = write_measurement(measured, options.sampling_rate, stride(scene, options.sampling_rate), folder)
+    largest = write_measurement(measured, folder, 1.0 / options.sampling_rate)
     return follower(scene, folder)({}, {}), measured["pitch"], largest
-
-
-def _with(scene: Scene, override: dict[str, float]) -> Scene:
-    table = scene.table()
-    vehicle = table["vehicle"] | {"override": {**table["vehicle"].get("override", {}), **override}}
-    return build({**table, "vehicle": vehicle}, scene.file, Path(scene.folder))
 
 
 def _error(run: Result, pitch: np.ndarray) -> Curve:
@@ -130,19 +115,27 @@ def _ensemble(base: Scene, deviation: float, options: Options, engine: str) -> d
 
     The errors are nan from where a path left all bounds.
     """
-    table = base.table()
-    effects = table["effects"] | {"force_noise": {"deviation": deviation, "seed": options.seed}}
-    scene = build({**table, "effects": effects}, base.file, Path(base.folder))
+    noisy = changed(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
     quiet = simulate(base, "reference")
-    every = max(1, round(SPACING / base.run.step))
-    true = quiet["pitch"]
-    rows = np.arange(0, len(true), every)
-    found = run_paths(noise_paths(scene, quiet.times[rows], true, options.angle, engine), options.paths)
-    return {
-        "times": quiet.times[rows],
-        "drift_off": found["drift_off"],
-        "errors": np.abs(found["states"][:, :, 3] - true[rows]),
+    rows = np.arange(0, len(quiet.times), max(1, round(SPACING / base.run.step)))
+    times, true = quiet.times[rows], quiet["pitch"]
+    found = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths)
+    errors = np.abs(found["states"][:, :, 3] - true[rows])
+    return {"times": times, "drift_off": found["drift_off"], "errors": errors}
+
+
+def _save(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray], path: Path) -> None:
+    """Drift-off by source, and the noise paths."""
+    drift_off = {
+        name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
+        for name in ("predicted", "measured")
     }
+    paths = {
+        "drift_off": Channel("path", spread["drift_off"], "s", "drift-off, infinite if never"),
+        "error": Channel(("path", "time"), spread["errors"], "rad", "pitch error"),
+    }
+    axes = {"source": Channel("source", list(NAMES)), "time": Channel("time", spread["times"], "s")}
+    result(scene, drift_off | paths, axes).save(path)
 
 
 NAMES = {
@@ -157,21 +150,16 @@ def _rows(
     curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options
 ) -> list[Row]:
     """Predicted and measured drift-off (s) by source; None where it lies beyond the run."""
-    rows = []
+    rows = list[Row]()
     for name, curve in curves.items():
-        row: Row = {"source": name, "predicted": curve.passes(options.angle), "measured": None, "quartiles": None}
-        if name in runs:
-            row["measured"] = runs[name].passes(options.angle)
+        measured, quartiles = runs[name].passes(options.angle) if name in runs else None, None
         if name == "noise":
-            found = [quantile(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
-            row["measured"] = _finite(found[0])
-            row["quartiles"] = [_finite(time) for time in found[1:]]
-        rows.append(row)
+            times = [quantile(spread["drift_off"], level)[0] for level in (0.5, 0.25, 0.75)]
+            measured, *quartiles = [time if math.isfinite(time) else None for time in times]
+        rows.append(
+            {"source": name, "predicted": curve.passes(options.angle), "measured": measured, "quartiles": quartiles}
+        )
     return rows
-
-
-def _finite(time: float) -> float | None:
-    return time if math.isfinite(time) else None
 
 
 def _text(
@@ -246,12 +234,8 @@ def _figure(
     colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
     figure, axis = plt.subplots(figsize=(8.0, 4.6))
     axis.semilogy(spread["times"], spread["errors"][:20].T, color="#0072b2", alpha=0.15, linewidth=0.6)
-    axis.semilogy(
-        spread["times"],
-        np.median(spread["errors"], axis=0),
-        color="#0072b2",
-        label="noise: median of the paths (20 of them thin)",
-    )
+    middle = np.median(spread["errors"], axis=0)
+    axis.semilogy(spread["times"], middle, color="#0072b2", label="noise: median of the paths (20 of them thin)")
     for name, curve in runs.items():
         axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
     for name, curve in curves.items():

@@ -11,7 +11,7 @@ import pytest
 import models
 from models.core.scene_effects import module_of, names_of
 from models.core.systems import DEFAULT
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from validation.absence import ride
 from validation.absence.hand_built import mujoco_model
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, registered, user_functions
@@ -22,6 +22,7 @@ from validation.cases.effect_prices import hand_built
 BARE = {"title": "bare", "run": {"duration": 0.02, "step": 0.001}, "start": {"pitch": 0.1}}
 FORCED = {**BARE, "effects": FORCES}
 ROAD = module_of(DEFAULT, "road").EXAMPLE
+EFFECT_FILES = "systems/pitch_plane/effects"
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_the_same_numbers_with_the_other_effects_files_removed(kept, bare, force
     shutil.copytree(Path(models.__file__).parent, copy)
     shutil.rmtree(copy / "road")
     for name in {*names_of(DEFAULT)} - {*kept}:
-        (copy / "effects" / f"{name}.py").unlink()
+        (copy / EFFECT_FILES / f"{name}.py").unlink()
     for name in ("mujoco_callback", "mujoco_layout"):
         (copy / "engines" / f"{name}.py").unlink()
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -147,7 +148,7 @@ def test_the_copy_is_what_runs_without_the_files(folder, tmp_path):
     """Positive control of the test above: a scene that names a removed effect is refused by the copy."""
     copy = tmp_path / "models"
     shutil.copytree(Path(models.__file__).parent, copy)
-    (copy / "effects" / "wheel_forces.py").unlink()
+    (copy / EFFECT_FILES / "wheel_forces.py").unlink()
     with pytest.raises(Exception) as caught:
         probe(FORCED, str(folder), cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)})
     assert "no such effect" in caught.value.stderr

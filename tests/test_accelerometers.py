@@ -6,7 +6,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.time_series import write_time_series
 from models.sensors import rigid_body_motion, sensor_array
-from models.sensors.virtual_accelerometers import on_bracket, readings
+from models.sensors.sensor_array import on_bracket, readings
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from validation.hard_cases import accelerometers as family

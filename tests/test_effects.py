@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from models.core.noise import normal
 from models.core.time_series import write_time_series
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.systems.pitch_plane.effects.contact_points import compression
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build

@@ -23,10 +23,10 @@ from models.ensemble import store
 from models.ensemble.runner import PathFailed, run_paths
 from models.ensemble.statistics import deviation, quantile
 from models.ensemble.workers import cluster, processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
-from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import force_scene, road_scene
 
 PATHS, BLOCK = 10, 3
 TIMES = np.array([0.0, 0.25, 0.5])
@@ -36,7 +36,7 @@ TIMES = np.array([0.0, 0.25, 0.5])
 def folder(tmp_path_factory):
     """Forces of half a second on the study road, sampled at 1 kHz."""
     made = tmp_path_factory.mktemp("forces")
-    write_forces(simulate(road_scene(duration=0.5), "reference"), made, 1e-3)
+    write_measurement(simulate(road_scene(duration=0.5), "reference"), made, 1e-3)
     return made
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.engines.reference import derivative_of
-from models.vehicles.linear import matrices
+from models.vehicles.description import matrices
 from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.pitch_plane import describe, equilibrium
 
@@ -145,9 +145,8 @@ def test_accelerations_agree_at_any_sample(tmp_path, interpolation, guided):
     """The audit of force-excited scenes: every implementation reads the sample of the asked time."""
     from models.core.time_series import write_time_series
     from models.engines.protocol import build
-    from models.systems.pitch_plane.assembly import assemble
+    from models.systems.pitch_plane.scene import assemble, settings_of
     from models.systems.pitch_plane.scene import build as build_scene
-    from models.systems.pitch_plane.scene import settings_of
 
     t = 1e-3 * np.arange(301)
     write_time_series(tmp_path / "f.csv", {"front": ("N", 4e3 + 3e6 * t**2), "rear": ("N", 3e3 - 1e4 * t)}, 1e-3)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
+from models.engines.assembly import Settings
 from models.engines.catalogue import RECOMMENDED
-from models.engines.protocol import Settings, build
+from models.engines.protocol import build
 from models.road import SineProfile, SplineProfile
 from models.road.grade import TRANSITION, Graded
 from models.road.signal import RoadUnderWheels
 from models.road.study import hills_road
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 
 FLAT = SineProfile(np.zeros(1), np.ones(1), np.zeros(1), 0.0, "flat")

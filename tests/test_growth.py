@@ -11,17 +11,16 @@ from models.core.noise import normal
 from models.core.systems import load
 from models.drift import growth as law
 from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.plan import describe, trust_line
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
-from models.systems.pitch_plane.tangent import Path, path_of, swing, tilted
+from models.systems.pitch_plane.scene import assemble, settings_of
+from models.systems.pitch_plane.tangent import Path, covariance, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from studies.asked import SCENES
 from studies.trust import run as run_study
-from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.scenes import VEHICLES, force_scene, road_scene
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +28,9 @@ def folder(tmp_path_factory):
     """Six seconds of wheel forces at 1 kHz and 100 Hz."""
     place = tmp_path_factory.mktemp("forces")
     true = simulate(road_scene(step=1e-3, duration=6.0), "reference")
-    write_forces(true, place, 1e-3)
+    write_measurement(true, place, 1e-3)
     (place / "slow").mkdir()
-    write_forces(true, place / "slow", 1e-2)
+    write_measurement(true, place / "slow", 1e-2)
     return place
 
 
@@ -116,7 +115,7 @@ def test_covariance_is_that_of_the_samples(folder, rule, step):
         for wheel in range(2):
             values = np.zeros_like(assembly.input.values)
             values[sample, wheel] = 20.0
-            table = path.table(replace(assembly.input, values=values))
+            table = replace(path, forces=replace(assembly.input, values=values)).inputs
             stages = [table] * 3 if rule == "held" else [table[0:-1:2], table[1::2], table[2::2]]
             pushes = np.stack(stages, axis=1).reshape(-1, 1, 2)
             responses.append(path.carry(np.zeros((1, 8)), pushes)[1][-1, 0])

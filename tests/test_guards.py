@@ -12,9 +12,10 @@ from models.core.signals import Smooth
 from models.core.time_series import write_time_series
 from models.engines import exudyn as exudyn_engine
 from models.engines import protocol, stability
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, balanced, build, guard
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.protocol import balanced, build, guard
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.cases import guards
 from validation.hard_cases import setups

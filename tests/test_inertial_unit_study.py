@@ -8,9 +8,10 @@ import pytest
 from models.core.errors import InputError
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.section_forces import CHANNELS, section_forces
+from models.drift.angle_damage import damages
+from models.drift.score import CHANNELS, section_forces
 from models.fatigue.damage import pseudo_damage
-from models.sensors.gyro import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study
@@ -75,7 +76,7 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
     f3, f4, pitch = (np.tile(result[name], 24) for name in ("f3", "f4", "pitch"))
     error = np.linspace(0.0, 0.03, len(pitch))
     wrong, true = section_forces(f3, f4, pitch + error), section_forces(f3, f4, pitch)
-    found = study.damage_errors(study.damage_curve(result, scene(), 0.1), error[None, ::100])[0]
+    found = study.damage_errors(study.damage_curve(result, 0.1), error[None, ::100])[0]
     ratio = np.array([pseudo_damage(wrong[name]) / pseudo_damage(true[name]) for name in CHANNELS])
     # f3x and f4x do 10 % and 115 % more damage; what is left falls as one over the number of runs
     assert 1 + found == pytest.approx(ratio, rel=0.01)
@@ -84,10 +85,10 @@ def test_a_drive_of_many_minutes_by_one_run_is_as_good_as_the_whole_drive():
 
 def test_the_curve_between_its_nodes_is_a_count_of_damage():
     result = simulate(scene(), "reference")
-    curve, true = study.damage_curve(result, scene(), 0.3), np.array(study._damage(result, 0.0))
+    curve, true = study.damage_curve(result, 0.3), np.array(damages(result, 0.0))
     for angle in (-0.21, -0.004, 3e-4, 0.017, 0.12):
         # a spline of 41 nodes over a count that is smooth but for cycles that change their partner
-        assert np.exp(curve(angle)) == pytest.approx(np.array(study._damage(result, angle)) / true, rel=0.01)
+        assert np.exp(curve(angle)) == pytest.approx(np.array(damages(result, angle)) / true, rel=0.01)
     assert np.array_equal(curve(0.0), np.zeros(4))
 
 
@@ -101,7 +102,8 @@ def test_the_study_adds_what_the_effects_add():
     }
     run = simulate(build({"title": "test", "run": {"duration": 10.0, "step": 1e-3}, "effects": effects}), "reference")
     error = (run["gyro"] - run["pitch_rate"])[:10_000:100].sum() / 10.0
-    paths = study.unit_paths(own)
+    length = round(60 * own.durations[-1])
+    paths = study.unit_paths(own.samples, own.sampling_rate, length, own.correlation_time, own.seed)
     ours = walk * DEGREES_PER_ROOT_HOUR * paths[0][3, 10] + grade * DEGREES_PER_HOUR * paths[1][3, 10]
     assert ours == pytest.approx(error, rel=1e-9)
 

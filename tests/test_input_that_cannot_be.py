@@ -149,8 +149,8 @@ def test_a_doubt_is_printed_saved_and_taken_into_the_trust(tmp_path):
     result = simulate(own, "reference")
     assert "falls" in json.loads(result.data.attrs["doubts"])[0] and "doubt" in result.data.attrs["status"]
     assert abs(result["z3"][-1]) > 80.0  # as the doubt says
-    from models.systems.pitch_plane.assembly import assemble
     from models.systems.pitch_plane.plan import trust_line
+    from models.systems.pitch_plane.scene import assemble
 
     assert "mean of the wheel forces" in trust_line(assemble(own))[0]
     accepted = scene(tmp_path, 0.95 * true()[0], 'accept = ["weight"]\n')

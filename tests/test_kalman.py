@@ -8,14 +8,23 @@ from models.core.errors import InputError, RunFailed
 from models.core.tables import NEWTONS
 from models.core.time_series import read_time_series, write_time_series
 from models.drift.innovations import LEVEL, consistency
-from models.engines.protocol import Settings, build
+from models.engines.assembly import Settings
+from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane import pitch_filter, pitch_step
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.pitch_filter import INERTIA, PITCH, RATE, Measurement, estimate
-from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
+from models.systems.pitch_plane import pitch_filter
+from models.systems.pitch_plane.pitch_filter import (
+    INERTIA,
+    KEPT,
+    PITCH,
+    RATE,
+    RELATIVE,
+    Measurement,
+    PitchStep,
+    estimate,
+)
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 
 PERIOD, DURATION = 5e-3, 2.0
@@ -70,7 +79,7 @@ def matrices(assembly):
 
 @pytest.mark.parametrize("interpolation", ["held", "linear"])
 def test_the_step_of_the_linear_vehicle_is_the_matrix_exponential(folder, interpolation, monkeypatch):
-    monkeypatch.setattr(pitch_step, "REACH", 0.02)  # substeps in which Runge-Kutta errs by 1e-8
+    monkeypatch.setattr(pitch_filter, "REACH", 0.02)  # substeps in which Runge-Kutta errs by 1e-8
     assembly = assemble(scene(folder, geometry="linear", interpolation=interpolation))
     a, b = matrices(assembly)
     h = 2e-3

@@ -9,8 +9,9 @@ from models.advice.choice.systems.ride import opened
 from models.core.errors import InputError
 from models.core.scene_effects import without
 from models.engines import reference
+from models.engines.assembly import Settings
 from models.engines.catalogue import RECOMMENDED as INTEGRATORS
-from models.engines.protocol import Settings, build
+from models.engines.protocol import build
 from models.engines.spatial_protocol import build as build_spatial
 from models.engines.spatial_reference import SpatialReference
 from models.ride.nonlinear_copies import March, copies_in_time
@@ -19,11 +20,10 @@ from models.ride.statistical_linearisation import statistically_linear
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.hub_forces.scene import build as build_hubs
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects import lift_off
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.scene import settings_of
 from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import check_linear, excitation_of, vehicle_of
 from models.systems.ride.scene import build as build_ride

@@ -11,15 +11,17 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused, RunFailed
-from models.engines import beside_reference
+from models.engines import outside
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED
 from models.engines.outside import register
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation import conformity
 from validation.common import checks, wrong_engines
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.scenes import force_scene, road_scene
 
 
 def of_the_readme():
@@ -127,7 +129,7 @@ def test_a_scipy_solver_of_a_dozen_lines_agrees_with_the_reference(own, tmp_path
     Between its own steps, 0.01 s at most, scipy interpolates to 1.3e-8; a jump read half a step late costs 1e-5.
     """
     name = own(Scipy)
-    write_forces(simulate(road_scene(duration=SHORT), "reference"), tmp_path, 5e-3)
+    write_measurement(simulate(road_scene(duration=SHORT), "reference"), tmp_path, 5e-3)
     scenes = [
         road_scene(duration=SHORT),
         force_scene(tmp_path, duration=SHORT),
@@ -199,15 +201,15 @@ def test_wrong_integrators_are_told_in_a_run_and_right_ones_say_how_near_they_ar
 
 def test_the_comparison_with_the_reference_can_see(monkeypatch):
     """The fault to be seen: an allowance that explains everything."""
-    monkeypatch.setattr(beside_reference, "_expected", lambda *given: 1e9)
-    monkeypatch.setattr(beside_reference, "CEILING", 1e9)
+    monkeypatch.setattr(outside, "_expected", lambda *given: 1e9)
+    monkeypatch.setattr(outside, "CEILING", 1e9)
     assert len(wrong_engines.passed()) == len(wrong_engines.WRONG)
 
 
 def test_an_engine_of_its_own_runs_and_what_it_cannot_do_is_refused(own, tmp_path):
     name = own(Engine)
     run = simulate(road_scene(duration=SHORT), "reference")
-    write_forces(run, tmp_path, 5e-3)
+    write_measurement(run, tmp_path, 5e-3)
     assert np.array_equal(simulate(road_scene(duration=SHORT), name).states, run.states)
     guided = force_scene(tmp_path, duration=SHORT, effects={"prescribed_pitch": {"file": "pitch.csv"}})
     with pytest.raises(Refused, match="does not solve for a prescribed pitch"):

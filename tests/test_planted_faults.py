@@ -99,7 +99,7 @@ def test_a_fault_lives_only_while_its_model_works():
         (exudyn.Clock, "advance"),
         (exudyn.Clock, "reader"),
         (exudyn.ExudynModel, "_enforced"),
-        (mujoco, "_spec"),
+        (mujoco, "specification"),
         (mujoco, "_suspension"),
         (mujoco, "_guidance"),
         (equations, "suspension"),

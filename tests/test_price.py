@@ -342,7 +342,7 @@ def test_description_of_seconds():
 
 def test_force_calls_seen_from_outside():
     """Each adapter's counts against MuJoCo's timers and Exudyn's own calls of a load, 50 steps each."""
-    from models.systems.pitch_plane.assembly import assemble
+    from models.systems.pitch_plane.scene import assemble
     from validation.price.force_calls import counted
     from validation.price.problems.road_excited import scene, setting, settings_of
 
@@ -385,8 +385,9 @@ def test_defaults_are_those_of_the_installed_engines():
 
 
 def test_every_force_in_one_callback_gives_the_native_path():
-    from models.engines.protocol import Settings, build
-    from models.systems.pitch_plane.assembly import assemble
+    from models.engines.assembly import Settings
+    from models.engines.protocol import build
+    from models.systems.pitch_plane.scene import assemble
     from validation.common.scenes import VEHICLES, road_scene
     from validation.price.compiled_forces import CompiledForces
 

@@ -4,9 +4,8 @@ import pytest
 
 from models.core.errors import RunFailed
 from models.engines import mujoco as adapter
-from models.engines.protocol import Settings
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.scene import build
+from models.engines.assembly import Settings
+from models.systems.pitch_plane.scene import assemble, build
 
 
 def test_a_run_that_blows_up_is_one_error_and_nothing_else(tmp_path, monkeypatch, capfd):

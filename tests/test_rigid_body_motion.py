@@ -5,8 +5,8 @@ import pytest
 
 from models.core.errors import InputError
 from models.sensors import rigid_body_motion as motion
-from models.sensors.high_pass import high_pass
 from models.sensors.rate_filter import filter_rates
+from models.sensors.rigid_body_motion import high_pass
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
 from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted

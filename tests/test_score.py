@@ -8,6 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.result import Result
 from models.drift.score import (
+    CHANNELS,
     Errors,
     Limits,
     Own,
@@ -17,12 +18,13 @@ from models.drift.score import (
     low_pass,
     own_figures,
     rms,
+    section_forces,
     verdict,
 )
-from models.drift.section_forces import CHANNELS, section_forces
 from models.fatigue.damage import damage_ratio, pseudo_damage, turning_points
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import force_scene, road_scene
 
 DURATION = 4.0
 OWN = Own(
@@ -51,7 +53,7 @@ GUIDED, SPRUNG, FREE = ("wheel_forces", "prescribed_pitch"), ("wheel_forces", "p
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("score")
     truth = simulate(road_scene(duration=DURATION), "reference")
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     return folder, truth
 
 

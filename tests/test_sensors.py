@@ -6,12 +6,11 @@ import pytest
 from models.core.errors import InputError
 from models.core.noise import GYRO, PITCH_SENSOR, normal
 from models.core.time_series import read_time_series
-from models.engines.protocol import Settings
-from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Settings
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, angle_variance, bias
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.sampling import write
-from models.systems.pitch_plane.scene import build
+from models.systems.pitch_plane.scene import assemble, build
 
 ENGINES = ("reference", "exudyn", "mujoco")
 

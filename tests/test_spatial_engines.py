@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, Refused, RunFailed
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, METHODS, at_speeds, build, jacobian
 from models.engines.spatial_reference import SpatialReference
 from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, TurnOutput, Tyre

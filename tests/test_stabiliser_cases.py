@@ -9,7 +9,6 @@ from models.core.errors import RunFailed
 from models.engines import exudyn, mujoco, reference
 from validation.cases import index_reduction as index_case
 from validation.cases import stabilisers as case
-from validation.drift import index_reduction
 from validation.hard_cases import stabilisers as hard
 from validation.hard_cases.case import judge
 
@@ -60,20 +59,20 @@ def test_the_balance_sees_a_force_without_its_sign(monkeypatch):
 
 
 def test_a_missing_projection_fails_its_row(monkeypatch, tmp_path):
-    monkeypatch.setattr(index_reduction.IndexOne, "_back", lambda self, y, u: y)
+    monkeypatch.setattr(index_case.IndexOne, "_back", lambda self, y, u: y)
     assert failed(index_case, tmp_path) == {"index_reduction.none.index_1.projection"}
 
 
 def test_a_wrong_multiplier_column_fails_every_law_at_index_1(monkeypatch, tmp_path):
     """The constraint on heave instead of pitch: nothing at index 1 follows any more."""
-    monkeypatch.setattr(index_reduction, "DIRECTION", np.array([[0.0, 0.0, 1.0, 0.0]]))
+    monkeypatch.setattr(index_case, "DIRECTION", np.array([[0.0, 0.0, 1.0, 0.0]]))
     assert {"index_reduction.law.index_1", "index_reduction.law.index_1.Baumgarte"} <= failed(index_case, tmp_path)
 
 
 def test_the_gap_law_is_the_damped_one():
     """Against its own differential equation by differences: g'' + 2 alpha g' + alpha^2 g = 0."""
     t = np.linspace(0, 1, 100_001)
-    g = index_reduction.gap_law(t, 1e-3, 2e-3, 7.0)
+    g = index_case.gap_law(t, 1e-3, 2e-3, 7.0)
     rate, step = np.gradient(g, t), t[1]
     second = np.diff(g, 2) / step**2
     assert np.abs(second + 14.0 * rate[1:-1] + 49.0 * g[1:-1]).max() < 1e-6  # differences of 1e-5: rounding 1e-8

@@ -8,13 +8,13 @@ import pytest
 from models.core.errors import InputError
 from models.core.signals import sampled
 from models.core.time_series import write_time_series
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import RECOMMENDED
-from models.engines.protocol import Settings, build
+from models.engines.protocol import build
 from models.engines.stability import first_order, linearised, step_matrix
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.plan import describe
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks

@@ -4,7 +4,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.scene_file import changed
-from models.ensemble.named_files import named_files
+from models.ensemble.store import named_files
 from studies.summary_numbers import numbers
 from studies.sweep import asked
 

@@ -16,15 +16,15 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.result import provenance
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.outside import register
-from models.engines.protocol import Settings
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common import checks
 from validation.common.rows import Independence, Row, System, at_most, behaves, not_run
-from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.scenes import VEHICLES, force_scene, road_scene
 from validation.hard_cases.case import Outcome, judge
 from validation.run import save, say
 
@@ -186,7 +186,7 @@ def _momentum_bound(name: str) -> float:
 def _paths(folder: Path) -> dict[str, Any]:
     """Scenes whose paths are compared: a road, and wheel forces read in two ways."""
     if not (folder / "wheel_forces.csv").exists():
-        write_forces(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
+        write_measurement(simulate(road_scene(duration=DURATION), "reference"), folder, STEP)
     return {
         "study road": road_scene(duration=DURATION),
         "wheel forces, linear": force_scene(folder, duration=DURATION),
@@ -251,7 +251,7 @@ def _guards(name: str, folder: Path) -> Row:
     run = simulate(road_scene(duration=DURATION), "reference")
     for channel in ("f1", "f2"):
         run.data[channel].values[:] *= 1e6
-    write_forces(run, throw, STEP)
+    write_measurement(run, throw, STEP)
     meant = {"file": "wheel_forces.csv", "interpolation": "linear", "accept": ["weight", "unit", "sign"]}
     try:
         scene = force_scene(throw, duration=DURATION, effects={"wheel_forces": meant})

@@ -43,6 +43,13 @@ MOVED = {
     "models.systems.ride.in_engines": "models.systems.ride.nonlinear",
     "models.advice.ride_choice.cost": "models.advice.ride_choice.march",
     "models.measured.scene": "models.systems.measured.scene",
+    "models.section_forces": "models.drift.score",
+    "models.sensors.gyro": "models.sensors.inertial_unit",
+    "models.sensors.high_pass": "models.sensors.rigid_body_motion",
+    "models.sensors.virtual_accelerometers": "models.sensors.sensor_array",
+    "models.vehicles.linear": "models.vehicles.description",
+    "models.ensemble.named_files": "models.ensemble.store",
+    "models.engines.beside_reference": "models.engines.outside",
     "validation.price.own_scene": "models.advice.price",
 }
 """Old names, of modules or of whole packages, and where their content is now."""

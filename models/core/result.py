@@ -1,6 +1,7 @@
 """Results: labelled arrays with units, counts and provenance, saved as netCDF; the only thing that a run saves."""
 
 import json
+import math
 import os
 import platform
 import subprocess
@@ -154,6 +155,20 @@ def joined(results: Mapping[str, Result], axis: str) -> Result:
     data.attrs["counts"] = json.dumps({name: one.counts() for name, one in results.items()})
     data.attrs["seconds"] = sum(one.seconds for one in every)
     return Result(data)
+
+
+def tabulated(scene: Any, rows: Sequence[Mapping[str, Any]], axis: str, **attributes: Any) -> Result:
+    """A table as a result: a channel per column of its rows, along ``axis``; seconds are left out, as they never
+    repeat.
+
+    Values are numbers, text, or None for no number; a name's unit is what it has in brackets, as "heave [m]".
+    """
+    columns = {name: [math.nan if row[name] is None else row[name] for row in rows] for name in rows[0]}
+    columns.pop("seconds", None)
+    units = {name: name.partition("[")[2].rstrip("]") for name in columns}
+    return result(
+        scene, {name: Channel(axis, values, units[name]) for name, values in columns.items()}, {}, **attributes
+    )
 
 
 def load(path: Path) -> Result:

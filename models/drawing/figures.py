@@ -47,6 +47,11 @@ plt.rcParams.update(
 )
 
 
+def heading(figure: Figure, title: str) -> None:
+    """Title of a whole figure, above its left edge."""
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write ``path`` (.svg or .png) without a date, close the figure and return the path."""
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}

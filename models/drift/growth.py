@@ -152,6 +152,13 @@ def holding_stiffness(p: Parameters, rate: float) -> float:
     return rigid_pitch(p).total * rate**2
 
 
+def spring_of(p: Parameters, frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """Spring to the ground of a natural frequency (Hz) of the pitch: k = (I + J) wc^2 in N m/rad, d = 2 zeta (I + J) wc
+    in N m s/rad."""
+    corner, inertia = 2 * math.pi * frequency, rigid_pitch(p).total
+    return inertia * corner**2, 2 * damping_ratio * inertia * corner
+
+
 def drift_off_time(rate: float, intensity: float, angle: float) -> float:
     """Time (s) by which half of all runs are more than ``angle`` (rad) off, for a constant growth rate (1/s).
 

@@ -95,13 +95,10 @@ def _check(deviation: float, step: float, mass: float, damping: float, length: f
     """Deviation, damping and length are zero or more, step and mass above zero, and all finite."""
     finite = all(map(math.isfinite, (deviation, step, mass, damping, length)))
     if not finite or min(deviation, damping, length) < 0 or min(step, mass) <= 0:
-        raise InputError(
-            "",
-            "point mass",
-            None,
-            f"none has deviation {deviation:g}, step {step:g}, mass {mass:g}, "
-            f"damping {damping:g} over {length:g} s or steps",
+        numbers = (
+            f"deviation {deviation:g}, step {step:g}, mass {mass:g}, damping {damping:g} over {length:g} s or steps"
         )
+        raise InputError("", "point mass", None, f"none has {numbers}")
 
 
 def paths(

@@ -18,7 +18,6 @@ from pydantic import Field
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.strict import Strict
-from models.drift.section_forces import CHANNELS, section_forces
 from models.fatigue.damage import SLOPE, damage_ratio
 from models.vehicles.pitch_plane import Parameters
 
@@ -305,3 +304,17 @@ def _step(run: Result) -> float:
             "or less: leave run.output_step out",
         )
     return float(steps.mean())
+
+
+CHANNELS = ("f3x", "f3z", "f4x", "f4z")
+"""Front and rear, along the chassis' forward axis and (in compression) along its vertical one."""
+
+
+def section_forces(f3: np.ndarray, f4: np.ndarray, pitch: np.ndarray) -> dict[str, np.ndarray]:
+    """Body-frame components (N) of the vertical suspension forces f3, f4 (N, compression positive), shape (n,) each.
+
+    pitch in rad, nose up. ``f3x`` is positive forward: with the nose up, an upward force points forward along the
+    chassis. ``f3z`` is positive in compression, that is up along the chassis' own vertical.
+    """
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    return {"f3x": f3 * sine, "f3z": f3 * cosine, "f4x": f4 * sine, "f4z": f4 * cosine}

@@ -1,18 +1,20 @@
-"""What engines build and run of the pitch-plane vehicle: bodies, struts, input, initial state."""
+"""What engines are given of the pitch-plane vehicle, bodies, struts, input and settings, and what they give: a path."""
 
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from models.core.signals import Signal
 from models.vehicles import pitch_plane
-from models.vehicles.description import Vehicle
+from models.vehicles.description import PitchSpring, Vehicle
 
 Mode = Literal["free", "road", "force", "force-body", "pitch", "heave-pitch"]
 GUIDED: dict[str, tuple[int, ...]] = {"pitch": (3,), "heave-pitch": (2, 3)}
 """Coordinates that a mode's input prescribes, by their place in the state. The input is then the two wheel forces,
 these coordinates, their rates and their second derivatives."""
+Channels = dict[str, tuple[str, str, np.ndarray]]
+"""Name -> unit, meaning, values (n,)."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,68 @@ class Assembly:
         assert self.mode in ("force", "force-body") and signal.channels == 1 and not signal.held
         return replace(self, moment=signal)
 
+    def with_spring(self, spring: PitchSpring) -> "Assembly":
+        """The same, with one more rotational spring to the ground."""
+        springs = (*self.vehicle.pitch_springs, spring)
+        return replace(self, vehicle=replace(self.vehicle, pitch_springs=springs))
+
     def without_tyres(self) -> "Assembly":
         """The same, cut off the road."""
         struts = tuple(strut for strut in self.vehicle.struts if strut.lower.body is not None)
         return replace(self, vehicle=replace(self.vehicle, struts=struts))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to integrate: integrator by its engine's name, step and duration in s."""
+
+    integrator: str
+    step: float
+    duration: float
+    tolerance: float = 1e-9
+    spectral_radius: float = 0.6
+
+    @property
+    def steps(self) -> int:
+        """Number of fixed steps that cover the duration."""
+        return round(self.duration / self.step)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """times (n,), states (n, 8), and what the run cost in counts.
+
+    enforced (n, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
+    (N m, nose up); None where nothing is.
+    """
+
+    times: np.ndarray
+    states: np.ndarray
+    enforced: np.ndarray | None = None
+    counts: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def moment(self) -> np.ndarray | None:
+        """Moment (n,) in N m that the prescribed pitch takes."""
+        return None if self.enforced is None else self.enforced[:, -1]
+
+    @property
+    def force(self) -> np.ndarray | None:
+        """Force (n,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
+        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]
+
+
+class Model(Protocol):
+    """A vehicle built in one engine."""
+
+    def run(self) -> Trajectory:
+        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
+        ...
+
+    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+        ...
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        ...

@@ -10,17 +10,18 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as items
+import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
-from models.engines.protocol import Settings, Trajectory, balanced, guard, landings_followed
-from models.vehicles.description import PitchSpring, Point, Strut
-from models.vehicles.linear import matrices
+from models.engines.protocol import balanced, guard, landings_followed
+from models.vehicles.description import PitchSpring, Point, Strut, matrices
 
 exu.config.printToConsole = False
+items: Any = typed_items
+"""Its type hints do not know that a function is a user function."""
 Reader = Callable[[Any, float, float], float]
 """What Exudyn asks at a stage's time: (system, s, constant load) -> value."""
 
@@ -36,7 +37,6 @@ class Build:
     mbs: Any
     places: dict[tuple[str, str], Any] = field(default_factory=dict)
     nodes: dict[str, Any] = field(default_factory=dict)
-    ground: Any = None
     callbacks: int = 0
 
 
@@ -44,91 +44,95 @@ def _exact(assembly: Assembly) -> Build:
     """Point masses, a rigid body, and vertical springs between points: exact in sin and cos of pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    built = Build(container, mbs, ground=mbs.AddObject(items.ObjectGround()))
-    bodies = {}
+    built = Build(container, mbs)
+    bodies: dict[str | None, Any] = {None: mbs.AddObject(items.ObjectGround())}
     for body in assembly.vehicle.bodies:
         if body.pitch_inertia is None:
             node = mbs.AddNode(items.NodePoint2D())
-            bodies[body.name] = mbs.AddObject(items.MassPoint2D(nodeNumber=node, mass=body.mass))
+            item: Any = items.MassPoint2D(nodeNumber=node, mass=body.mass)
         else:
             node = mbs.AddNode(items.NodeRigidBody2D())
-            bodies[body.name] = mbs.AddObject(
-                items.RigidBody2D(nodeNumber=node, mass=body.mass, inertia=body.pitch_inertia)
-            )
+            item = items.RigidBody2D(nodeNumber=node, mass=body.mass, inertia=body.pitch_inertia)
+        bodies[body.name] = mbs.AddObject(item)
+        if body.pitch_inertia is not None:
             built.places[body.name, "pitch"] = _marker(mbs, node, 2)
         built.nodes[body.name] = node
         built.places[body.name, "z"] = _marker(mbs, node, 1)
         weight = body.mass * assembly.vehicle.gravity
         mbs.AddLoad(items.LoadCoordinate(markerNumber=built.places[body.name, "z"], load=weight))
+
+    def end(point: Point) -> Any:  # x is counted backward in Exudyn's plane
+        return mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=bodies[point.body], localPosition=[-point.x, 0, 0]))
+
     for strut in (strut for strut in assembly.vehicle.struts if not strut.pushes_only):
-        _strut(mbs, strut, lambda point: _point(built, bodies, point))
+        mbs.AddObject(
+            items.CartesianSpringDamper(
+                markerNumbers=[end(strut.lower), end(strut.upper)],
+                stiffness=[0, strut.stiffness, 0],
+                damping=[0, strut.damping, 0],
+            )
+        )
     for spring in assembly.vehicle.pitch_springs:
         _pitch_spring(built, spring)
     return built
 
 
-def _point(built: Build, bodies: dict[str, Any], point: Point) -> Any:
-    """Position marker of a point; x is counted backward in Exudyn's plane."""
-    body = built.ground if point.body is None else bodies[point.body]
-    return built.mbs.AddMarker(items.MarkerBodyPosition(bodyNumber=body, localPosition=[-point.x, 0, 0]))
+def ground_marker(mbs: Any) -> Any:
+    """A new coordinate that stands still."""
+    return _marker(mbs, mbs.AddNode(items.NodePointGround()), 0)
 
 
-def _strut(mbs: Any, strut: Strut, marker: Callable[[Point], Any]) -> None:
-    mbs.AddObject(
-        items.CartesianSpringDamper(
-            markerNumbers=[marker(strut.lower), marker(strut.upper)],
-            stiffness=[0, strut.stiffness, 0],
-            damping=[0, strut.damping, 0],
+def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
+    return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+
+
+def _to_ground(built: Build, place: tuple[str, str], part: Strut | PitchSpring, law: Any = None) -> None:
+    """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
+    own = {} if law is None else {"springForceUserFunction": law}
+    built.callbacks += len(own)
+    built.mbs.AddObject(
+        items.CoordinateSpringDamper(
+            markerNumbers=[ground_marker(built.mbs), built.places[place]],
+            stiffness=part.stiffness,
+            damping=part.damping,
+            **own,
         )
     )
 
 
 def _pitch_spring(built: Build, spring: PitchSpring) -> None:
-    ground = built.mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
-    built.mbs.AddObject(
-        items.CoordinateSpringDamper(
-            markerNumbers=[ground, built.places[spring.body, "pitch"]],
-            stiffness=spring.stiffness,
-            damping=spring.damping,
-            **_dead_band(built, spring),
-        )
-    )
-
-
-def _dead_band(built: Build, spring: PitchSpring) -> dict[str, Any]:
-    """A law for a spring with a dead band, nothing for one without.
+    """A spring to the ground, with a law of its own where it has a dead band.
 
     Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
     """
-    if not spring.dead_band:
-        return {}
 
     def moment(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
         beyond = abs(angle) - spring.dead_band
         return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
 
-    built.callbacks += 1
-    return {"springForceUserFunction": moment}
+    _to_ground(built, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
+
+
+def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
+    """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
+    within a step."""
+
+    def force(mbs: Any, t: float, item: int, place: float, speed: float, k: float, d: float, offset: float) -> float:
+        pressed = k * (place - height(mbs, t, 0.0))
+        return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
+
+    _to_ground(built, (str(tyre.upper.body), "z"), tyre, force)
 
 
 def _linear(assembly: Assembly) -> Build:
     """One object with constant M, D, K: the vehicle linearised about zero pitch."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    built = Build(container, mbs)
     linear = tuple(strut for strut in assembly.vehicle.struts if not strut.pushes_only)
     mass, damping, stiffness = matrices(replace(assembly.vehicle, struts=linear))
     zero = [0.0] * len(mass)
-    node = mbs.AddNode(
-        items.NodeGenericODE2(
-            referenceCoordinates=zero,
-            initialCoordinates=zero,
-            initialCoordinates_t=zero,
-            numberOfODE2Coordinates=len(mass),
-        )
-    )
+    start = dict.fromkeys(("referenceCoordinates", "initialCoordinates", "initialCoordinates_t"), zero)
+    node = mbs.AddNode(items.NodeGenericODE2(**start, numberOfODE2Coordinates=len(mass)))
     weight = [body.mass * assembly.vehicle.gravity for body in assembly.vehicle.bodies]
     mbs.AddObject(
         items.ObjectGenericODE2(
@@ -139,16 +143,11 @@ def _linear(assembly: Assembly) -> Build:
             forceVector=[*weight, *zero[len(weight) :]],
         )
     )
-    for i, place in enumerate(assembly.vehicle.coordinates()):
-        built.places[place] = _marker(mbs, node, i)
-    built.nodes = {"vehicle": node}
+    places = {place: _marker(mbs, node, i) for i, place in enumerate(assembly.vehicle.coordinates())}
+    built = Build(container, mbs, places, {"vehicle": node})
     for spring in (spring for spring in assembly.vehicle.pitch_springs if spring.dead_band):
         _pitch_spring(built, spring)
     return built
-
-
-def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
-    return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
 
 
 def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
@@ -170,30 +169,6 @@ def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
             _load(built, (axle.wheel, "z"), clock.reader(i, -1.0))
 
 
-def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> None:
-    """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
-    within a step."""
-    wheel = str(tyre.upper.body)
-
-    def force(mbs: Any, t: float, item: int, place: float, speed: float, k: float, d: float, offset: float) -> float:
-        pressed = k * (place - height(mbs, t, 0.0))
-        return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
-
-    law: Any = force  # its type hints do not know that a function is one
-    ground = built.mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
-    built.mbs.AddObject(
-        items.CoordinateSpringDamper(
-            markerNumbers=[ground, built.places[wheel, "z"]],
-            stiffness=tyre.stiffness,
-            damping=tyre.damping,
-            springForceUserFunction=law,
-        )
-    )
-    built.callbacks += 1
-
-
 def _flat(mbs: Any, t: float, load: float) -> float:
     """Height and rate of the road where there is no other."""
     return 0.0
@@ -204,7 +179,7 @@ def _load(built: Build, place: tuple[str, str], function: Any) -> None:
     built.callbacks += 1
 
 
-def _body_fixed(built: Build, wheel: str, x: float, force: Callable[[Any, float, float], float]) -> None:
+def _body_fixed(built: Build, wheel: str, x: float, force: Reader) -> None:
     """A force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
     node, coordinates = built.nodes["chassis"], exu.OutputVariableType.Coordinates
 
@@ -221,21 +196,16 @@ def _prescribe(built: Build, assembly: Assembly, settings: Settings) -> list[Any
         return []
     table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1).T.tolist()
     places = [assembly.vehicle.coordinates()[i] for i in assembly.guided]
-    return [
-        _constraint(built, place, table[2 + i], table[2 + len(places) + i], 2.0 / settings.step)
-        for i, place in enumerate(places)
-    ]
+    paths, rates = table[2 : 2 + len(places)], table[2 + len(places) :]
+    return [_constraint(built, *path, 2.0 / settings.step) for path in zip(places, paths, rates, strict=False)]
 
 
 def _constraint(built: Build, place: tuple[str, str], path: list[float], rate: list[float], per_time: float) -> Any:
     """A coordinate that follows a path given at half steps."""
-    ground = built.mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
     built.callbacks += 2
     return built.mbs.AddObject(
         items.CoordinateConstraint(
-            markerNumbers=[ground, built.places[place]],
+            markerNumbers=[ground_marker(built.mbs), built.places[place]],
             offsetUserFunction=lambda mbs, t, item, offset: path[round(t * per_time)],
             offsetUserFunction_t=lambda mbs, t, item, offset: rate[round(t * per_time)],
         )
@@ -252,39 +222,27 @@ class ExudynModel:
             self.clock = Clock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
         for i, tyre in enumerate(tyre for tyre in assembly.vehicle.tyres if tyre.pushes_only):
-            read = (
-                (_flat, _flat) if assembly.input is None else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
-            )
-            _pushing_tyre(self.built, tyre, *read)
+            flat = assembly.input is None
+            height, rate = (_flat, _flat) if flat else (self.clock.reader(i, 1.0), self.clock.reader(2 + i, 1.0))
+            _pushing_tyre(self.built, tyre, height, rate)
         if assembly.moment is not None:
             _load(self.built, ("chassis", "pitch"), Clock(assembly.moment, settings).reader(0, 1.0))
         self.constraints = _prescribe(self.built, assembly, settings)
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
-        self._sensors = self._add_sensors()
-        self.built.mbs.Assemble()
-        self._columns = self._find_columns()
-        self._set_state(assembly.initial)
-
-    def _add_sensors(self) -> list[tuple[Any, Any]]:
-        kinds = exu.OutputVariableType
-
-        def sensor(node: Any, kind: Any) -> Any:
-            return self.built.mbs.AddSensor(
-                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=kind)
-            )
-
-        nodes = self.built.nodes.values()
-        sensors = [(sensor(node, kinds.Coordinates), sensor(node, kinds.Coordinates_t)) for node in nodes]
+        kinds, kept = exu.OutputVariableType, {"storeInternal": True, "writeToFile": False}
+        mbs, nodes = self.built.mbs, self.built.nodes.values()
+        self._sensors = [
+            [mbs.AddSensor(items.SensorNode(nodeNumber=node, outputVariableType=kind, **kept)) for node in nodes]
+            for kind in (kinds.Coordinates, kinds.Coordinates_t)
+        ]
         self._multipliers = [
-            self.built.mbs.AddSensor(
-                items.SensorObject(
-                    objectNumber=constraint, storeInternal=True, writeToFile=False, outputVariableType=kinds.Force
-                )
-            )
+            mbs.AddSensor(items.SensorObject(objectNumber=constraint, outputVariableType=kinds.Force, **kept))
             for constraint in self.constraints
         ]
-        return sensors
+        mbs.Assemble()
+        self._columns = self._find_columns()
+        self._set_state(assembly.initial)
 
     def _find_columns(self) -> list[int]:
         """Place of each of the four coordinates within Exudyn's vector."""
@@ -308,10 +266,8 @@ class ExudynModel:
 
     def _wanted(self, time: float) -> np.ndarray:
         """Accelerations of the prescribed coordinates, if any."""
-        guided = self.assembly.guided
-        return (
-            np.empty(0) if not guided or self.assembly.input is None else self.assembly.input.at(time)[-len(guided) :]
-        )
+        signal, count = self.assembly.input, len(self.assembly.guided)
+        return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
 
     def _free_acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """The same with nothing enforced on prescribed coordinates."""
@@ -403,20 +359,14 @@ class ExudynModel:
     def _recorded(self) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and states (n, 8) from the sensors; heave is y, pitch the rotation."""
         read = self.built.mbs.GetSensorStoredData
-        positions = [read(position) for position, _ in self._sensors]
-        rates = [read(rate) for _, rate in self._sensors]
-        times = positions[0][:, 0]
+        halves = [[read(sensor) for sensor in sensors] for sensors in self._sensors]
+        times = halves[0][0][:, 0]
         if self.assembly.vehicle.geometry == "linear":
-            return times, np.hstack([positions[0][:, 1:], rates[0][:, 1:]])
-        halves = [
-            np.column_stack([part[0][:, 2], part[1][:, 2], part[2][:, 2], part[2][:, 3]]) for part in (positions, rates)
-        ]
-        return self._on_grid(times), np.hstack(halves)
-
-    def _on_grid(self, times: np.ndarray) -> np.ndarray:
-        """Fixed steps are counted; Exudyn accumulates them and ends 1e-13 early."""
-        counted = self.settings.step * np.arange(len(times))
-        return counted if np.allclose(times, counted, rtol=0, atol=1e-9 * max(1.0, self.settings.duration)) else times
+            return times, np.hstack([half[0][:, 1:] for half in halves])
+        states = [column for front, rear, body in halves for column in (front[:, 2], rear[:, 2], *body[:, 2:].T)]
+        grid = self.settings.step * np.arange(len(times))  # Exudyn adds up its steps and ends 1e-13 early
+        fixed = np.allclose(times, grid, rtol=0, atol=1e-9 * max(1.0, self.settings.duration))
+        return grid if fixed else times, np.column_stack(states)
 
     def _enforced(self) -> np.ndarray | None:
         """Enforced force and moment (n, constraints): the multipliers, with the sign of loads on the chassis.

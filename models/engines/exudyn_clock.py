@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from models.core.signals import Signal
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings
 
 
 class Clock:

@@ -17,9 +17,9 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.mujoco_quiet import quiet
-from models.engines.protocol import Settings, Trajectory, guard, landings_followed
+from models.engines.protocol import guard, landings_followed
 from models.vehicles.description import Strut, Vehicle
 
 INTEGRATORS = {
@@ -34,7 +34,7 @@ CHUNK = 4096
 """Steps between two looks at the guard."""
 
 
-def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
+def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
     """Bodies and joints without those of ``guided`` coordinates, which stand still at zero."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -59,17 +59,16 @@ def _spec(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) ->
         if (body.name, "pitch") in joints:
             own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     for strut in (strut for strut in vehicle.struts if not strut.pushes_only):
-        _tyre(spec, strut) if strut.lower.body is None else _suspension(spec, vehicle, strut, joints)
+        if strut.lower.body is None:
+            joint = spec.joint(f"{strut.upper.body} z")
+            joint.stiffness[0], joint.damping[0] = strut.stiffness, strut.damping
+        else:
+            _suspension(spec, vehicle, strut, joints)
     for spring in (spring for spring in vehicle.pitch_springs if not spring.dead_band):
         joint = spec.joint(f"{spring.body} pitch")
         joint.stiffness[0] += spring.stiffness
         joint.damping[0] += spring.damping
     return spec
-
-
-def _tyre(spec: mujoco.MjSpec, strut: Strut) -> None:
-    joint = spec.joint(f"{strut.upper.body} z")
-    joint.stiffness[0], joint.damping[0] = strut.stiffness, strut.damping
 
 
 def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set[tuple[str, str]]) -> None:
@@ -94,18 +93,6 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         biasprm=[0, -strut.stiffness, -strut.damping, *[0] * 7],
     )
-
-
-def _held(spec: mujoco.MjSpec, vehicle: Vehicle, gear: float) -> None:
-    """One motor per wheel for forces that stay constant over a step; they come first among the controls."""
-    for axle in vehicle.axles:
-        spec.add_actuator(
-            name=f"{axle.name} force",
-            target=f"{axle.wheel} z",
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            gear=[gear, 0, 0, 0, 0, 0],
-            gainprm=[1.0 if gear else 0.0, *[0] * 9],
-        )
 
 
 @dataclass
@@ -156,9 +143,8 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
     """Forces (rows, 2 or 3) on the free heave coordinates that the input stands for; motors apply held ones."""
     if assembly.mode == "road":
         tyres = assembly.vehicle.tyres
-        return np.column_stack(
-            [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
-        )
+        pushes = [tyre.stiffness * inputs[:, i] + tyre.damping * inputs[:, 2 + i] for i, tyre in enumerate(tyres)]
+        return np.column_stack(pushes)
     held = assembly.input is not None and assembly.input.held
     forces = np.zeros((len(inputs), 2)) if held else -inputs[:, :2]
     if not assembly.guided:
@@ -188,9 +174,16 @@ def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 def _compiled(assembly: Assembly, settings: Settings, drive: Drive, guided: Collection[int] = ()) -> mujoco.MjModel:
     """The model with its input table in its numeric data, behind what ``mujoco_callback`` reads before it."""
-    spec = _spec(assembly.vehicle, settings, guided)
-    if drive.controls is not None:
-        _held(spec, assembly.vehicle, 0.0 if drive.arms is not None else -1.0)
+    spec = specification(assembly.vehicle, settings, guided)
+    gear = 0.0 if drive.arms is not None else -1.0
+    for axle in assembly.vehicle.axles if drive.controls is not None else ():  # motors for forces held over a step
+        spec.add_actuator(
+            name=f"{axle.name} force",
+            target=f"{axle.wheel} z",
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gear=[gear, 0, 0, 0, 0, 0],
+            gainprm=[1.0 if gear else 0.0, *[0] * 9],
+        )
     if drive.law is None:
         return spec.compile()
     arms = (0.0, 0.0) if drive.arms is None else drive.arms
@@ -211,6 +204,7 @@ class MujocoModel:
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
+        self.signal: Any = assembly.input
         self.guided = list(assembly.guided)
         self.free = [i for i in range(4) if i not in self.guided]
         self.drive = _drive(assembly, settings)
@@ -233,13 +227,14 @@ class MujocoModel:
             self._advance(states, [*self.free, *(4 + i for i in self.free)])
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
-            inputs = self._signal().sample(0.0, self.settings.step, n + 1)
+            inputs = self.signal.sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
         guard("mujoco", times, states, self.settings.duration, self.warnings())
         landings_followed("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, enforced=enforced)
-        return Trajectory(times, states, enforced, self._counts())
+        calls = n * STAGES.get(self.settings.integrator, 1)
+        return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
     def _advance(self, states: np.ndarray, free: list[int]) -> None:
         """March in chunks, so that a run that has failed is not carried to its end."""
@@ -247,8 +242,7 @@ class MujocoModel:
         state = np.concatenate(([0.0], states[0, free]))
         for first in range(0, n, CHUNK):
             count = min(CHUNK, n - first)
-            controls = None if self.drive.controls is None else self.drive.controls[first : first + count]
-            controls = self.padded(controls)
+            controls = None if self.drive.controls is None else self.padded(self.drive.controls[first : first + count])
             path, _ = rollout.rollout(self.model, self.data, state[None, :], control=controls, nstep=count)
             path = path[0, :, :size]
             states[first + 1 : first + 1 + count, free] = path[:, 1:]
@@ -263,10 +257,8 @@ class MujocoModel:
         guard("mujoco", self.settings.step * np.arange(last + 1), states[: last + 1], last * self.settings.step)
         raise RunFailed("mujoco", f"the engine gave up{self.warnings()}", last * self.settings.step, states[last])
 
-    def padded(self, controls: np.ndarray | None) -> np.ndarray | None:
+    def padded(self, controls: np.ndarray) -> np.ndarray:
         """Controls of all actuators: springs take none, the wheels' motors come last."""
-        if controls is None:
-            return None
         padded = np.zeros((1, len(controls), self.model.nu))
         padded[0, :, self.model.nu - 2 :] = controls
         return padded
@@ -286,23 +278,22 @@ class MujocoModel:
 
         return installed(self.drive.law)
 
-    def _signal(self) -> Any:
-        assert self.assembly.input is not None
-        return self.assembly.input
-
     def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
         """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+        out = np.empty(4)
+        with self.callback():
+            out[self.free] = self._free_acceleration(time, state, round(time / self.settings.step))
+        if self.guided:
+            out[self.guided] = self.signal.at(time)[-len(self.guided) :]
+        return out
+
+    def _free_acceleration(self, time: float, state: np.ndarray, step: int) -> np.ndarray:
+        """Of the coordinates that are not prescribed, within a step of the run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, state[:4][self.free], state[4:][self.free]
         if self.drive.controls is not None:
-            row = min(round(time / self.settings.step), len(self.drive.controls) - 1)
-            self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[row]
-        with self.callback():
-            mujoco.mj_forward(self.model, self.data)
-        out = np.empty(4)
-        out[self.free] = self.data.qacc
-        if self.guided:
-            out[self.guided] = self._signal().at(time)[-len(self.guided) :]
-        return out
+            self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]
+        mujoco.mj_forward(self.model, self.data)
+        return self.data.qacc
 
     def _enforced(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Force and moment (n, guided) that the prescribed motion takes: inverse dynamics with all joints.
@@ -311,7 +302,12 @@ class MujocoModel:
         """
         full = _compiled(self.assembly, self.settings, Drive())
         data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
-        accelerations = self._accelerations(times, states)
+        accelerations = np.empty((len(times), 4))
+        with self.callback():
+            for i, time in enumerate(times):
+                accelerations[i, self.free] = self._free_acceleration(time, states[i], i)
+        signal = self.signal.sample(0.0, self.settings.step, len(times))
+        accelerations[:, self.guided] = signal[:, -len(self.guided) :]
         for i, state in enumerate(states):
             data.qpos[:], data.qvel[:], data.qacc[:] = state[:4], state[4:], accelerations[i]
             mujoco.mj_inverse(full, data)
@@ -319,33 +315,11 @@ class MujocoModel:
             enforced[i] = data.qfrc_inverse[self.guided] - data.qfrc_actuator[self.guided]
         return enforced
 
-    def _accelerations(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Accelerations (n, 4) along a guided run."""
-        signal = self._signal().sample(0.0, self.settings.step, len(times))
-        out = np.empty((len(times), 4))
-        with self.callback():
-            for i, time in enumerate(times):
-                positions, rates = np.split(states[i], 2)
-                self.data.time, self.data.qpos[:], self.data.qvel[:] = time, positions[self.free], rates[self.free]
-                if self.drive.controls is not None:
-                    self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(i, len(self.drive.controls) - 1)]
-                mujoco.mj_forward(self.model, self.data)
-                out[i, self.free] = self.data.qacc
-        out[:, self.guided] = signal[:, -len(self.guided) :]
-        return out
-
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
         native = self.model.nu + self.model.ntendon + int((self.model.jnt_stiffness != 0).sum())
-        return {
-            "degrees of freedom": self.model.nv,
-            "native items": native,
-            "callbacks": int(self.drive.law is not None),
-        }
-
-    def _counts(self) -> dict[str, int]:
-        n = self.settings.steps
-        return {"steps": n, "force calls": n * STAGES.get(self.settings.integrator, 1)}
+        law = int(self.drive.law is not None)
+        return {"degrees of freedom": self.model.nv, "native items": native, "callbacks": law}
 
 
 def build(assembly: Assembly, settings: Settings) -> MujocoModel:

@@ -5,7 +5,7 @@ An integrator has ``integrate(f, times, start, tolerance)``, which returns state
 ``(assembly, settings)`` and has ``run()``, which returns something with ``times`` (n,) and ``states`` (n, 8), and
 ``acceleration(time, state)`` (4,). Either says its ``order``, and ``adaptive = True`` if it keeps a tolerance instead
 of taking steps of fixed length. What it returns passes the guard that every run passes and is compared with the
-reference (beside_reference.py); what it raises is a failed run.
+reference (``beside_reference``); what it raises is a failed run.
 
 ::
 
@@ -21,17 +21,18 @@ import math
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from models.core.errors import InputError, RunFailed
-from models.engines.assembly import Assembly
+from models.engines import protocol
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
-from models.engines.protocol import Model, Settings, Trajectory, guard
+from models.engines.protocol import guard
 from models.engines.reference import Reference, derivative_of
 
 HIGHEST = 20
@@ -134,22 +135,12 @@ class Integrated(Reference):
         """States (n, 8) at the times, and how often the right-hand side was asked for."""
         states, calls = np.empty((len(times), 8)), [0]
         y = states[0] = self.assembly.initial
-        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
-        small = 1e-9 * self.settings.step
-        for start, end in pairwise((0.0, *knots, times[-1])):
-            inside = slice(*np.searchsorted(times, (start + small, end + small)))
+        for start, end, inside in self._stretches(times, times[-1]):
             within = times[inside]
-            last = [] if len(within) and within[-1] > end - small else [end]
+            last = [] if len(within) and within[-1] > end - 1e-9 * self.settings.step else [end]
             grid = np.array([start, *within, *last])
-            answer = _asked(
-                self.name,
-                "integrate",
-                self.integrate,
-                self._rhs(start, end, calls),
-                grid,
-                y.copy(),
-                self.settings.tolerance,
-            )
+            asked = (self._rhs(start, end, calls), grid, y.copy(), self.settings.tolerance)
+            answer = _asked(self.name, "integrate", self.integrate, *asked)
             found = _numbers(self.name, "integrate", answer, (len(grid), 8))
             states[inside], y = found[1 : 1 + len(within)], found[-1]
             if not np.isfinite(y).all():
@@ -201,3 +192,56 @@ class Guarded:
         """What was built, as far as the engine says."""
         blank = {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
         return blank | dict(getattr(self.model, "plan", dict)())
+
+
+TIGHT = 1e-10
+"""Tolerance of the reference's own run."""
+MARGIN, FLOOR, CEILING = 100.0, 1e-5, 0.1
+"""A run is refused beyond so many times the expected error, of the largest motion; but not below the first share of
+that motion (between their own steps, methods interpolate to 3e-6), and always beyond the second."""
+
+
+def beside_reference(engine: str, assembly: Assembly, settings: Settings, run: Trajectory) -> str:
+    """Say how far a run is from the reference; raises RunFailed where its order and step cannot explain that."""
+    try:
+        truth = _of_reference(assembly, replace(settings, integrator="DOP853", tolerance=TIGHT))
+    except (InputError, RunFailed) as error:
+        return f"nothing was compared with it: the reference gives no run of this scene ({error})"
+    gap, where = relative_gap(run, truth)
+    allowed = min(max(MARGIN * _expected(engine, assembly, settings, truth), FLOOR), CEILING)
+    if not gap <= allowed:
+        raise RunFailed(
+            engine,
+            f"its states are {100 * gap:.3g} % of the largest motion away from the reference at "
+            f"{where:.3g} s, where its order and step explain at most {100 * allowed:.3g} %: "
+            f"`twinrig validate --engine {engine}` says what is wrong",
+        )
+    return f"states within {gap:.1e} of the largest motion from the reference"
+
+
+def relative_gap(run: Trajectory, truth: Trajectory) -> tuple[float, float]:
+    """Largest distance of the states (n, 8) by the largest motion in truth of the same kind, and its time in s.
+
+    Kinds are heights, pitch, and the rates of each; where nothing moves, a millimetre or milliradian counts.
+    """
+    states = CubicSpline(truth.times, truth.states)(run.times)
+    motion = np.abs(truth.states - truth.states[0]).max(axis=0)
+    sizes = np.concatenate([np.full(3, motion[:3].max()), motion[3:4], np.full(3, motion[4:7].max()), motion[7:]])
+    gaps = (np.abs(run.states - states) / np.maximum(sizes, 1e-3)).max(axis=1)
+    worst = int(gaps.argmax())
+    return float(gaps[worst]), float(run.times[worst])
+
+
+def _of_reference(assembly: Assembly, settings: Settings) -> Trajectory:
+    return protocol.build("reference", assembly, settings).run()
+
+
+def _expected(engine: str, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
+    """Relative error that the stated order and step make likely; of an adaptive method, its tolerance."""
+    if getattr(OUTSIDE[engine], "adaptive", False):
+        return settings.tolerance
+    try:
+        gap, _ = relative_gap(_of_reference(assembly, replace(settings, integrator="RK4")), truth)
+    except (InputError, RunFailed):
+        return CEILING  # too coarse for RK4: only what no step explains is told
+    return float(gap ** (min(CATALOGUE[engine][settings.integrator].order, 4) / 4))

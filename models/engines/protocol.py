@@ -5,9 +5,7 @@ and can be asked for its acceleration at any state, for the build audit.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,11 +13,9 @@ from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
 from models.core.steps import divides, fitting
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
 from models.engines.stability import check_step
-
-if TYPE_CHECKING:
-    from models.engines.assembly import Assembly
 
 BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
 """Rows at which a multiplier is checked, rows at the start that may ring, and the accepted share of its rms.
@@ -32,86 +28,31 @@ SIZE_BOUND = 1e4
 """A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How to integrate: integrator by its engine's name, step and duration in s."""
-
-    integrator: str
-    step: float
-    duration: float
-    tolerance: float = 1e-9
-    spectral_radius: float = 0.6
-
-    @property
-    def steps(self) -> int:
-        """Number of fixed steps that cover the duration."""
-        return round(self.duration / self.step)
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """times (n,), states (n, 8), and what the run cost in counts.
-
-    enforced (n, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
-    (N m, nose up); None where nothing is.
-    """
-
-    times: np.ndarray
-    states: np.ndarray
-    enforced: np.ndarray | None = None
-    counts: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def moment(self) -> np.ndarray | None:
-        """Moment (n,) in N m that the prescribed pitch takes."""
-        return None if self.enforced is None else self.enforced[:, -1]
-
-    @property
-    def force(self) -> np.ndarray | None:
-        """Force (n,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
-        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]
-
-
-class Model(Protocol):
-    """A vehicle built in one engine."""
-
-    def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
-        ...
-
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
-        ...
-
-    def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
-        ...
-
-
-def build(engine: str, assembly: "Assembly", settings: Settings) -> Model:
+def build(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Build an assembly in an engine by name; raises Refused where the engine would answer wrongly."""
     check(engine, assembly, settings)
     return unchecked(engine, assembly, settings)
 
 
-def unchecked(engine: str, assembly: "Assembly", settings: Settings) -> Model:
+def unchecked(engine: str, assembly: Assembly, settings: Settings) -> Model:
     """Build it without asking whether the engine would answer rightly."""
     if engine in OUTSIDE:
         return import_module("models.engines.outside").build(engine, assembly, settings)
     return import_module(f"models.engines.{engine}").build(assembly, settings)
 
 
-def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
+def check(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Refuse combinations that no integrator treats correctly."""
     integrator = CATALOGUE[engine][settings.integrator]
     if (engine, settings.integrator) in MISSING:
         raise Refused(engine, MISSING[engine, settings.integrator])
     _whole(engine, settings.step, "the duration", settings.duration)
     if assembly.guided and not integrator.constraints:
+        right = (name for name, known in CATALOGUE[engine].items() if known.constraints)
         raise Refused(
             engine,
             f"{settings.integrator} does not solve for a prescribed pitch: its enforced moment would "
-            f"be wrong without a word; use {_constrained(engine)}",
+            f"be wrong without a word; use {' or '.join(right)}",
         )
     if assembly.guided and settings.integrator == "GeneralizedAlpha" and settings.spectral_radius > 0.95:
         raise Refused(
@@ -123,10 +64,6 @@ def check(engine: str, assembly: "Assembly", settings: Settings) -> None:
         if signal is not None:
             _reading(engine, integrator, settings, signal)
     check_step(engine, assembly, settings)
-
-
-def _constrained(engine: str) -> str:
-    return " or ".join(name for name, integrator in CATALOGUE[engine].items() if integrator.constraints)
 
 
 def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Signal) -> None:
@@ -210,18 +147,13 @@ def _fail(engine: str, times: np.ndarray, states: np.ndarray, note: str, enforce
     sane = finite & (np.abs(np.where(np.isfinite(states), states, 0)) < SIZE_BOUND).all(axis=1)
     forward = np.concatenate(([True], np.diff(times) > 0))
     first = np.flatnonzero(~(sane & forward & np.isfinite(times)))[0]
-    reason, last = _reason(bool(finite[first]), bool(sane[first])), first - 1
+    grown = "time ran backwards" if sane[first] else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
+    reason, last = grown if finite[first] else "the state became infinite or not a number", first - 1
     raise RunFailed(engine, reason + note, times[last] if last >= 0 else None, states[last] if last >= 0 else None)
 
 
-def _reason(finite: bool, sane: bool) -> str:
-    if not finite:
-        return "the state became infinite or not a number"
-    return "time ran backwards" if sane else f"the state grew beyond {SIZE_BOUND:g}: no vehicle any more"
-
-
 def landings_followed(
-    engine: str, assembly: "Assembly", settings: Settings, times: np.ndarray, states: np.ndarray
+    engine: str, assembly: Assembly, settings: Settings, times: np.ndarray, states: np.ndarray
 ) -> None:
     """Raise RunFailed where fixed steps were too long for what tyres that only push met: a step that is stable on the
     road may still jump over a landing.

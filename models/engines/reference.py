@@ -1,7 +1,7 @@
 """The hand-written reference: the paper's equations, a compiled fixed-step Runge-Kutta, scipy's adaptive solvers."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 
 from models.core.errors import RunFailed
 from models.core.signals import Stacked
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, Trajectory, guard, landings_followed
+from models.engines.protocol import guard, landings_followed
 from models.machine.compiled import named, njit
 from models.vehicles.pitch_plane_equations import ADDED, RIGHT_HAND_SIDES, numbers
 
@@ -74,13 +74,6 @@ def _sum(rhs, added):
     return register_jitable(named(total, rhs.__name__, added.__name__))
 
 
-def _equations(assembly: Assembly) -> str:
-    """Which right-hand side holds: a flat road is a road, too."""
-    if any(strut.pushes_only for strut in assembly.vehicle.struts):
-        return "lift-off"
-    return "road" if assembly.mode == "free" else assembly.mode
-
-
 @dataclass
 class Reference:
     """The vehicle as compiled equations."""
@@ -90,9 +83,10 @@ class Reference:
 
     def __post_init__(self) -> None:
         own = self.assembly
-        springs = own.vehicle.pitch_springs
-        self._added = (*(("springs",) if springs else ()), *(("moment",) if own.moment is not None else ()))
-        self._key = (_equations(own), own.vehicle.geometry, *self._added)
+        terms = {"springs": own.vehicle.pitch_springs, "moment": own.moment is not None}
+        lifts = any(strut.pushes_only for strut in own.vehicle.struts)
+        equations = "lift-off" if lifts else "road" if own.mode == "free" else own.mode  # a flat road is a road, too
+        self._key = (equations, own.vehicle.geometry, *(term for term, there in terms.items() if there))
         self._input = own.input if own.input is None or own.moment is None else Stacked((own.input, own.moment))
         self._p = numbers(own.parameters, own.vehicle)
 
@@ -150,14 +144,10 @@ class Reference:
     def _adaptive(self) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
         """Piecewise between the knots of the input, so that each piece is smooth."""
         h, n = self.settings.step, self.settings.steps
-        times = h * np.arange(n + 1)
-        states = np.empty((n + 1, 8))
+        times, states = h * np.arange(n + 1), np.empty((n + 1, 8))
         y = states[0] = self.assembly.initial
-        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
-        edges = np.concatenate(([0.0], knots, [self.settings.duration]))
         steps = calls = 0
-        for start, end in pairwise(edges):
-            inside = slice(*np.searchsorted(times, (start + 1e-9 * h, end + 1e-9 * h)))
+        for start, end, inside in self._stretches(times, self.settings.duration):
             within = times[inside]
             dense = bool(len(within)) and within[0] < end - 1e-9 * h  # else a row at the end at most, which is y there
             solution = self._piece(start, end, y, dense)
@@ -168,6 +158,13 @@ class Reference:
         states[-1] = y
         self._guide(states)
         return times, states, {"steps": steps, "force calls": calls}
+
+    def _stretches(self, times: np.ndarray, last: float) -> Iterator[tuple[float, float, slice]]:
+        """Start and end (s) of each stretch between knots of the input, and the rows of ``times`` (n,) within."""
+        knots = np.empty(0) if self._input is None else self._input.knots(self.settings.duration)
+        small = 1e-9 * self.settings.step
+        for start, end in pairwise((0.0, *knots, last)):
+            yield start, end, slice(*np.searchsorted(times, (start + small, end + small)))
 
     def _piece(self, start: float, end: float, y: np.ndarray, dense: bool):
         derivative, p, at = derivative_of(*self._key), self._p, self._reader(start, end)

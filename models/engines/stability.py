@@ -14,17 +14,12 @@ is stiffest: a tilt shortens the struts' arms. What is not linear is left to the
 import math
 from collections.abc import Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.core.errors import Refused
-from models.vehicles.description import Vehicle
-from models.vehicles.linear import matrices
-
-if TYPE_CHECKING:
-    from models.engines.assembly import Assembly
-    from models.engines.protocol import Settings
+from models.engines.assembly import Assembly, Settings
+from models.vehicles.description import Vehicle, matrices
 
 Linear = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """M, D, K, the part of D that an engine knows of (no callbacks) and the part of that which sits on single joints
@@ -81,20 +76,19 @@ def step_matrix(integrator: str, step: float, linear: Linear) -> np.ndarray | No
     """
     polynomial = coefficients(integrator)
     if polynomial is not None:
-        return _polynomial(polynomial, step * first_order(linear))
+        z = step * first_order(linear)
+        out = np.zeros_like(z)
+        for coefficient in reversed(polynomial):
+            out = out @ z + coefficient * np.eye(len(z))
+        return out
     if integrator == "VelocityVerlet":
         return _verlet(step, linear)
     *_, native, joint = linear
-    implicit = {"Euler": joint, "implicit": _within_trees(native), "implicitfast": np.diag(native.diagonal())}
+    alone = np.diag(native.diagonal())
+    within_trees = alone.copy()  # between coordinates of one body, not across branches
+    within_trees[2:, 2:] = native[2:, 2:]
+    implicit = {"Euler": joint, "implicit": within_trees, "implicitfast": alone}
     return _semi_implicit(step, linear, implicit[integrator]) if integrator in implicit else None
-
-
-def _polynomial(polynomial: list[float], z: np.ndarray) -> np.ndarray:
-    """R(z) by Horner's rule."""
-    out = np.zeros_like(z)
-    for coefficient in reversed(polynomial):
-        out = out @ z + coefficient * np.eye(len(z))
-    return out
 
 
 def _verlet(step: float, linear: Linear) -> np.ndarray:
@@ -118,13 +112,6 @@ def _semi_implicit(step: float, linear: Linear, implicit: np.ndarray) -> np.ndar
     q, v = np.eye(2 * n)[:n], np.eye(2 * n)[n:]
     after = v - step * np.linalg.solve(mass + step * implicit, stiffness @ q + damping @ v)
     return np.vstack([q + step * after, after])
-
-
-def _within_trees(damping: np.ndarray) -> np.ndarray:
-    """The damping that MuJoCo's ``implicit`` sees: between coordinates of one body, not across branches."""
-    out = np.diag(damping.diagonal())
-    out[2:, 2:] = damping[2:, 2:]
-    return out
 
 
 def growth(integrator: str, step: float, duration: float, linear: Linear) -> float:
@@ -151,25 +138,20 @@ def limit(integrator: str, step: float, duration: float, linear: Linear) -> floa
     return stable
 
 
-def check_step(engine: str, assembly: "Assembly", settings: "Settings") -> None:
+def check_step(engine: str, assembly: Assembly, settings: Settings) -> None:
     """Refuse a step at which a mode of the vehicle would grow, naming the limit and the fastest pole."""
     linear = linearised(assembly.vehicle, assembly.guided)
     grown = growth(settings.integrator, settings.step, settings.duration, linear)
     if grown <= math.log(GROWTH):
         return
     longest = limit(settings.integrator, settings.step, max(settings.duration, LONG_RUN * settings.step), linear)
+    scale = 10.0 ** (math.floor(math.log10(longest)) - 2)  # three digits, rounded down: a limit that is named must hold
     raise Refused(
         engine,
-        f"step {settings.step:g} s exceeds the stability limit {_down(longest):g} s of "
+        f"step {settings.step:g} s exceeds the stability limit {math.floor(longest / scale) * scale:g} s of "
         f"{settings.integrator} for this vehicle (fastest pole {_pole(linear)}): an error would grow "
         f"1e{grown / math.log(10):.0f}-fold over the run; shorten the step",
     )
-
-
-def _down(value: float) -> float:
-    """Three digits, rounded down: a limit that is named must hold."""
-    scale = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return math.floor(value / scale) * scale
 
 
 def _pole(linear: Linear) -> str:

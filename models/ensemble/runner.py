@@ -122,7 +122,8 @@ def run_paths(
             kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
             more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
             raise RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
-        return _together([lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))])
+        blocks = [lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))]
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
 def _compute(
@@ -219,7 +220,3 @@ def _said(error: BaseException) -> _Failure:
     full = isinstance(error, OSError) and error.errno in FULL
     said = str(error) if full or isinstance(error, PathFailed | RunFailed) else f"{type(error).__name__}: {error}"
     return _Failure(said, full)
-
-
-def _together(blocks: list[Arrays]) -> Arrays:
-    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}

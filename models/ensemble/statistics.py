@@ -9,6 +9,8 @@ from models.core.errors import InputError
 FEWEST = 3
 ERRORS_95 = 1.959964
 """Standard errors on either side of a 95 % interval."""
+FAN = (5, 25, 50, 75, 95)
+"""Percentiles of a figure."""
 
 
 def deviation(values: np.ndarray) -> tuple[float, float]:
@@ -25,6 +27,11 @@ def deviation(values: np.ndarray) -> tuple[float, float]:
     if spread == 0.0:
         return 0.0, 0.0
     return spread, math.sqrt(max(fourth - second**2, 0.0) / len(values)) / (2 * math.sqrt(second))
+
+
+def percentiles(errors: np.ndarray) -> np.ndarray:
+    """Percentiles FAN of the magnitude of errors (paths, times), shape (5, times); failed paths are left out."""
+    return np.nanpercentile(np.abs(errors), FAN, axis=0)
 
 
 def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:

@@ -3,12 +3,15 @@
 import hashlib
 import io
 import json
+import os
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -52,13 +55,11 @@ class Store:
         kept = _read_note(file)
         for key in (*own, *kept):
             if own.get(key) != kept.get(key):
-                raise InputError(
-                    file,
-                    key,
-                    kept.get(key),
-                    f"this folder belongs to another job: {own.get(key)!r} is "
-                    "asked for here; resume with what it was begun with, or begin in a new folder",
+                allowed = (
+                    f"this folder belongs to another job: {own.get(key)!r} is asked for here; resume with what it was "
+                    "begun with, or begin in a new folder"
                 )
+                raise InputError(file, key, kept.get(key), allowed)
 
     def path(self, block: int) -> Path:
         """File of a block."""
@@ -137,3 +138,53 @@ def code(root: Path) -> str:
     for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml", ".csv", ".dat")):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def named_files(value: Any, folder: Path) -> dict[str, str]:
+    """Checksum of each file by the text that names it, from ``folder`` or from where the command runs.
+
+    value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
+    named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
+    """
+    found: dict[str, str] = {}
+    _collect(value, folder, found, set())
+    return found
+
+
+def _collect(value: Any, folder: Path, found: dict[str, str], seen: set[Path]) -> None:
+    if isinstance(value, dict | list | tuple):
+        for inner in value.values() if isinstance(value, dict) else value:
+            _collect(inner, folder, found, seen)
+    elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in seen:
+        seen.add(path.resolve())
+        content = path.read_bytes()
+        found[value] = found.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
+        if path.suffix == ".toml":
+            _collect(_table(content), path.parent, found, seen)
+
+
+def _file(text: str, folder: Path) -> Path | None:
+    """The file that a text names, if it names one."""
+    before, _, _ = text.rpartition(":")
+    for path in (folder / text, Path(text), folder / before, Path(before)):
+        if text and os.path.isfile(path):
+            return path
+    return _of_module(before)
+
+
+def _of_module(name: str) -> Path | None:
+    if not name or not all(part.isidentifier() for part in name.split(".")):
+        return None
+    try:
+        spec = find_spec(name)
+    except (ImportError, ValueError):
+        return None
+    return Path(spec.origin) if spec and spec.origin and os.path.isfile(spec.origin) else None
+
+
+def _table(content: bytes) -> Any:
+    """Contents of a TOML file; nothing if it is none, which reading the scene says."""
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except ValueError:
+        return None

@@ -35,19 +35,19 @@ def filter_rates(
     filter leaves out: between neighbouring predictions, and between a prediction and the measurement after it.
     """
     if not noise > 0:
-        raise InputError(
-            "",
-            "noise",
-            noise,
-            "the standard deviation of the readings must be above 0 (m/s^2): it weighs integration against measurement",
+        allowed = (
+            "the standard deviation of the readings must be above 0 (m/s^2): it weighs integration against measurement"
         )
+        raise InputError("", "noise", noise, allowed)
     frame, planar = found.array.frame, found.array.planar
     pairs = PAIRS[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * EYE
     filter_.Q = np.diag((period * noise * found.array.own_gains(planar)) ** 2)
-    filter_.R = np.diag([(noise * _spread(found, pair)) ** 2 for pair in pairs])
+    squares = found.array.inverse_squares
+    spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
+    filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
     values = np.column_stack([0.5 * (found.gradient[:, i, j] + found.gradient[:, j, i]) for i, j in pairs])
     known, rows = own_acceleration(found, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
@@ -56,12 +56,6 @@ def filter_rates(
         rows.append((filter_.x.copy(), filter_.P))
     rates, covariances = (np.array(part) for part in zip(*rows, strict=True))
     return rates @ frame.T, np.sqrt(np.einsum("ij,njk,ik->ni", frame, covariances, frame))
-
-
-def _spread(found: Spin, pair: tuple[int, int]) -> float:
-    """Noise of one entry of the symmetric part per unit of the readings' (1/m)."""
-    inverse, (i, j) = found.array.inverse_squares, pair
-    return float(np.sqrt(inverse[i] if i == j else (inverse[i] + inverse[j]) / 4))
 
 
 def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) -> None:

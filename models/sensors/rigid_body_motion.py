@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import InputError
-from models.sensors.high_pass import high_pass
 from models.sensors.rotations import cardan, from_cardan, integrals, integrate, matrix, skew
 from models.sensors.sensor_array import SensorArray, sensor_array
 
@@ -68,6 +67,12 @@ class Start:
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @staticmethod
+    def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "Start":
+        """Of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
+        level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
+        return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 
 
 @dataclass(frozen=True)
@@ -295,3 +300,35 @@ def _filtered(values: np.ndarray, period: float, cut_off: float | None) -> np.nd
 def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = 9.81) -> np.ndarray:
     """False horizontal displacement (n,) in m of a constant tilt error (rad), by gravity: g sin(tilt) t^2 / 2."""
     return 0.5 * gravity * np.sin(tilt) * times**2
+
+
+ORDER = 2
+"""Order of the Butterworth filter, which runs forwards and backwards: no phase, half the amplitude at the cut-off."""
+
+
+def check_cut_off(count: int, period: float, cut_off: float, file: str = "", place: str = "high-pass") -> None:
+    """Refuse a cut-off (Hz) that ``count`` samples every ``period`` (s) cannot carry."""
+    if not 0 < cut_off < 0.5 / period:
+        raise InputError(file, place, cut_off, f"the cut-off must lie between 0 and {0.5 / period:g} Hz")
+    if count <= round(1 / (cut_off * period)):
+        raise InputError(
+            file,
+            place,
+            cut_off,
+            f"a record of {(count - 1) * period:g} s is shorter than one period of "
+            f"the cut-off, {1 / cut_off:g} s: raise the cut-off",
+        )
+
+
+def high_pass(values: np.ndarray, period: float, cut_off: float) -> np.ndarray:
+    """Values (n, ...) without what is slower than ``cut_off`` (Hz), sampled every ``period`` (s).
+
+    A Butterworth filter of order ORDER run forwards and backwards, so that the amplitude falls by 1 / (1 + (fc/f)^4)
+    and nothing is delayed; the ends are extended by their mirror image, which
+    keeps the mean that is taken out. Raises InputError as ``check_cut_off`` does.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    check_cut_off(len(values), period, cut_off)
+    sections = butter(ORDER, cut_off, "highpass", fs=1 / period, output="sos")
+    return sosfiltfilt(sections, values, axis=0, padtype="even", padlen=round(1 / (cut_off * period)))

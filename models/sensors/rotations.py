@@ -109,13 +109,8 @@ def _check_turned(rates: np.ndarray, period: float) -> None:
     """Refuse rates that say too little of what lies between their samples."""
     fastest = float(np.linalg.norm(rates, axis=-1).max())
     if fastest * period > HALF:
-        raise InputError(
-            "",
-            "rates",
-            fastest,
-            f"must be at most {HALF / period:.4g} rad/s for samples every "
-            f"{period:g} s, half a turn from one to the next: are they in degrees?",
-        )
+        samples = f"for samples every {period:g} s, half a turn from one to the next: are they in degrees?"
+        raise InputError("", "rates", fastest, f"must be at most {HALF / period:.4g} rad/s {samples}")
 
 
 def integrals(values: np.ndarray, period: float) -> np.ndarray:

@@ -14,6 +14,8 @@ from models.vehicles.description import Axle, Body, Geometry, Point, Strut, Vehi
 
 STATES = ("z1", "z2", "z3", "pitch")
 """Names of the coordinates; the state is these four and their rates."""
+STATE_NAMES = (*STATES, *(f"{name}_rate" for name in STATES))
+"""Names of the eight states, as of their channels."""
 
 
 class Parameters(Strict):

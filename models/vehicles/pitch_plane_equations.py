@@ -14,11 +14,12 @@ into a caller, which keeps them cacheable.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
-from models.vehicles.description import Vehicle
+from models.vehicles.description import Geometry, Vehicle
 from models.vehicles.pitch_plane import Parameters
 
 
@@ -35,6 +36,15 @@ def suspension(y, p, sine, cosine):
     f3 = p[8] * (y[2] - y[0] - b * sine) + p[12] * (y[6] - y[4] - b * y[7] * cosine)
     f4 = p[9] * (y[2] - y[1] + a * sine) + p[13] * (y[6] - y[5] + a * y[7] * cosine)
     return f3, f4
+
+
+def suspension_loads(y: Any, p: Parameters, geometry: Geometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Suspension forces f3, f4 (N, compression) and their moment on the chassis (N m, nose up), (n,) each, at states y,
+    eight arrays (n,); eqs (35), (36)."""
+    exact = geometry == "exact"
+    sine, cosine = (np.sin(y[3]), np.cos(y[3])) if exact else (y[3], np.ones_like(y[3]))
+    f3, f4 = suspension(y, p.array(), sine, cosine)
+    return f3, f4, cosine * (p.b * f3 - p.a * f4)
 
 
 @register_jitable

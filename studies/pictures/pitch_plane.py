@@ -7,10 +7,9 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import Channels, outputs
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as scene_of
-from models.systems.pitch_plane.scene import settings_of
 from models.vehicles.pitch_plane import equilibrium
 from studies.pictures.camera import Camera
 from studies.pictures.film import Arrow, Curve, Kind, Motion, Poses, Stage, Strut, of_exudyn, of_mujoco

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import GRAVITY, excitation_of, vehicle_of

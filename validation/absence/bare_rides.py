@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.engines.protocol import Settings, guard
+from models.engines.assembly import Settings
+from models.engines.protocol import guard
 from models.engines.spatial_protocol import INTEGRATORS, build
 from models.machine.timing import interleave, paired_ratio
 from models.ride.copies_kernel import POWERS, march

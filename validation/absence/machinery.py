@@ -59,36 +59,36 @@ def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, flo
     return float(gap), paired_ratio(*interleave(jobs, rounds, clock=time.process_time))
 
 
+def made_by_more(job: Callable[[int], Callable[[], Any]], short: int = SHORT, long: int = 10 * SHORT) -> int:
+    """Arrays that more steps of a job make; job(steps) gives it."""
+    jobs = [job(steps) for steps in (short, long)]
+    for warm in jobs:
+        warm()
+    few, many = map(arrays, jobs)
+    return many - few
+
+
 def made_by_wheelset(which: int) -> int:
     """Arrays that more steps of the bare wheelset (0) or the written one (1) make."""
-    short, long = (wheelsets(steps)[which] for steps in (SHORT, 10 * SHORT))
-    short(), long()
-    return arrays(long) - arrays(short)
+    return made_by_more(lambda steps: wheelsets(steps)[which])
 
 
 def made_by_ride() -> int:
     """Arrays that more steps of a bare ride make, in MuJoCo, where all its forces are compiled, and as copies."""
-    made = 0
-    for jobs in (partial(rides, "mujoco"), copies):
-        short, long = (jobs(steps)[0] for steps in (SHORT, 10 * SHORT))
-        short(), long()
-        made += arrays(long) - arrays(short)
-    return made
+    return made_by_more(lambda steps: rides("mujoco", steps)[0]) + made_by_more(lambda steps: copies(steps)[0])
 
 
 def made_by_car() -> int:
     """Arrays that more steps of a bare car of a scene of handling make in MuJoCo."""
-    short, long = (cars(steps)[0] for steps in (SHORT, 10 * SHORT))
-    short(), long()
-    return arrays(long) - arrays(short)
+    return made_by_more(lambda steps: cars(steps)[0])
 
 
 def made_by_hubs(engine: str) -> int:
     """Arrays that more steps of a bare vehicle driven by its hub forces make."""
     scene = bare("hub-forces")
-    short, long = (hub_forces.job(scene, engine, steps) for steps in (hub_forces.STEPS // 4, hub_forces.STEPS))
-    short(), long()
-    return arrays(long) - arrays(short)
+    most = hub_forces.STEPS
+    most = hub_forces.STEPS
+    return made_by_more(lambda steps: hub_forces.job(scene, engine, steps), most // 4, most)
 
 
 def made_by_braking(engine: str) -> tuple[int, int]:
@@ -110,57 +110,22 @@ def rows() -> list[Row]:
     """Arrays made in the loops of bare scenes."""
     made, samples = zip(*map(made_by_braking, braking.ENGINES), strict=True)
     why = "a short run against a long one, by the count of numba's own memory; no effect is there that could make one"
-    return [
-        at_most(
-            "absent.wheelset.arrays",
-            SYSTEM,
-            "arrays that 360 more steps of a bare wheelset make",
-            made_by_wheelset(0),
-            "",
-            0,
-            why,
-            "none",
-        ),
-        at_most(
-            "absent.ride.arrays",
-            SYSTEM,
-            "arrays that 360 more steps of a bare ride make in MuJoCo and as copies",
-            made_by_ride(),
-            "",
-            0,
-            why,
-            "none",
-        ),
-        at_most(
-            "absent.handling.arrays",
-            SYSTEM,
-            "arrays that 360 more steps of a bare car make in MuJoCo",
-            made_by_car(),
-            "",
-            0,
-            why,
-            "none",
-        ),
-        at_most(
-            "absent.hub-forces.arrays",
-            SYSTEM,
-            "arrays that 15 more steps of a bare vehicle driven by its hub "
-            "forces make in the reference, Exudyn and MuJoCo together",
+    counted = {
+        "wheelset": ("360 more steps of a bare wheelset make", made_by_wheelset(0)),
+        "ride": ("360 more steps of a bare ride make in MuJoCo and as copies", made_by_ride()),
+        "handling": ("360 more steps of a bare car make in MuJoCo", made_by_car()),
+        "hub-forces": (
+            "15 more steps of a bare vehicle driven by its hub forces make in the reference, Exudyn and MuJoCo "
+            "together",
             sum(map(made_by_hubs, hub_forces.ENGINES)),
-            "",
-            0,
-            why,
-            "none",
         ),
-        at_most(
-            "absent.braking.arrays",
-            SYSTEM,
-            f"arrays that {samples[0]} more samples of a bare braked vehicle "
-            "make in compiled code of the reference, Exudyn and MuJoCo together, in four steps each",
+        "braking": (
+            f"{samples[0]} more samples of a bare braked vehicle make in compiled code of the reference, Exudyn and "
+            "MuJoCo together, in four steps each",
             sum(made),
-            "",
-            0,
-            why,
-            "none",
         ),
+    }
+    return [
+        at_most(f"absent.{name}.arrays", SYSTEM, f"arrays that {what}", count, "", 0, why, "none")
+        for name, (what, count) in counted.items()
     ]

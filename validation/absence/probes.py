@@ -14,25 +14,17 @@ from dataclasses import dataclass
 from typing import Any
 from unittest import mock
 
-from models.engines.protocol import Model
+from models.engines.assembly import Model
 
 CALLBACKS = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor", "time")
 """MuJoCo's callbacks, all global to the process."""
 
 PROBE = """
 import json, sys
-from models.systems.pitch_plane.assembly import assemble
-from models.engines.protocol import build
-from models.systems.pitch_plane.scene import settings_of
-from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.run import outputs
-scene = build_scene(json.loads(sys.argv[1]), "probe", sys.argv[2])
-states = {}
-for engine in ("reference", "exudyn", "mujoco"):
-    assembly = assemble(scene)
-    trajectory = build(engine, assembly, settings_of(scene, engine)).run()
-    states[engine] = trajectory.states.tobytes().hex()
-    outputs(assembly, trajectory)
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import build
+scene = build(json.loads(sys.argv[1]), "probe", sys.argv[2])
+states = {engine: run(scene, engine).detail.states.tobytes().hex() for engine in ("reference", "exudyn", "mujoco")}
 reference = sys.modules["models.engines.reference"]
 print(json.dumps({
     "modules": sorted(sys.modules),
@@ -62,7 +54,6 @@ def belongs_to_effects(module: str) -> bool:
         "models.sensors",
         "models.core.time_series",
         "models.core.tables",
-        "models.systems.pitch_plane.prescribed",
         "models.engines.mujoco_callback",
         "models.engines.mujoco_layout",
         "pyopencrg",

@@ -11,14 +11,14 @@ import numpy as np
 from models.core.scene_effects import module_of, names_of, without
 from models.core.systems import DEFAULT
 from models.core.time_series import write_time_series
-from models.engines.protocol import Model, build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.engines.assembly import Model
+from models.engines.protocol import build
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
-from validation.common.rows import Row, System, at_most, behaves
+from validation.common.rows import Measured, Row, System, at_most, behaves
 
 TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
@@ -83,9 +83,7 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
 
 def counts(own: Scene, engine: str) -> dict[str, int]:
     """What a scene builds in an engine, and how many channels it saves."""
-    assembly = assemble(own)
-    built = build(engine, assembly, settings_of(own, engine))
-    return {**built.plan(), "channels": len(outputs(assembly, built.run(), built))}
+    return {**model(own, engine).plan(), "channels": len(run(own, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
@@ -100,7 +98,7 @@ def declared(effect: str, engine: str) -> dict[str, int]:
     return {key: value for key, value in {**table.get("all", {}), **table.get(engine, {})}.items() if value}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """All counts of absence, with a positive control of every effect; a quick run has each control in one engine,
     those of the vehicle in turn and of other systems every third, and one process that looks for what is imported.
     """

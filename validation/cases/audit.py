@@ -1,13 +1,12 @@
 """Build audit: accelerations at random states, before any trajectory."""
 
 from pathlib import Path
-from typing import Any
 
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.scene import settings_of
 from validation.common import checks
-from validation.common.rows import Row, System, at_most
+from validation.common.checks import acceleration_gap
+from validation.common.rows import Measured, System, at_most
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"
@@ -29,10 +28,10 @@ def scene(parameters: str, geometry: str = "exact"):
 def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
     """Largest difference to the reference, relative to the largest acceleration, over all states."""
     own = scene(parameters, geometry)
-    return checks.acceleration_gap(checks.engine(engine), assemble(own), settings_of(own, engine), STATES)
+    return acceleration_gap(checks.engine(engine), assemble(own), settings_of(own, engine), STATES)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """A row per engine, vehicle and geometry, the same in quick."""
     rows = [
         at_most(

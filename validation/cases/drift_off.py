@@ -8,23 +8,21 @@ d4 and I times a factor between 0.9 and 1.1, as in Fig. 7 of the paper).
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.result import Result
 from models.engines.assembly import Assembly
-from models.engines.protocol import build
 from models.ensemble.runner import run_paths
 from models.ensemble.statistics import quantile
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
-from models.systems.pitch_plane.trust import ANGLE, interpolation, model, noise
+from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.trust import ANGLE, Curve, interpolation, model, noise
+from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
 from models.vehicles.pitch_plane import Parameters
-from validation.common.rows import Row, System, Table, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, within
+from validation.common.scenes import drive, force_scene
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
@@ -44,7 +42,7 @@ class Combination:
 
     name: str
     source: str
-    road: dict[str, Any]
+    road: Data
     rate: float
     duration: float
     size: float = 0.0
@@ -71,13 +69,13 @@ COMBINATIONS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """A row per combination; quick: the first one, by few paths."""
-    found = [_combination(one, folder, quick) for one in (COMBINATIONS[:1] if quick else COMBINATIONS)]
-    return [_row(one) for one in found], {"combinations": found}
+    found = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
+    return [_row(figures) for figures in found], {"combinations": found}
 
 
-def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
+def _combination(one: Combination, folder: Path, quick: bool) -> Data:
     """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
     members = {"noise": _noise, "interpolation": _between, "model": _models}[one.source]
     predicted, measured = members(one, folder, QUICK_PATHS if quick else PATHS)
@@ -98,20 +96,13 @@ def _combination(one: Combination, folder: Path, quick: bool) -> dict[str, Any]:
     }
 
 
-def _truth(one: Combination, folder: Path, road: dict[str, Any], step: float = STEP) -> Result:
-    true = simulate(road_scene(step=step, duration=one.duration, road=road), "reference")
-    write_forces(true, folder, 1 / one.rate)
-    return true
-
-
 def _noise(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """One prediction, and the drift-off time of every path."""
-    step = 1e-3
-    true = _truth(one, folder, one.road, step)
+    true = drive(folder, one.duration, 1 / one.rate, road=one.road)
     effects = {"force_noise": {"deviation": one.size, "seed": SEED}}
-    scene = force_scene(folder, step=step, duration=one.duration, effects=effects)
+    scene = force_scene(folder, duration=one.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], ANGLE), paths)["drift_off"]
-    quiet = assemble(force_scene(folder, step=step, duration=one.duration))
+    quiet = assemble(force_scene(folder, duration=one.duration))
     return [noise(quiet, one.size).passes()], times.tolist()
 
 
@@ -122,41 +113,37 @@ def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | N
         one.road | ({"seed": i} if one.road["source"] == "iso8608" else {"speed": speed * factor})
         for i, factor in enumerate(SPEEDS)
     ]
-    pairs = [_undisturbed(one, folder, road) for road in roads]
-    return [predicted for predicted, _ in pairs], [measured for _, measured in pairs]
-
-
-def _undisturbed(one: Combination, folder: Path, road: dict[str, Any]) -> tuple[float | None, float]:
-    true = _truth(one, folder, road)
-    assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
-    return interpolation(assembly).passes(), _drift_off(assembly, true)
+    predicted, measured = [], []
+    for road in roads:
+        true = drive(folder, one.duration, 1 / one.rate, STEP, road=road)
+        assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
+        predicted.append(interpolation(assembly).passes())
+        measured.append(_drift_off(assembly, true))
+    return predicted, measured
 
 
 def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Random models, each predicted and run from the true start."""
-    true = _truth(one, folder, one.road)
+    true = drive(folder, one.duration, 1 / one.rate, STEP, road=one.road)
     assembly = assemble(force_scene(folder, step=STEP, duration=one.duration))
-    others = [_random_model(assembly.parameters, i) for i in range(MODELS)]
+    p, others = assembly.parameters, list[Parameters]()
+    for i in range(MODELS):
+        factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER))
+        others.append(p.model_copy(update=perturbed(p, dict(zip(PAPER, factors, strict=True)))))
     return (
         [model(assembly, other).passes() for other in others],
         [_drift_off(replace(assembly, parameters=other), true) for other in others],
     )
 
 
-def _random_model(p: Parameters, index: int) -> Parameters:
-    names = ("k3", "k4", "d3", "d4", "I")
-    factors = np.random.Generator(np.random.Philox(key=[SEED, index])).uniform(0.9, 1.1, len(names))
-    return p.model_copy(update={name: getattr(p, name) * f for name, f in zip(names, factors, strict=True)})
-
-
 def _drift_off(assembly: Assembly, true: Result) -> float:
     """First time (s) at which the run's pitch is ANGLE from the true one; infinite if never."""
-    run = build("reference", assembly, settings_of(assembly.scene, "reference")).run()
-    off = np.abs(run.states[:, 3] - true["pitch"]) > ANGLE
-    return float(run.times[off.argmax()]) if off.any() else np.inf
+    run = simulate(assembly.scene, "reference", assembly=assembly)
+    time = Curve(run.times, np.abs(run["pitch"] - true["pitch"])).passes()
+    return np.inf if time is None else time
 
 
-def _row(found: dict[str, Any]) -> Row:
+def _row(found: Data) -> Row:
     key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
     scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
     what = (
@@ -167,7 +154,7 @@ def _row(found: dict[str, Any]) -> Row:
     return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
@@ -198,7 +185,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Measured over predicted."""
     from models.drawing.figures import plt
 
@@ -209,17 +196,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for source, colour in (("noise", "#0072b2"), ("interpolation", "#d55e00"), ("model", "#009e73")):
         own = [one for one in data["combinations"] if one["source"].startswith(source)]
         if own:
-            middle, quartiles = np.array([one["median"] for one in own]), np.array([one["quartiles"] for one in own]).T
-            axis.errorbar(
-                [one["predicted"] for one in own],
-                middle,
-                np.abs(quartiles - middle),
-                fmt="o",
-                color=colour,
-                label=source,
-                markersize=4,
-                elinewidth=0.8,
+            predicted, middle, quartiles = (
+                np.array([one[k] for one in own]) for k in ("predicted", "median", "quartiles")
             )
+            spread = np.abs(quartiles.T - middle)
+            axis.errorbar(predicted, middle, spread, fmt="o", color=colour, label=source, markersize=4, elinewidth=0.8)
     axis.set(xlabel="predicted before the run [s]", ylabel="measured: median and quartiles [s]")
     axis.legend(loc="upper left")
     caption = "Time at which the pitch is 0.05 rad off, over roads, speeds, sampling rates and sources of error."

@@ -1,15 +1,15 @@
 """The paper's six runs beside its figures, and why they cannot all be reproduced."""
 
 from collections.abc import Collection
+from math import log2
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from models.core.systems import load
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from studies.six_runs import followed, row
-from validation.common.rows import Row, System, Table, finding, within
+from models.systems.pitch_plane.six_runs import followed, row
+from validation.common.rows import Data, Measured, System, Table, finding, within
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
@@ -81,7 +81,7 @@ FIGURES = (
 """Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
@@ -111,7 +111,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
                 "drift.moment.order",
                 SYSTEM,
                 "order in which the undisturbed moment falls with the period, 1000 to 2000 Hz",
-                _order(rates[1000.0]["moment max"], rates[2000.0]["moment max"]),
+                log2(rates[1000.0]["moment max"] / rates[2000.0]["moment max"]),
                 "",
                 2.0,
                 0.2,
@@ -126,7 +126,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     }
 
 
-def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, dict[str, Any]]:
+def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Data]:
     """Figures of the study's runs in the reference by name: of some, or of all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = followed(scene, Path(folder))
@@ -140,13 +140,7 @@ def _at_rate(rate: float) -> dict[str, float]:
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
-def _order(coarse: float, fine: float) -> float:
-    from math import log2
-
-    return log2(coarse / fine)
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
     rows = tuple(
         (

@@ -11,22 +11,23 @@ from typing import Any
 
 import numpy as np
 
+from models.core.noise import normal
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.drift.growth import growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
-from models.drift.section_forces import section_forces
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.drift.score import section_forces
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import Row, System, Table, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.scene import assemble
+from models.systems.pitch_plane.trust import Curve
+from models.vehicles.pitch_plane_equations import suspension_loads
+from validation.common.rows import Data, Measured, Row, System, Table, finding, within
+from validation.common.scenes import drive, force_scene
 
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
 SEED = 14
-ANGLE = 0.05
 RATE, DURATION = 50.0, 15.0
 """Sampling rate (Hz) of the runs by solver and their length (s): few samples, as adaptive solvers restart at each."""
 SOLVERS = (
@@ -69,7 +70,7 @@ SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
@@ -79,24 +80,18 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
 
 
-def _truth(folder: Path, duration: float, rate: float) -> Result:
-    true = simulate(road_scene(step=2.5e-4, duration=duration), "reference")
-    write_forces(true, folder, 1 / rate)
-    return true
-
-
-def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
+def _solvers(folder: Path, solvers: Any) -> list[Data]:
     """Drift-off (s) by solver: undisturbed with linear and with smooth samples, and noisy with linear ones.
 
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
     fixed steps.
     """
-    true = _truth(folder, DURATION, RATE)
+    true = drive(folder, DURATION, 1 / RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     found = []
     tight = solvers[1::2]
     fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
-    inputs: tuple[tuple[str, str, dict[str, Any], Any], ...] = (
+    inputs: tuple[tuple[str, str, Data, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
         ("noisy", "linear", noise, fixed),
@@ -104,16 +99,9 @@ def _solvers(folder: Path, solvers: Any) -> list[dict[str, Any]]:
     for name, rule, effects, chosen in inputs:
         scene = force_scene(folder, step=1e-3, duration=DURATION, interpolation=rule, effects=effects)
         assembly = assemble(scene)
-        found += [
-            {
-                "engine": engine,
-                "method": method,
-                "value": value,
-                "input": name,
-                **_drift(assembly, engine, method, value, true),
-            }
-            for engine, method, value in chosen
-        ]
+        for engine, method, value in chosen:
+            solver = {"engine": engine, "method": method, "value": value, "input": name}
+            found.append(solver | _drift(assembly, engine, method, value, true))
     return found
 
 
@@ -124,13 +112,13 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
         settings = Settings(method, 1e-3 if engine == "reference" else 5e-3, DURATION, value)
     run = build(engine, assembly, settings).run()
     error = np.abs(run.states[:, 3] - np.interp(run.times, true.times, true["pitch"]))
-    off = error > ANGLE
-    return {"drift-off": float(run.times[off.argmax()]) if off.any() else DURATION, "error": float(error[-1])}
+    time = Curve(run.times, error).passes()
+    return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
-def _smoothing(folder: Path) -> list[dict[str, Any]]:
+def _smoothing(folder: Path) -> list[Data]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
-    true = _truth(folder, NOISY, NOISY_RATE)
+    true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
     found = [
         _treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
@@ -144,7 +132,7 @@ def _smoothing(folder: Path) -> list[dict[str, Any]]:
 
 def _treated(
     name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
-) -> dict[str, Any]:
+) -> Data:
     forces = quiet.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
@@ -152,7 +140,7 @@ def _treated(
     rows = np.rint(np.array(WINDOW) / step).astype(int)
     spread = np.zeros(2)
     for path in range(PATHS):
-        noise = NOISE * _white(path, len(forces.values))
+        noise = NOISE * normal(SEED, path, len(forces.values), 2)
         spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
     growth, expected = (float(np.log(one[1] / one[0]) / np.diff(WINDOW)[0]) for one in (spread, law))
@@ -163,12 +151,6 @@ def _treated(
         "spread": float(spread[1]),
         **_bias(clean[:: round(1e-3 / step)], true, quiet),
     }
-
-
-def _white(path: int, count: int) -> np.ndarray:
-    from models.core.noise import normal
-
-    return normal(SEED, path, count, 2)
 
 
 def _run(engine: str, assembly: Assembly, values: np.ndarray, cutoff: float | None, settings: Settings) -> np.ndarray:
@@ -188,12 +170,10 @@ def _low_pass(values: np.ndarray, cutoff: float | None) -> np.ndarray:
 
 def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, float]:
     """Pseudo-damage of the front section force by the truth's, both components, without any noise, before drift-off."""
-    end, p = round(SCORED * NOISY_RATE), assembly.parameters
-    wanted = section_forces(true["f3"][::4][:end], true["f4"][::4][:end], true["pitch"][::4][:end])
-    y = states[:end]
-    sine, cosine = np.sin(y[:, 3]), np.cos(y[:, 3])
-    f3 = p.k3 * (y[:, 2] - y[:, 0] - p.b * sine) + p.d3 * (y[:, 6] - y[:, 4] - p.b * y[:, 7] * cosine)
-    found = section_forces(f3, f3, y[:, 3])
+    end = round(SCORED * NOISY_RATE)
+    wanted = section_forces(*(true[name][::4][:end] for name in ("f3", "f4", "pitch")))
+    f3, f4, _ = suspension_loads(states[:end].T, assembly.parameters, "exact")
+    found = section_forces(f3, f4, states[:end, 3])
     return {f"damage {name}": damage_ratio(found[name], wanted[name]) for name in ("f3x", "f3z")}
 
 
@@ -205,7 +185,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
 
 
-def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
+def _solver_rows(solvers: list[Data]) -> list[Row]:
     """Who drifts off when."""
     rows = []
     for name in ("linear", "noisy"):
@@ -245,7 +225,7 @@ def _solver_rows(solvers: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
+def _smoothing_rows(smoothing: list[Data]) -> list[Row]:
     """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
     rows = []
     for one in smoothing:
@@ -261,32 +241,18 @@ def _smoothing_rows(smoothing: list[dict[str, Any]]) -> list[Row]:
                 0.1,
                 f"the same {PATHS} noise files in all; their own chance is 3 %",
                 "closed form",
-            ),
-            finding(
-                f"drift_solvers.bias.{key}.f3z",
-                SYSTEM,
-                f"damage of the front section force, body z, {one['name']}, no noise, by the truth's",
-                one["damage f3z"],
-                "",
-                "1",
-                "what smoothing takes away",
-                "none",
-            ),
-            finding(
-                f"drift_solvers.bias.{key}.f3x",
-                SYSTEM,
-                f"the same, body x, {one['name']}",
-                one["damage f3x"],
-                "",
-                "1",
-                "what smoothing takes away",
-                "none",
-            ),
+            )
         ]
+        for axis, what in (
+            ("f3z", f"damage of the front section force, body z, {one['name']}, no noise, by the truth's"),
+            ("f3x", f"the same, body x, {one['name']}"),
+        ):
+            id, damage = f"drift_solvers.bias.{key}.{axis}", one[f"damage {axis}"]
+            rows.append(finding(id, SYSTEM, what, damage, "", "1", "what smoothing takes away", "none"))
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
         (one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
@@ -299,16 +265,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
     found = [Table("Drift-off by solver and interpolation", note, heads, rows)]
     if data["smoothing"]:
+        shown = {"growth": ".3f", "law": ".3f", "spread": ".4f", "damage f3z": ".3f", "damage f3x": ".3f"}
         lines = tuple(
-            (
-                one["name"],
-                f"{one['growth']:.3f}",
-                f"{one['law']:.3f}",
-                f"{one['spread']:.4f}",
-                f"{one['damage f3z']:.3f}",
-                f"{one['damage f3x']:.3f}",
-            )
-            for one in data["smoothing"]
+            (one["name"], *(f"{one[name]:{form}}" for name, form in shown.items())) for one in data["smoothing"]
         )
         columns = (
             "treatment",
@@ -326,5 +285,5 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return found
 
 
-def _when(one: dict[str, Any]) -> str:
+def _when(one: Data) -> str:
     return "never" if one["drift-off"] >= DURATION else f"{one['drift-off']:.2f}"

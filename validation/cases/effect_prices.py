@@ -9,9 +9,8 @@ import numpy as np
 
 from models.engines.protocol import build, guard
 from models.machine.timing import describe, interleave, paired_ratio
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from validation.absence.bare_cars import ratio_of_cars
 from validation.absence.bare_rides import ratio_of_rides
 from validation.absence.hand_built import exudyn_run, mujoco_run

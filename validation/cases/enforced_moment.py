@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from models.core.time_series import write_time_series
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Settings
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
-from models.systems.pitch_plane.scene import build as build_scene
+from models.systems.pitch_plane.scene import Scene, assemble, parameter_set
+from models.systems.pitch_plane.virtual_measurement import perturbed, write_wheel_forces
+from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import equilibrium
-from validation.common.rows import Row, System, Table, at_most, finding
-from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding
+from validation.common.scenes import VEHICLES, drive, force_scene
 
 TITLE = "Enforced moment of a prescribed pitch"
 SYSTEM: System = "pitch-plane"
@@ -26,7 +27,6 @@ PERIOD = 1e-3
 STEP = 1e-3
 BOUND = 1e-4
 GUIDE = {"prescribed_pitch": {"file": "pitch.csv"}}
-PERTURBED = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
 BEST = {
     "exudyn": Settings("GeneralizedAlpha", STEP, DURATION, spectral_radius=0.6),
     "mujoco": Settings("RK4", STEP, DURATION),
@@ -39,9 +39,7 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     It begins in the vehicle's own equilibrium with zero angular acceleration; ``abrupt`` begins with
     4.4 rad/s^2 at once.
     """
-    p = build_scene(
-        {"title": TITLE, "vehicle": {"parameters": parameters}, "run": {"duration": 1.0}}
-    ).vehicle_parameters()
+    p = parameter_set(parameters, "", folder)
     rest = equilibrium(p)
     t = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
     s = np.clip(t / 1.0, 0, 1)
@@ -52,7 +50,7 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
     pitch = pitch + rest[3]
     front = p.k1 * rest[0] + rise * (900 * np.sin(2 * np.pi * 1.4 * t) + 300 * np.sin(2 * np.pi * 2.3 * t))
     rear = p.k2 * rest[1] + rise * 700 * np.sin(2 * np.pi * 1.7 * t + 1)
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, PERIOD)
+    write_wheel_forces(folder, front, rear, PERIOD)
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, PERIOD)
 
 
@@ -72,7 +70,7 @@ def relative(found: np.ndarray, true: np.ndarray) -> float:
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, no road."""
     with TemporaryDirectory() as name:
         work = Path(name)
@@ -123,19 +121,18 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
     )
 
 
-def _ringing(folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def _ringing(folder: Path) -> Measured:
     """An abrupt start: error of the multiplier over the first 0.1 s with and without consistent accelerations."""
     manoeuvre(folder, "itwm_drift", abrupt=True)
     scene = force_scene(folder, step=STEP, duration=START, interpolation="smooth", effects=GUIDE)
     true = truth(scene)
     first = slice(1, 101)
-    paths: dict[str, Any] = {"time": (STEP * np.arange(1, 101)).tolist()}
+    paths: Data = {"time": (STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
         settings = Settings("GeneralizedAlpha", STEP, START, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
-        paths[f"consistent start, spectral radius {radius}"] = (moment(scene, "exudyn", settings) - true)[
-            first
-        ].tolist()
+        consistent = moment(scene, "exudyn", settings) - true
+        paths[f"consistent start, spectral radius {radius}"] = consistent[first].tolist()
     peak = {name: float(np.abs(path).max()) for name, path in paths.items() if name != "time"}
     rows = [
         finding(
@@ -175,9 +172,9 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
 
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:
     """The paper's guided run on the study road: what each step leaves, relative to rms of moment and of I beta''."""
-    measured = simulate(road_scene(step=PERIOD, duration=ROUGH + 0.1), "reference")
-    write_forces(measured, folder, PERIOD)
-    scene = force_scene(folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=PERTURBED, effects=GUIDE)
+    drive(folder, ROUGH + 0.1, PERIOD, PERIOD)
+    paper = perturbed(PARAMETERS)
+    scene = force_scene(folder, step=PERIOD, duration=ROUGH, interpolation="smooth", override=paper, effects=GUIDE)
     true = truth(scene)
     table: list[list[Any]] = []
     for engine, best in BEST.items():
@@ -201,46 +198,33 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     return rows, table
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Error by step on the study road, where it was driven."""
     if not data["table"]:
         return []
     rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
-    return [
-        Table(
-            "Enforced moment on the study road, perturbed model, after the first 20 ms",
-            "Rms of the error by the rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness "
-            "of 40 Hz needs a smaller step.",
-            ("engine", "integrator", "step [ms]", "relative error"),
-            rows,
-        )
-    ]
+    title = "Enforced moment on the study road, perturbed model, after the first 20 ms"
+    note = (
+        "Rms of the error by the rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness of 40 Hz "
+        "needs a smaller step."
+    )
+    return [Table(title, note, ("engine", "integrator", "step [ms]", "relative error"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Start-up ringing of the multiplier."""
     from models.drawing.figures import plt
 
     figure, axis = plt.subplots(figsize=(8, 3))
     paths = data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
-        consistent = name.startswith("consistent")
-        axis.plot(
-            [1e3 * t for t in paths["time"]],
-            path,
-            label=name,
-            color=f"C{i // 2}",
-            linestyle="--" if consistent else "-",
-            linewidth=2 if consistent else 1,
-        )
-    axis.set_xlabel("time [ms]")
-    axis.set_ylabel("error of the moment [N m]")
-    axis.set_title("Exudyn's enforced moment after an abrupt start, against the eliminated form")
+        style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)
+        axis.plot(1e3 * np.array(paths["time"]), path, style, label=name, color=f"C{i // 2}", linewidth=width)
+    title = "Exudyn's enforced moment after an abrupt start, against the eliminated form"
+    axis.set(xlabel="time [ms]", ylabel="error of the moment [N m]", title=title)
     axis.legend()
-    return [
-        (
-            "A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out "
-            "with the spectral radius, and is gone with consistent accelerations.",
-            figure,
-        )
-    ]
+    caption = (
+        "A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out with the "
+        "spectral radius, and is gone with consistent accelerations."
+    )
+    return [(caption, figure)]

@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 
 from models.ensemble.runner import run_paths
-from models.ensemble.statistics import deviation, quantile
+from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import processes
-from models.systems.pitch_plane.noise_paths import NoisePaths, noise_paths
-from models.systems.pitch_plane.noise_paths_mujoco import gap, mujoco_threads
+from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, aim, at_most, behaves, finding, within
+from validation.common.scenes import drive, force_scene
 
 TITLE = "Noise paths by the thousand"
 SYSTEM: System = "drift"
@@ -40,12 +39,11 @@ TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 SAME = "the same bits"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LONG
-        measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-        write_forces(measured, forces, STEP)
+        measured = drive(forces, duration, STEP, STEP)
         truth = measured["pitch"]
         scene, times = _scene(forces, duration), np.arange(0.0, duration + 0.5)
         job = noise_paths(scene, times, truth)
@@ -124,9 +122,8 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     try:
         run_paths(job, 12, blocks, block=3, progress=stop)
     except KeyboardInterrupt:
-        return _same_row(
-            "resumed", "12 paths, interrupted half-way and resumed", found, run_paths(job, 12, blocks, block=3)
-        )
+        again = run_paths(job, 12, blocks, block=3)
+        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found, again)
     raise AssertionError("the interrupt was lost")
 
 
@@ -161,7 +158,7 @@ def _alone(function: Callable[..., Any], *args: Any) -> Any:
         return pool.submit(function, *args).result()
 
 
-def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
+def _large(job: NoisePaths, many: int, blocks: Path) -> Data:
     """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
     import resource
 
@@ -184,71 +181,53 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> dict[str, Any]:
     }
 
 
-def _scale_rows(large: dict[str, Any]) -> list[Row]:
+def _scale_rows(large: Data) -> list[Row]:
     what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
-    return [
-        within(
-            "ensemble.scale.path-steps",
-            SYSTEM,
-            f"{what}: steps of all paths",
-            float(large["path-steps"]),
-            "",
-            MANY * LONG / STEP,
-            0.0,
-            "a count",
-            "none",
+    share = f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores"
+    counted = (
+        ("path-steps", "steps of all paths", float(large["path-steps"]), "", MANY * LONG / STEP, "a count"),
+        ("failed", "paths that left all bounds", float(large["failed"]), "", 0.0, "a tumbling vehicle stays finite"),
+        (
+            "kept",
+            "bytes of results, by paths",
+            large["kept"],
+            "byte",
+            STATE * (LONG + 1.0) + MARKS,
+            "a count: a state of eight numbers every second, and when it drifts off or fails",
         ),
-        within(
-            "ensemble.scale.failed",
-            SYSTEM,
-            f"{what}: paths that left all bounds",
-            float(large["failed"]),
-            "",
-            0.0,
-            0.0,
-            "a tumbling vehicle stays finite",
-            "none",
-        ),
-        aim(
-            "ensemble.scale.seconds",
-            SYSTEM,
-            f"{what}: start of the processes to the last path, once, with "
-            f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores",
+    )
+    aimed = (
+        (
+            "seconds",
+            f"start of the processes to the last path, once, with {share}",
             large["seconds"],
             "s",
             SECONDS,
             "target on two free cores; what other programs take of them adds to it",
         ),
-        aim(
-            "ensemble.scale.processor",
-            SYSTEM,
-            f"{what}: processor time of all processes by two cores, once",
+        (
+            "processor",
+            "processor time of all processes by two cores, once",
             large["busy"] / 2,
             "s",
             SECONDS,
             "what it takes on two free cores, whoever else uses them now",
         ),
-        aim(
-            "ensemble.scale.memory",
-            SYSTEM,
-            f"{what}: largest memory of all processes together, once",
+        (
+            "memory",
+            "largest memory of all processes together, once",
             large["bytes"],
             "byte",
             MEMORY,
             "target; libraries included, of which a machine's own are a part",
         ),
-        within(
-            "ensemble.scale.kept",
-            SYSTEM,
-            f"{what}: bytes of results, by paths",
-            large["kept"],
-            "byte",
-            STATE * (LONG + 1.0) + MARKS,
-            0.0,
-            "a count: a state of eight numbers every second, and when it drifts off or fails",
-            "none",
-        ),
-    ]
+    )
+    steps, failed, kept = (
+        within(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit, expected, 0.0, why, "none")
+        for id, words, value, unit, expected, why in counted
+    )
+    aims = [aim(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", *rest) for id, words, *rest in aimed]
+    return [steps, failed, *aims, kept]
 
 
 def _engines(
@@ -322,12 +301,8 @@ def _half_step_row(forces: Path) -> Row:
     )
 
 
-def _data(
-    truth: np.ndarray, times: np.ndarray, found: Arrays, large: dict[str, Any], prices: dict[str, float]
-) -> dict[str, Any]:
+def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Data, prices: dict[str, float]) -> Data:
     """What the tables and the figure show."""
-    from studies.ensemble import percentiles
-
     errors = found["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
     quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
@@ -345,7 +320,7 @@ def _data(
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
     if not data:
         return []
@@ -383,12 +358,12 @@ def tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []
+    from models.drawing.drift import draw_fan
     from models.drawing.figures import plt
-    from studies.ensemble import draw_fan
 
     figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))

@@ -6,24 +6,32 @@ The closed law takes the growth rate from the fast pitch rate of the true run; M
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.result import Result
 from models.core.signals import Sampled
-from models.drift import growth as law
+from models.drift.growth import (
+    CUTOFF,
+    growth_rate,
+    growth_until,
+    heave_variance,
+    pitch_rate_of_forces,
+    pitch_variance,
+    rigid_pitch,
+)
 from models.engines.assembly import Assembly
 from models.ensemble.runner import run_paths
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.covariance import covariance
 from models.systems.pitch_plane.noise_paths import noise_paths
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, changed
 from models.systems.pitch_plane.tangent import Path as ErrorPath
-from models.systems.pitch_plane.tangent import measured_growth, swing
-from validation.common.rows import Row, System, Table, at_most, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.tangent import covariance, measured_growth, path_of, swing
+from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement
+from models.vehicles.parameters.itwm_drift import PARAMETERS
+from models.vehicles.pitch_plane import STATES
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, within
+from validation.common.scenes import drive, force_scene, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
@@ -38,38 +46,24 @@ WINDOW, WINDOWS = 20, 4
 """Length (s) and number of the windows in which the growth rate is measured."""
 STUDY = "20 m/s, Gd 2.4e-3"
 ROADS = {
-    STUDY: {"speed": 20.0, "gd": 2.4e-3},
-    "20 m/s, Gd 6e-4": {"speed": 20.0, "gd": 6e-4},
-    "20 m/s, Gd 1.5e-4": {"speed": 20.0, "gd": 1.5e-4},
-    "10 m/s, Gd 2.4e-3": {"speed": 10.0, "gd": 2.4e-3},
+    f"{speed} m/s, Gd {gd}": {"source": "study", "speed": float(speed), "gd": float(gd)}
+    for speed, gd in ((20, "2.4e-3"), (20, "6e-4"), (20, "1.5e-4"), (10, "2.4e-3"))
 }
 """The study road at other speeds and roughnesses."""
-PAPER = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
-"""The perturbed model of Appendix B."""
 LAW = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
-    true = _measured(folder, LENGTH)
+    true = drive(folder, LENGTH)
     spread = _spread(true, folder, quick)
     if quick:
         roads = {STUDY: _growth(folder, ROADS[STUDY], 2)}
         return _spread_rows(spread) + _growth_rows(roads), {"spread": spread, "roads": roads}
     roads = {name: _growth(folder, road) for name, road in ROADS.items()}
     roads["asymmetric twin"] = _growth(folder, ROADS[STUDY], parameters="asymmetric_twin")
-    rows = _spread_rows(spread) + _growth_rows(roads) + _twin_rows(folder)
-    return rows + _engine_rows(folder) + _step_rows(folder) + _linear_rows(folder), {"spread": spread, "roads": roads}
-
-
-def _measured(
-    folder: Path, duration: float, road: dict[str, Any] | None = None, parameters: str = "itwm_drift"
-) -> Result:
-    """The virtual measurement, its forces written at RATE."""
-    source = {"source": "study", **(road or ROADS[STUDY])}
-    true = simulate(road_scene(parameters, 1e-3, duration, source), "reference")
-    write_forces(true, folder, 1 / RATE)
-    return true
+    rows = [*_spread_rows(spread), *_growth_rows(roads), _twin_row(folder), *_engine_rows(folder)]
+    return [*rows, _step_row(folder), _linear_row(folder)], {"spread": spread, "roads": roads}
 
 
 def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> Scene:
@@ -77,46 +71,36 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true: Result, folder: Path, quick: bool) -> dict[str, Any]:
+def _spread(true: Result, folder: Path, quick: bool) -> Data:
     """Standard deviations at 1 to 10 s: Monte Carlo (in the full run), covariance along the path, and the laws."""
     times, assembly = np.arange(1, LENGTH + 1), assemble(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
-    p, quiet = assembly.parameters, _without_noise(assembly, folder)
-    q = law.rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    p, quiet = assembly.parameters, assemble(force_scene(folder, duration=LENGTH))
+    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     carried = covariance(quiet, DEVIATION)
-    alone = law.pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
+    alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
     found = {
-        f"law, {name}": np.sqrt(law.pitch_variance(times, law.growth_until(rate, 1 / RATE, p)[at], q)).tolist()
+        f"law, {name}": np.sqrt(pitch_variance(times, growth_until(rate, 1 / RATE, p)[at], q))
         for name, rate in rates.items()
     }
     found |= {
-        "time": times.tolist(),
-        "covariance": carried.deviation("pitch")[at].tolist(),
-        "t^1.5": np.sqrt(law.pitch_variance(times, 0.0, q)).tolist(),
-        "heave law": np.sqrt(law.heave_variance(times, p, DEVIATION, 1 / RATE)).tolist(),
-        "heave covariance": carried.deviation("z3")[at].tolist(),
+        "time": times,
+        "covariance": carried.deviation("pitch")[at],
+        "t^1.5": np.sqrt(pitch_variance(times, 0.0, q)),
+        "heave law": np.sqrt(heave_variance(times, p, DEVIATION, 1 / RATE)),
+        "heave covariance": carried.deviation("z3")[at],
     }
     if not quick:
         job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
-        off = run_paths(job, PATHS)["states"] - quiet_states(quiet)[at]
-        found["pitch"], found["heave"] = off[:, :, 3].std(axis=0).tolist(), off[:, :, 2].std(axis=0).tolist()
-    return found
-
-
-def _without_noise(assembly: Assembly, folder: Path) -> Assembly:
-    duration = assembly.scene.run.duration
-    return assemble(force_scene(folder, step=1e-3, duration=duration))
+        off = run_paths(job, PATHS)["states"] - path_of(quiet).carry(np.zeros((1, 8)))[0][at]
+        found["pitch"], found["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
+    return {name: values.tolist() for name, values in found.items()}
 
 
 def _samples(assembly: Assembly) -> Sampled:
     assert isinstance(assembly.input, Sampled)
     return assembly.input
-
-
-def quiet_states(assembly: Assembly) -> np.ndarray:
-    """States (n, 8) of the run without noise."""
-    return _path(assembly, assembly.initial, 0, round(assembly.scene.run.duration * RATE)).carry(np.zeros((1, 8)))[0]
 
 
 def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> ErrorPath:
@@ -125,36 +109,34 @@ def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> Er
     return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
 
 
-def _growth(
-    folder: Path, road: dict[str, Any], windows: int = WINDOWS, parameters: str = "itwm_drift"
-) -> dict[str, Any]:
+def _growth(folder: Path, road: Data, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Data:
     """Growth rates of one road: from the run, from the forces, by cut-off, and measured in windows in both frames."""
-    true = _measured(folder, WINDOW * windows, road, parameters)
+    true = drive(folder, WINDOW * windows, parameters=parameters, road=road)
     assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
     p, rate = assembly.parameters, true["pitch_rate"]
-    alone = law.pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
+    alone = pitch_rate_of_forces(_samples(assembly).values, 1 / RATE, p)
     starts = np.rint(np.arange(windows) * WINDOW * RATE).astype(int)
     paths = {
         mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
         for mode in ("force", "force-body")
     }
     measured = {mode: np.array([measured_growth(path) for path in own]).T for mode, own in paths.items()}
-    rigid = law.rigid_pitch(p)
+    rigid = rigid_pitch(p)
     return {
-        "run": law.growth_rate(rate, 1 / RATE, p),
-        "forces": law.growth_rate(alone, 1 / RATE, p),
-        "cut-offs": [law.growth_rate(rate, 1 / RATE, p, law.CUTOFF * factor) for factor in (0.5, 2.0)],
+        "run": growth_rate(rate, 1 / RATE, p),
+        "forces": growth_rate(alone, 1 / RATE, p),
+        "cut-offs": [growth_rate(rate, 1 / RATE, p, CUTOFF * factor) for factor in (0.5, 2.0)],
         "measured": float(measured["force"][0].mean()),
         "scatter": float(measured["force"][0].std(ddof=1)),
         "body": float(measured["force-body"][0].mean()),
         "body error": float(measured["force-body"][1].max()),
         "swing": float(np.mean([swing(path) for path in paths["force-body"]])),
         "coupling": rigid.coupling,
-        "swing law": law.growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
+        "swing law": growth_rate(rate, 1 / RATE, p) * float(np.sqrt(rigid.carried / rigid.inertia)),
     }
 
 
-def _spread_rows(spread: dict[str, Any]) -> list[Row]:
+def _spread_rows(spread: Data) -> list[Row]:
     """The spread of noise against its laws, second by second."""
     seen = "pitch" if "pitch" in spread else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
@@ -218,8 +200,8 @@ def _spread_rows(spread: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _growth_rows(roads: dict[str, Any]) -> list[Row]:
-    rows = []
+def _growth_rows(roads: Data) -> list[Row]:
+    rows = list[Row]()
     for name, road in roads.items():
         key = name.replace(" ", "-").replace(",", "")
         rows += [
@@ -263,7 +245,7 @@ def _growth_rows(roads: dict[str, Any]) -> list[Row]:
         at_most(
             "growth.cut-off",
             SYSTEM,
-            f"change of the growth rate by half or twice the cut-off of {law.CUTOFF} Hz, largest",
+            f"change of the growth rate by half or twice the cut-off of {CUTOFF} Hz, largest",
             worst,
             "",
             0.05,
@@ -273,7 +255,7 @@ def _growth_rows(roads: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _body_row(key: str, what: str, road: dict[str, Any]) -> Row:
+def _body_row(key: str, what: str, road: Data) -> Row:
     """No growth for a vehicle that does not couple heave to pitch; one that does is told, not judged.
 
     Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
@@ -295,32 +277,21 @@ def _body_row(key: str, what: str, road: dict[str, Any]) -> Row:
     )
 
 
-def _twin_rows(folder: Path) -> list[Row]:
+def _twin_row(folder: Path) -> Row:
     """A vehicle whose ends differ: arms about the common centre of mass."""
-    true = _measured(folder, 5.0, parameters="asymmetric_twin")
+    true = drive(folder, 5.0, parameters="asymmetric_twin")
     assembly = assemble(force_scene(folder, "asymmetric_twin", 1e-3, 5.0))
     p, at = assembly.parameters, round(5.0 * RATE)
-    q = law.rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
-    expected = np.sqrt(float(law.pitch_variance(5.0, law.growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
+    q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
+    expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
-    return [
-        within(
-            "growth.twin",
-            SYSTEM,
-            "asymmetric twin: covariance along the path at 5 s by the closed law",
-            float(found / expected),
-            "",
-            1.0,
-            0.05,
-            "as for the published vehicle",
-            "closed form",
-        )
-    ]
+    what, why = "asymmetric twin: covariance along the path at 5 s by the closed law", "as for the published vehicle"
+    return within("growth.twin", SYSTEM, what, float(found / expected), "", 1.0, 0.05, why, "closed form")
 
 
 def _engine_rows(folder: Path) -> list[Row]:
     """The same noise file in all implementations, compared before the pitch is 0.05 rad off."""
-    true = _measured(folder, LENGTH)
+    true = drive(folder, LENGTH)
     runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
     base = runs["reference"]
     off = np.abs(base["pitch"] - true["pitch"]) > 0.05
@@ -344,62 +315,36 @@ def _engine_rows(folder: Path) -> list[Row]:
     ]
 
 
-def _step_rows(folder: Path) -> list[Row]:
+def _step_row(folder: Path) -> Row:
     """Half the step, the same noise: the difference by the spread."""
     runs = {
         step: np.array([simulate(_noisy(folder, LENGTH, step, path), "reference").states[-1] for path in range(20)])
         for step in (5e-4, 2.5e-4)
     }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
-    return [
-        at_most(
-            "growth.step",
-            SYSTEM,
-            "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread",
-            gap,
-            "",
-            1e-4,
-            "noise belongs to the samples",
-            "closed form",
-        )
-    ]
+    what = "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread"
+    return at_most("growth.step", SYSTEM, what, gap, "", 1e-4, "noise belongs to the samples", "closed form")
 
 
-def _linear_rows(folder: Path) -> list[Row]:
+def _linear_row(folder: Path) -> Row:
     """Linearised, measurement and all, the perturbed vehicle must not drift."""
-    true = simulate(_linear(road_scene(step=1e-3, duration=60.0), {}), "reference")
-    write_forces(true, folder, 1 / RATE)
-    start = dict(zip(("z1", "z2", "z3", "pitch"), true.states[0, :4].tolist(), strict=True))
-    run = simulate(_linear(force_scene(folder, step=1e-3, duration=60.0, override=PAPER), start), "reference")
+    linear = {"geometry": "linear"}
+    true = simulate(changed(road_scene(duration=60.0), vehicle=linear), "reference")
+    write_measurement(true, folder, 1 / RATE)
+    start = dict(zip(STATES, true.states[0, :4].tolist(), strict=True))
+    wrong = force_scene(folder, duration=60.0, override=perturbed(PARAMETERS))
+    run = simulate(changed(wrong, vehicle=linear, start=start), "reference")
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
-    return [
-        at_most(
-            "growth.linear",
-            SYSTEM,
-            "largest pitch error of the perturbed model, linearised, in 60 s",
-            off,
-            "rad",
-            0.05,
-            "drift needs the cosine: with it this run drifts off after 12 s",
-            "none",
-        )
-    ]
+    what = "largest pitch error of the perturbed model, linearised, in 60 s"
+    why = "drift needs the cosine: with it this run drifts off after 12 s"
+    return at_most("growth.linear", SYSTEM, what, off, "rad", 0.05, why, "none")
 
 
-def _linear(scene: Scene, start: dict[str, float]) -> Scene:
-    table = scene.table()
-    vehicle = table["vehicle"] | {"geometry": "linear"}
-    return build({**table, "vehicle": vehicle, "start": start}, "", Path(scene.folder))
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Spread over time, and growth rates by road."""
     spread = data["spread"]
-    names = [
-        name
-        for name in ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
-        if name in spread
-    ]
+    known = ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
+    names = [name for name in known if name in spread]
     rows = tuple((str(t), *(f"{spread[name][i]:.4g}" for name in names)) for i, t in enumerate(spread["time"]))
     note = (
         f"White noise of {DEVIATION} N at {RATE:g} Hz on the study road at 20 m/s. Law, run: with the growth rate "
@@ -422,7 +367,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
     from models.drawing.figures import plt
 

@@ -17,22 +17,20 @@ import numpy as np
 
 from models.drift.growth import holding_stiffness, rigid_pitch
 from models.engines.assembly import Assembly
-from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.effects import pitch_spring
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import settings_of
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import growth
-from validation.common.rows import Row, System, Table, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import perturbed
+from models.vehicles.parameters.itwm_drift import PARAMETERS
+from validation.common.rows import Data, Measured, Row, System, Table, behaves, finding, within
+from validation.common.scenes import drive, force_scene
 
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
 SEED = 13
 DURATION, STEP, HELD = 60.0, 1e-3, 0.2
 """Length and step of the runs (s), pitch error of a run that is held (rad)."""
-PAPER = {"k3": 1.05e5, "k4": 0.95e5, "d3": 0.95e4, "d4": 1.05e4, "I": 475.0}
-"""The perturbed model of Appendix B."""
 NOISE = 30.7
 """N, on each sample at 1 kHz."""
 HALVINGS = 7
@@ -55,7 +53,7 @@ TOLD = (Setting(1.0, False), Setting(0.0, True))
 
 
 @dataclass(frozen=True)
-class Measured:
+class FreeRuns:
     """The true pitch (n,), and the runs without a spring that start where the true one does, by ``disturbed``."""
 
     pitch: np.ndarray
@@ -63,7 +61,7 @@ class Measured:
     law: float
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
@@ -76,26 +74,24 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"law": measured.law, "found": found}
 
 
-def _measure(folder: Path) -> Measured:
-    true = simulate(road_scene(step=STEP, duration=DURATION), "reference")
-    write_forces(true, folder, STEP)
+def _measure(folder: Path) -> FreeRuns:
+    true = drive(folder, DURATION, STEP, STEP)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
     quiet = assemble(force_scene(folder, step=STEP, duration=DURATION))
-    noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=PAPER, effects=noise))
+    noisy = assemble(force_scene(folder, step=STEP, duration=DURATION, override=perturbed(PARAMETERS), effects=noise))
     law = holding_stiffness(quiet.parameters, growth(quiet).rate)
-    return Measured(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
+    return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
 
 
-def _error(one: Setting, stiffness: float, measured: Measured, engine: str = "reference") -> float:
+def _error(one: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
     """Largest pitch error (rad) of a run on a spring (N m/rad)."""
     free = measured.runs[one.disturbed]
     damping = 2 * one.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
-    run = build(engine, held, settings_of(free.scene, engine)).run()
-    return float(np.abs(run.states[:, 3] - measured.pitch).max())
+    return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - measured.pitch).max())
 
 
-def _ends(one: Setting, measured: Measured, engine: str) -> list[Row]:
+def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
@@ -115,7 +111,7 @@ def _ends(one: Setting, measured: Measured, engine: str) -> list[Row]:
     return rows
 
 
-def _smallest(one: Setting, measured: Measured) -> float:
+def _smallest(one: Setting, measured: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
     low, high = 0.5 * measured.law, 1.3 * measured.law
     if _error(one, high, measured) > HELD:
@@ -133,7 +129,7 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
     return within(key, SYSTEM, what, law / stiffness, "", 1.0, 0.3, "30 % is asked", "closed form")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Stiffness found in each setting."""
     rows = tuple(
         (name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")

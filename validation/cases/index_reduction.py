@@ -9,14 +9,14 @@ import numpy as np
 
 from models.core.noise import normal
 from models.core.time_series import write_time_series
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
-from validation.common.rows import Row, System, at_most, behaves, finding, not_run
-from validation.common.scenes import force_scene, road_scene, write_forces
-from validation.drift.index_reduction import IndexOne, gap_law
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
+from models.engines.reference import derivative_of
+from models.systems.pitch_plane.scene import Scene, assemble
+from models.vehicles.description import matrices
+from models.vehicles.pitch_plane_equations import numbers
+from validation.common.rows import Data, Figures, Measured, Row, System, at_most, behaves, finding, not_run
+from validation.common.scenes import drive, force_scene
 from validation.hard_cases.prescribed_pitch import AsItComes
 
 TITLE = "Drift by index reduction, and drift by noise"
@@ -30,7 +30,7 @@ SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
 """Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
 SMOOTH = 5.0
 """Bandwidth (Hz) of the pitch that such a gyro gives."""
-HAND: dict[str, dict[str, Any]] = {
+HAND: dict[str, Data] = {
     "index 1": {},
     "index 1, Baumgarte": {"alpha": ALPHA},
     "index 1, projection": {"projected": True},
@@ -72,12 +72,12 @@ class Files:
         return assemble(self.scene(prescribed_pitch={"file": file, **values}))
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Gaps from a start off the constraint by formulation, then both drifts by noise; quick: over short runs."""
     with TemporaryDirectory() as name:
         files = _drive(Path(name), 0.2 if quick else 4.0)
         gaps, laws = _gaps(files), _laws(files)
-        walked = _walked(files)
+        walked = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files)  # from a start on the constraint
         loose = _loose(_drive(Path(name), 1.0 if quick else 12.0))
     rows = [
         *_gap_rows(gaps, laws, files.duration),
@@ -95,15 +95,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _drive(folder: Path, duration: float) -> Files:
     """Measure on the study road, write forces, pitch, and the pitch that a gyro's integrated rate gives."""
-    measured = simulate(road_scene(step=STEP, duration=duration), "reference")
-    write_forces(measured, folder, STEP)
+    measured = drive(folder, duration, STEP, STEP)
     walk = WALK * np.sqrt(STEP) * np.cumsum(normal(SEED, 0, len(measured.times), 1)[:, 0])
     write_time_series(folder / "gyro.csv", {"pitch": ("rad", measured["pitch"] + walk)}, STEP)
     return Files(folder, duration, measured["pitch"])
 
 
-def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
-    """Pitch (n,) by formulation, each from the assembly's initial state."""
+def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
+    """Pitch minus true pitch (n,) by formulation, each from the assembly's initial state."""
+    duration = files.duration
     found = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
     for name, integrator in EXUDYN.items():
         found[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
@@ -111,7 +111,7 @@ def _paths(assembly: Assembly, duration: float) -> dict[str, np.ndarray]:
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] for name, states in found.items()}
+    return {name: states[:, 3] - files.pitch for name, states in found.items()}
 
 
 def _gaps(files: Files) -> dict[str, np.ndarray]:
@@ -119,14 +119,7 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
     guided = files.guided()
     start = guided.initial.copy()
     start[[3, 7]] += OFF, RATE_OFF
-    paths = _paths(replace(guided, initial=start), files.duration)
-    return {name: path - files.pitch for name, path in paths.items()}
-
-
-def _walked(files: Files) -> dict[str, np.ndarray]:
-    """Pitch minus true pitch (n,) by formulation, guided by the gyro's pitch from a start on the constraint."""
-    paths = _paths(files.guided("gyro.csv", bandwidth=SMOOTH), files.duration)
-    return {name: path - files.pitch for name, path in paths.items()}
+    return _paths(replace(guided, initial=start), files)
 
 
 def _loose(files: Files) -> dict[str, np.ndarray]:
@@ -281,7 +274,7 @@ def _id(name: str) -> str:
     return name.replace(", ", ".").replace(" ", "_")
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
     from models.drawing.figures import plt
 
@@ -302,10 +295,60 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     right.legend(fontsize="small")
     for axis in (left, right):
         axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
-    return [
-        (
-            "Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and "
-            "no formulation and no solver sees it.",
-            figure,
-        )
-    ]
+    caption = (
+        "Drift by index reduction is the constraint's own and can be cured; drift by noise is the data's, and no "
+        "formulation and no solver sees it."
+    )
+    return [(caption, figure)]
+
+
+DIRECTION = np.array([[0.0, 0.0, 0.0, 1.0]])
+"""G: the pitch alone is prescribed."""
+
+
+class IndexOne:
+    """The guided vehicle with its constraint differentiated twice.
+
+    alpha : Baumgarte's rate in 1/s, 0 for none; projected : whether each step ends on the constraint
+    """
+
+    def __init__(self, assembly: Assembly, alpha: float = 0.0, projected: bool = False) -> None:
+        self.assembly, self.alpha, self.projected = assembly, alpha, projected
+        self._mass = matrices(assembly.vehicle)[0]
+        self._solve = np.linalg.inv(np.block([[self._mass, -DIRECTION.T], [DIRECTION, np.zeros((1, 1))]]))
+        self._free = derivative_of("force", assembly.vehicle.geometry)
+        self._p = numbers(assembly.parameters, assembly.vehicle)
+
+    def run(self, step: float, duration: float) -> np.ndarray:
+        """States (n + 1, 8) by classical Runge-Kutta from the assembly's initial state, on the constraint or not."""
+        assert self.assembly.input is not None
+        count = round(duration / step)
+        inputs = self.assembly.input.sample(0.0, step / 2, 2 * count + 1)
+        states = np.empty((count + 1, 8))
+        y = states[0] = self.assembly.initial
+        for i in range(count):
+            first, middle, last = inputs[2 * i : 2 * i + 3]
+            k1 = self._rate(y, first)
+            k2 = self._rate(y + 0.5 * step * k1, middle)
+            k3 = self._rate(y + 0.5 * step * k2, middle)
+            k4 = self._rate(y + step * k3, last)
+            y = y + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            states[i + 1] = y = self._back(y, last) if self.projected else y
+        return states
+
+    def _rate(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """y' (8,) under the input u = (f1, f2, beta, beta', beta'')."""
+        dy = self._free(y, u[:2].copy(), self._p)
+        wanted = u[4] - 2 * self.alpha * (y[7] - u[3]) - self.alpha**2 * (y[3] - u[2])
+        dy[4:] = (self._solve @ np.append(self._mass @ dy[4:], wanted))[:4]
+        return dy
+
+    def _back(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """The nearest state on the constraint, by the distance that kinetic energy defines."""
+        along = self._solve[:4, 4]
+        return y - np.concatenate((along * (y[3] - u[2]), along * (y[7] - u[3])))
+
+
+def gap_law(times: np.ndarray, start: float, rate: float, alpha: float = 0.0) -> np.ndarray:
+    """Gap g (n,) in rad of g'' + 2 alpha g' + alpha^2 g = 0 from g(0) = start (rad) and g'(0) = rate (rad/s)."""
+    return (start + (rate + alpha * start) * times) * np.exp(-alpha * times)

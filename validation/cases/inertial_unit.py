@@ -3,27 +3,39 @@
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from models.core.noise import GYRO, normal
 from models.core.time_series import write_time_series
-from models.drift.section_forces import section_forces
-from models.sensors import inertial_unit as unit
-from models.sensors.gyro import DEGREES_PER_HOUR, angle_variance, bias
-from models.sensors.rotations import conjugate, exponential, integrate, logarithm, matrix, product
+from models.drift.score import rms, section_forces
+from models.sensors.inertial_unit import (
+    DEGREES_PER_HOUR,
+    angle_variance,
+    bias,
+    error_rotation,
+    euler_mean_square,
+    euler_quaternions,
+    ito_norm,
+    mean_error,
+    mean_scalar,
+    mean_trace,
+    measured_attitude,
+    random_walk,
+    true_attitude,
+)
+from models.sensors.rotations import exponential, integrate, logarithm, matrix
 from models.systems.pitch_plane.run import run as simulate
-from studies.virtual_measurement import follower, write_measurement
-from studies.virtual_measurement import measure as measure_road
+from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
+from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import road_scene
+from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
 from validation.measured import recording
 
 TITLE = "Attitude from a gyro's rates"
 SYSTEM: System = "drift"
-SEED = 30
 LEVEL = 3.3
 """Standard errors within which a mean lies 999 times in 1,000."""
 UNEQUAL = np.array([0.1, 0.3, 0.6])
@@ -31,14 +43,11 @@ UNEQUAL = np.array([0.1, 0.3, 0.6])
 EQUAL = 0.5
 PERIOD, SPAN = 5e-3, 2.0
 """s, of the Monte Carlo runs; a step's share of the law is then some 1e-4 of it."""
-CHUNK = 500
-"""Paths that stand side by side in memory."""
 TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 """s, Hz, rad/s per sample: the paper's own example."""
-START = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000
     rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
@@ -47,74 +56,26 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, *example, *recorded, *([] if quick else _section_forces())], {"ten minutes": data, "recording": seen}
 
 
-def turning(count: int, period: float) -> np.ndarray:
-    """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
-    t = period * np.arange(count)
-    return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
-
-
 def _clean() -> list[Row]:
     """Attitude from exact rates: about a fixed axis in steps of any length, and on a cone at 1 kHz."""
     rate, h = np.array([0.3, -1.1, 0.7]), 1e-3
-    held = unit.true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
+    held = true_attitude(np.broadcast_to(rate, (10_000, 3)), h, START)
     rates, true = cone(h * np.arange(10_001))
     coned = integrate(rates, h, true[0])
+    off = float(np.abs(np.linalg.norm(coned, axis=1) - 1).max())
+    fixed, turned = "constant rate, 10 s at 1 kHz: largest error of the attitude", exponential(10 * rate)
+    swept = "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error"
+    order = "fourth order in the sampling period, without noise"
     return [
-        _small(
-            "clean.axis",
-            "constant rate, 10 s at 1 kHz: largest error of the attitude",
-            _apart(held[-1], exponential(10 * rate)),
-            "rad",
-            "each step is the exact exponential",
-        ),
-        _small(
-            "clean.cone",
-            "axis on a cone of 0.3 rad at 2 rad/s, 10 s at 1 kHz: largest error",
-            _apart(coned, true),
-            "rad",
-            "fourth order in the sampling period, without noise",
-        ),
-        _small(
-            "clean.norm",
-            "largest departure of the quaternion's norm from 1",
-            float(np.abs(np.linalg.norm(coned, axis=1) - 1).max()),
-            "",
-            "normalised in each step",
-        ),
+        _small("clean.axis", fixed, apart(held[-1], turned), "rad", "each step is the exact exponential"),
+        _small("clean.cone", swept, apart(coned, true), "rad", order),
+        _small("clean.norm", "largest departure of the quaternion's norm from 1", off, "", "normalised in each step"),
     ]
 
 
 def _small(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
     """Row for an error beside a closed form."""
     return at_most(f"inertial_unit.{id}", SYSTEM, quantity, value, unit, bound, why, "closed form")
-
-
-def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
-    spin, half = 2.0, 0.3
-    about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
-    tilt = exponential(np.array([half, 0.0, 0.0]))
-    rates = spin * np.column_stack(
-        [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
-    )
-    return rates, product(product(about, tilt), conjugate(about))
-
-
-def _apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(logarithm(product(conjugate(one), other))).max())
-
-
-def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
-    """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
-    true = unit.true_attitude(rates, period, START)[-1]
-    chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
-    return np.concatenate(
-        [
-            unit.error_rotation(unit.measured_attitude(rates, period, deviation, START, chunk, SEED)[-1], true)
-            for chunk in chunks
-        ]
-    )
 
 
 def _one_axis(paths: int) -> list[Row]:
@@ -168,37 +129,37 @@ def _three_axes(paths: int) -> list[Row]:
     rates, root = turning(count, PERIOD), PERIOD**0.5
     equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
     found = errors(rates, PERIOD, UNEQUAL / root, paths)
-    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), unit.mean_error(UNEQUAL, rates, PERIOD, START)
-    resting = unit.mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
+    trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), mean_error(UNEQUAL, rates, PERIOD, START)
+    resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
     all_equal = np.full(3, EQUAL)
-    same = float(np.trace(unit.mean_error(all_equal, rates, PERIOD, START)))
+    same = float(np.trace(mean_error(all_equal, rates, PERIOD, START)))
     return [
-        _mean("trace", "E[tr E], three equal axes, turning body", trace, unit.mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
+        _mean("trace", "E[tr E], three equal axes, turning body", trace, mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
         _mean(
             "scalar",
             "E[q1] of the error, three equal axes, turning body",
             equal[:, 0],
-            unit.mean_scalar(all_equal, SPAN),
+            mean_scalar(all_equal, SPAN),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean(
             "scalar.unequal",
             "E[q1] of the error, unequal axes, turning body",
             found[:, 0],
-            unit.mean_scalar(UNEQUAL, SPAN),
+            mean_scalar(UNEQUAL, SPAN),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
         _small(
             "matrix.equal",
             "matrix law with equal noise against 3 exp(-s^2 t)",
-            abs(same - unit.mean_trace(EQUAL, SPAN)),
+            abs(same - mean_trace(EQUAL, SPAN)),
             "",
             "both are exact",
         ),
         _small(
             "matrix",
             "mean rotation matrix, unequal noise, turning body: worst entry by its standard error",
-            _standard_errors(found, exact),
+            standard_errors(found, exact),
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
@@ -208,7 +169,7 @@ def _three_axes(paths: int) -> list[Row]:
             "inertial_unit.matrix.resting",
             SYSTEM,
             "the same against the law of a body at rest",
-            _standard_errors(found, resting),
+            standard_errors(found, resting),
             "",
             f"far beyond {LEVEL}",
             "the rows above can tell the laws apart",
@@ -217,11 +178,7 @@ def _three_axes(paths: int) -> list[Row]:
     ]
 
 
-def _standard_errors(found: np.ndarray, law: np.ndarray) -> float:
-    """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
-    samples = matrix(found)
-    error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
-    return float((np.abs(samples.mean(axis=0) - law) / error).max())
+STRATONOVICH = "exp(-k s^2 t / 8), as after Stratonovich"
 
 
 def _norms(paths: int) -> list[Row]:
@@ -231,38 +188,24 @@ def _norms(paths: int) -> list[Row]:
     for axes in (1, 3):
         noise = np.zeros((steps, paths, 3))
         noise[:, :, :axes] = normal(SEED, axes, steps * paths, axes, source=GYRO).reshape(steps, paths, axes)
-        q = unit.euler_quaternions(EQUAL * period**0.5 * noise, START)
+        q = euler_quaternions(EQUAL * period**0.5 * noise, START)
         square = np.sum(q**2, axis=1)
-        law = unit.euler_mean_square(EQUAL, axes, period, steps)
+        law = euler_mean_square(EQUAL, axes, period, steps)
+        scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
+        means = (
+            ("norm", f"E[|q|^2] of explicit Euler, {noisy}, not normalised", square, law, "(1 + k s^2 D / 4)^n"),
+            ("mean", f"E[q1] of the same, {noisy}", true, 1.0, "after Ito the mean is the true quaternion"),
+            ("direction", f"E[q1] once it is normalised, {noisy}", true / square**0.5, scalar, STRATONOVICH),
+        )
         rows += [
-            _mean(
-                f"norm.{axes}",
-                f"E[|q|^2] of explicit Euler, {axes} noisy axes, not normalised",
-                square,
-                law,
-                "(1 + k s^2 D / 4)^n",
-            ),
-            _mean(
-                f"mean.{axes}",
-                f"E[q1] of the same, {axes} noisy axes",
-                q[:, 0],
-                1.0,
-                "after Ito the mean is the true quaternion",
-            ),
-            _mean(
-                f"direction.{axes}",
-                f"E[q1] once it is normalised, {axes} noisy axes",
-                q[:, 0] / square**0.5,
-                unit.mean_scalar(np.full(axes, EQUAL), span),
-                "exp(-k s^2 t / 8), as after Stratonovich",
-            ),
+            *(_mean(f"{id}.{axes}", *figures) for id, *figures in means),
             within(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the Euler law at 4e6 steps, {axes} noisy axes",
-                unit.euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
+                euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-                unit.ito_norm(np.full(axes, EQUAL), span),
+                ito_norm(np.full(axes, EQUAL), span),
                 1e-6,
                 "exp(k s^2 t / 8), eq. (28)",
                 "closed form",
@@ -271,9 +214,9 @@ def _norms(paths: int) -> list[Row]:
     return rows
 
 
-def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
+def _ten_minutes(paths: int) -> Measured:
     """The paper's example: 600 s at 1 kHz, 0.1 rad/s white on each sample, on a car's motion."""
-    walk = unit.random_walk(DEVIATION, RATE)
+    walk = random_walk(DEVIATION, RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [
@@ -288,27 +231,12 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
             why,
             "published",
         ),
-        within(
-            "inertial_unit.ten_minutes.axis",
-            SYSTEM,
-            "its rms angle per axis at 600 s",
-            axis,
-            "deg",
-            4.44,
-            5e-3,
-            "s sqrt(t)",
-            "closed form",
-        ),
-        within(
-            "inertial_unit.ten_minutes.total",
-            SYSTEM,
-            "its rms angle in all at 600 s",
-            axis * 3**0.5,
-            "deg",
-            7.69,
-            5e-3,
-            "s sqrt(3 t)",
-            "closed form",
+        *(
+            within(f"inertial_unit.ten_minutes.{id}", SYSTEM, what, angle, "deg", law, 5e-3, why, "closed form")
+            for id, what, angle, law, why in (
+                ("axis", "its rms angle per axis at 600 s", axis, 4.44, "s sqrt(t)"),
+                ("total", "its rms angle in all at 600 s", axis * 3**0.5, 7.69, "s sqrt(3 t)"),
+            )
         ),
     ]
     if not paths:
@@ -316,7 +244,7 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
     every = round(RATE)
     t = np.arange(round(TEN_MINUTES * RATE)) / RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
-    true = unit.true_attitude(rates, 1 / RATE, START)[::every]
+    true = true_attitude(rates, 1 / RATE, START)[::every]
     found = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(
         mean_square(
@@ -335,8 +263,8 @@ def _ten_minutes(paths: int) -> tuple[list[Row], dict[str, Any]]:
 
 def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees about the global axes of one noisy path, at the times of ``true`` (601, 4)."""
-    found = unit.measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
-    return np.degrees(logarithm(unit.error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
+    found = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
+    return np.degrees(logarithm(error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
@@ -369,22 +297,21 @@ def _section_forces() -> list[Row]:
     scene, size = road_scene(duration=10.0), 0.1
     with TemporaryDirectory() as name:
         place = Path(name)
-        measured = measure_road(scene)
-        write_measurement(measured, 1 / scene.run.step, 1, place)
-        true = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
+        measured, follow = measure_road(scene), follower(scene, place)
+        write_measurement(measured, place, scene.run.step)
+        true = simulate(follow({}, {"prescribed_pitch": {"file": "pitch.csv"}}), "reference")
         part = measured.times / scene.run.duration
         wrong = measured["pitch"] + size * part**3 * (10 - 15 * part + 6 * part**2)
         write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
-        guided = simulate(follower(scene, place)({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
-    found = section_forces(guided["f3"], guided["f4"], guided["pitch"])
-    turned = section_forces(true["f3"], true["f4"], guided["pitch"])
-    before = section_forces(true["f3"], true["f4"], true["pitch"])
+        guided = simulate(follow({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
+    pairs = ((guided, guided), (true, guided), (true, true))
+    found, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
     return [
         _small(
             f"section.{name}",
             f"{name} of a run guided by a pitch that goes wrong by {size} rad in 10 s, against "
             "the true force turned by that angle, by the change",
-            _rms(found[name] - turned[name]) / _rms(turned[name] - before[name]),
+            rms(found[name] - turned[name]) / rms(turned[name] - before[name]),
             "",
             "f3 and f4 are those of the true run: a slow angle error leaves no inertia force",
             0.01,
@@ -393,11 +320,7 @@ def _section_forces() -> list[Row]:
     ]
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
+def _recording(paths: int) -> Measured:
     """A minute in a real car: gyro against camera, and the noise law on its motion."""
     path = recording.find()
     if path is None:
@@ -411,7 +334,7 @@ def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
     rates, period = own.rates[::5], 5 * recording.PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
     found = errors(rates, period, deviation, paths)
-    law = unit.mean_error(deviation * period**0.5, rates, period, START)
+    law = mean_error(deviation * period**0.5, rates, period, START)
     return [
         finding(
             "inertial_unit.recording",
@@ -427,7 +350,7 @@ def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
         _small(
             "recording.law",
             "mean rotation matrix of noise on its motion: worst entry by its standard error",
-            _standard_errors(found, law),
+            standard_errors(found, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
             LEVEL,
@@ -435,24 +358,24 @@ def _recording(paths: int) -> tuple[list[Row], dict[str, Any]]:
     ], {"off": off[::20].tolist()}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """The ten minutes over time."""
     if not data["ten minutes"]:
         return []
-    rms, walk = data["ten minutes"]["rms"], math.degrees(unit.random_walk(DEVIATION, RATE))
+    rms, walk = data["ten minutes"]["rms"], math.degrees(random_walk(DEVIATION, RATE))
     rows = tuple((f"{t}", f"{rms[t]:.2f}", f"{walk * t**0.5:.2f}") for t in (1, 10, 60, 300, 600))
     note = f"0.1 rad/s on each sample of 1 kHz, {data['ten minutes']['count']} paths; samples are held (Stratonovich)."
     return [Table("The ten-minute example", note, ("time [s]", "rms angle per axis [deg]", "s sqrt(t) [deg]"), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import heading, plt
 
     found = []
     if data["ten minutes"]:
         figure, axes = plt.subplots(1, 3, figsize=(10, 3.4), sharey=True)
-        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(unit.random_walk(DEVIATION, RATE))
+        paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
         times = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):
             axis.plot(times, paths[:, :, i].T, color="#0072b2", linewidth=0.6)
@@ -460,14 +383,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
                 axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
             axis.set(title=f"about the global {'xyz'[i]} axis [deg]", xlabel="time [s]")
         axes[0].legend(loc="upper left")
-        figure.suptitle(
-            "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz", x=0.01, ha="left", fontweight="bold"
-        )
+        heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
         found.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
     if data["recording"]:
         figure, axis = plt.subplots(figsize=(6, 3.2))
         axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
         axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
-        figure.suptitle("A minute in a real car: attitude from the gyro alone", x=0.01, ha="left", fontweight="bold")
+        heading(figure, "A minute in a real car: attitude from the gyro alone")
         found.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
     return found

@@ -9,10 +9,20 @@ from scipy.stats import chi2
 
 from models.drift.innovations import LEVEL as ALARMS
 from models.drift.innovations import consistency
-from models.drift.section_forces import CHANNELS
+from models.drift.score import CHANNELS
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import Data, Measured, Row, System, Table, at_most, behaves, finding, within
 from validation.drift import kalman_runs as runs
+from validation.drift.kalman_runs import (
+    COARSE,
+    at_period,
+    closed_loop,
+    gyro_alone,
+    loop_errors,
+    spread_of_mean_square,
+    stabilised,
+    with_gaps,
+)
 
 TITLE = "The Kalman filter of the pitch"
 SYSTEM: System = "drift"
@@ -31,7 +41,7 @@ FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
     place = folder / "kalman"
     place.mkdir(exist_ok=True)
@@ -41,9 +51,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = _consistency_rows(place, 24, 12.0, tuple(FILTERS))
     rows += _gap_rows(place, 40.0, OUTAGE, tuple(SENSORS))
     loop_rows, deviations = _loop_rows(place)
-    gyro = runs.gyro_alone(place, 600.0, SEED)
-    damage = [runs.stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
-    right = [runs.stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
+    gyro = gyro_alone(place, 600.0, SEED)
+    damage = [stabilised(place, DURATION, SEED + i, ENGINES) for i in range(SAMPLES)]
+    right = [stabilised(place, DURATION, SEED + i, ENGINES[:1], wrong=False)["reference"] for i in range(2)]
     rows += loop_rows + _gyro_rows(gyro) + _damage_rows(damage) + _moment_rows(damage, right)
     return rows, {"damage": damage, "deviations": deviations, "gyro": gyro}
 
@@ -85,32 +95,12 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
         f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
         f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
     }
-    rows = [
-        at_most(
-            "kalman.alarms",
-            SYSTEM,
-            "right filters called inconsistent",
-            alarms,
-            "",
-            1,
-            f"of {count} runs; stated level {ALARMS:g} of all runs",
-            "closed form",
-        )
-    ]
+    stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
+    rows = [at_most("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "", 1, stated, "closed form")]
     for words, plant in planted.items():
         silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
-        rows.append(
-            at_most(
-                f"kalman.named.{words.split()[0]}",
-                SYSTEM,
-                f"filters whose innovations are {words}, not named",
-                silent,
-                "",
-                0,
-                f"of {count} runs",
-                "closed form",
-            )
-        )
+        id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words}, not named"
+        rows.append(at_most(id, SYSTEM, what, silent, "", 0, f"of {count} runs", "closed form"))
     return rows
 
 
@@ -159,7 +149,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     """Angle, rate and both from a file with holes."""
     rows = []
     for name in sensors:
-        found = runs.with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
+        found = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
         held = f"{LOST:.0%} of the samples lost" + (f", none from {outage[0]:g} to {outage[1]:g} s" if outage else "")
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest pitch error by its stated deviation"
         why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {found['deviation']:.2g} rad"
@@ -182,29 +172,19 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
 
 
 def _short_rows(folder: Path) -> list[Row]:
-    found = runs.stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]
+    error = stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
+    what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
-    return [
-        at_most(
-            "kalman.short",
-            SYSTEM,
-            "largest pitch error of a stabilised run of 3 s, wrong model and noise",
-            found["pitch"],
-            "rad",
-            5e-3,
-            why,
-            "none",
-        )
-    ]
+    return [at_most("kalman.short", SYSTEM, what, error, "rad", 5e-3, why, "none")]
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     """Deviations of the errors of estimate and run against the discrete Lyapunov equation."""
-    force = runs.at_period(35.0, runs.COARSE)
-    step, covariance = runs.closed_loop(folder, force)
-    errors = [runs.loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
+    force = at_period(35.0, COARSE)
+    step, covariance = closed_loop(folder, force)
+    errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
     squares = np.mean([np.mean(one**2, axis=0) for one in errors], axis=0)
-    spread = runs.spread_of_mean_square(step, covariance, sum(map(len, errors)))
+    spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")
     rows, table = [], []
     for i in range(12):
@@ -285,6 +265,10 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     return rows
 
 
+LACKS = "the model lacks 5 % of the inertia"
+ESTIMATED = "share by which 1/I is estimated above the model's, mean"
+
+
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
     """Moments by the inertia term: with a right model, and the part of a wrong one that is no inertia."""
     own = [one["reference"] for one in damage]
@@ -306,39 +290,18 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
                     "none",
                 )
             )
-    total = float(np.mean([one["all, band"] for one in own]))
-    rows.append(
-        within(
-            "kalman.moment.wrong",
-            SYSTEM,
-            "all artificial moments, wrong model, up to 15 Hz",
-            total,
-            "",
-            0.05,
-            0.005,
-            "the model lacks 5 % of the inertia",
-            "closed form",
-        )
+    total, inertia = (np.array([one[key] for one in own]) for key in ("all, band", "inertia"))
+    shown = (
+        ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, LACKS),
+        ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
     )
-    inertia = [one["inertia"] for one in own]
-    why = f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"
-    rows.append(
-        within(
-            "kalman.inertia",
-            SYSTEM,
-            "share by which 1/I is estimated above the model's, mean",
-            float(np.mean(inertia)),
-            "",
-            -0.05,
-            3e-3,
-            why,
-            "closed form",
-        )
-    )
-    return rows
+    return rows + [
+        within(f"kalman.{id}", SYSTEM, what, float(np.mean(values)), "", wanted, band, why, "closed form")
+        for id, what, values, wanted, band, why in shown
+    ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Damage and moments per implementation, and the deviations of the linear closed loop."""
     if not data["damage"]:
         return []

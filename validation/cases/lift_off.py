@@ -2,21 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.result import Result
 from models.core.scene_effects import without
-from models.engines.protocol import Settings
+from models.drift.score import rms
+from models.engines.assembly import Settings
 from models.engines.spatial_protocol import build as build_in_space
 from models.engines.spatial_reference import SpatialReference
 from models.ride.road_path import road_path
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.measurement import truth, two_tracks
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from models.systems.ride.nonlinear import ridden
 from models.systems.ride.of_scene import excitation_of, vehicle_of
@@ -26,7 +25,8 @@ from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
 from validation.common.bounces import Bounces, energy
-from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.checks import acceleration_gap
+from validation.common.rows import Measured, Row, System, at_most, finding, within
 from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 
 TITLE = "Tyres that only push"
@@ -41,7 +41,7 @@ ROUNDING = "the same tableau and laws; sums are taken in another order"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
     vehicles = VEHICLES[-1:] if quick else VEHICLES
     rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]
@@ -76,7 +76,7 @@ def _accelerations(parameters: str) -> list[Row]:
         own = scene(parameters, geometry, 2.0, 1e-3, road=True)
         assembly = assemble(own)
         for engine in ENGINES:
-            error = checks.acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
+            error = acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
                 at_most(
@@ -163,12 +163,10 @@ def _order(halvings: int) -> Row:
     own = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
     exact = Bounces(assemble(own), coarse).path(assemble(own).initial, round(1.0 / coarse))
-    errors = [
-        float(
-            np.abs(simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)] - exact).max()
-        )
-        for step in steps
-    ]
+    errors = []
+    for step in steps:
+        states = simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
+        errors.append(float(np.abs(states - exact).max()))
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
     why = "the force has corners: 2 on the average, 4 between them"
@@ -218,39 +216,26 @@ def _pulls(quick: bool) -> list[Row]:
     own = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
     lifting, linear = simulate(own, "reference"), simulate(without(own, "lift_off"), "reference")
     loads = _loads(linear)
-    rms = [float(np.sqrt(np.mean((_loads(run) - loads.mean(axis=1)[:, None]) ** 2))) for run in (linear, lifting)]
+    deviations = [rms(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {own.run.duration:g} s"
-    return [
-        finding(
-            "lift_off.pull",
-            SYSTEM,
+    share = 100.0 * float((loads < 0.0).any(axis=0).mean())
+    words = "rms of the dynamic wheel loads with tyres that lift, by that of linear ones"
+    pulls = "the same: share of time in which one or the other wheel pulls"
+    shown = (
+        (
+            "pull",
             f"{what}: largest pull on the road",
             float(-loads.min()),
             "N",
             0.0,
             "a tyre pushes; the paper's is linear",
-            "none",
         ),
-        finding(
-            "lift_off.share",
-            SYSTEM,
-            "the same: share of time in which one or the other wheel pulls",
-            100.0 * float((loads < 0.0).any(axis=0).mean()),
-            "%",
-            0.0,
-            "a tyre pushes",
-            "none",
-        ),
-        finding(
-            "lift_off.rms",
-            SYSTEM,
-            "rms of the dynamic wheel loads with tyres that lift, by that of linear ones",
-            rms[1] / rms[0],
-            "",
-            1.0,
-            "what the linear tyre costs",
-            "none",
-        ),
+        ("share", pulls, share, "%", 0.0, "a tyre pushes"),
+        ("rms", words, deviations[1] / deviations[0], "", 1.0, "what the linear tyre costs"),
+    )
+    return [
+        finding(f"lift_off.{id}", SYSTEM, words, value, unit, expected, why, "none")
+        for id, words, value, unit, expected, why in shown
     ]
 
 

@@ -1,11 +1,11 @@
 """Motion from accelerometers (Section 3.1): exact with clean data, honest about planes, noise and loose mounts."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.noise import ACCELEROMETERS, normal
+from models.drift.score import rms
 from models.engines.protocol import build
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
@@ -18,17 +18,17 @@ from models.sensors.rigid_body_motion import (
     spin,
     tilt_displacement,
 )
-from models.sensors.rotations import from_cardan, skew
+from models.sensors.rotations import skew
 from models.sensors.sensor_array import SensorArray, sensor_array
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.effects.accelerometers import names
-from models.systems.pitch_plane.run import outputs
+from models.systems.pitch_plane.effects.accelerometers import readings_of
+from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
-from models.systems.pitch_plane.scene import settings_of
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, within
 from validation.hard_cases.case import IMPLEMENTATIONS
-from validation.spatial.spatial_motion import ARRAYS, PATH, readings, tilted
+from validation.spatial.spatial_motion import ARRAYS, PATH, tilted
+from validation.spatial.spatial_motion import readings as readings_on_path
 
 TITLE = "Motion from accelerometers"
 SYSTEM: System = "drift"
@@ -49,7 +49,7 @@ RIGID = {
 BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
     rows += [_plain(), _order(), _tilt()]
@@ -64,50 +64,27 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _exact(name: str) -> list[Row]:
     """What needs no integration, on a motion whose derivatives are closed forms."""
     array = sensor_array(ARRAYS[name])
-    clean = readings(array.positions)
+    clean = readings_on_path(array.positions)
     found, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(found, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
     what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
+    shown = (
+        ("alpha", "angular acceleration from clean readings", alpha, "rad/s^2"),
+        ("rates", "rates up to sign from the symmetric part, squares", float(np.abs(squares).max()), "rad^2/s^2"),
+        ("consistency", "share of the readings that no rigid body explains", quality(array, clean).share, ""),
+    )
     return [
-        at_most(
-            f"{key}.alpha",
-            SYSTEM,
-            f"angular acceleration from clean readings, {what}",
-            alpha,
-            "rad/s^2",
-            BOUND,
-            why,
-            "closed form",
-        ),
-        at_most(
-            f"{key}.rates",
-            SYSTEM,
-            f"rates up to sign from the symmetric part, squares, {what}",
-            float(np.abs(squares).max()),
-            "rad^2/s^2",
-            BOUND,
-            why,
-            "closed form",
-        ),
-        at_most(
-            f"{key}.consistency",
-            SYSTEM,
-            f"share of the readings that no rigid body explains, {what}",
-            quality(array, clean).share,
-            "",
-            BOUND,
-            why,
-            "closed form",
-        ),
+        at_most(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit, BOUND, why, "closed form")
+        for id, words, value, unit in shown
     ]
 
 
 def _plain() -> Row:
     """The trap, shown by writing eq. (18) down as it stands."""
     floor = np.array(list(ARRAYS["5 in a plane"].values()))
-    relative = readings(floor) - readings(floor).mean(axis=1, keepdims=True)
+    relative = readings_on_path(floor) - readings_on_path(floor).mean(axis=1, keepdims=True)
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
     plain = 0.5 * (m[:, 2, 1] - m[:, 1, 2])
     half = 0.5 * (PATH.alpha[:, 0] + PATH.rates[:, 1] * PATH.rates[:, 2])
@@ -126,7 +103,7 @@ def _plain() -> Row:
 def _order() -> Row:
     """Order of the whole chain, readings to position, in the sampling period."""
     array = sensor_array(ARRAYS["5 in a tilted plane"])
-    clean = readings(array.positions)
+    clean = readings_on_path(array.positions)
     errors = [
         float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
         for n in (40, 20)
@@ -147,19 +124,11 @@ def _order() -> Row:
 def _tilt() -> Row:
     array, tilt, count = sensor_array(ARRAYS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    level = tuple(from_cardan(0.0, tilt, 0.0).tolist())
-    found = -motion(array, still, 1e-3, Start(orientation=level)).position[:, 0]
+    found = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
-    return at_most(
-        "motion.tilt",
-        SYSTEM,
-        f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2",
-        float(np.abs(found - law).max() / law[-1]),
-        "",
-        1e-10,
-        "a constant is integrated exactly",
-        "closed form",
-    )
+    what = f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2"
+    worst = float(np.abs(found - law).max() / law[-1])
+    return at_most("motion.tilt", SYSTEM, what, worst, "", 1e-10, "a constant is integrated exactly", "closed form")
 
 
 def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
@@ -220,21 +189,17 @@ def _engine(engine: str, duration: float) -> list[Row]:
             },
         }
     )
-    assembly = assemble(scene)
-    model = build(engine, assembly, settings_of(scene, engine))
-    run = model.run()
-    channels = outputs(assembly, run, model)
-    p = scene.effects["accelerometers"]
-    felt = np.stack([np.column_stack([channels[name][2] for name in own]) for own in names(p)], axis=1)
-    array, whole = sensor_array(RIGID), sensor_array(p.positions())
-    rate = channels["gyro"][2]
-    turning = np.column_stack([0 * rate, rate, 0 * rate])
-    found = angular_acceleration(spin(array, felt[:, :5]), turning)[:, 1]
-    true = _pitch_acceleration(assembly, scene, run)
-    loose, rigid = quality(whole, felt), quality(array, felt[:, :5])
+    run, p = simulate(scene, engine), scene.effects["accelerometers"]
+    readings, array = readings_of(run, p), sensor_array(RIGID)
+    felt = readings[:, :5]
+    turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
+    found = angular_acceleration(spin(array, felt), turning)[:, 1]
+    equations = build("reference", assemble(scene), settings_of(scene, "reference"))  # eq. (38) at every state
+    true = np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
+    loose = quality(sensor_array(p.positions()), readings)
     return [
-        *_follows("accelerometers", engine, array, felt[:, :5], run.states, None),
-        *_follows("gyro", engine, array, felt[:, :5], run.states, turning),
+        *_follows("accelerometers", engine, array, felt, run.states, None),
+        *_follows("gyro", engine, array, felt, run.states, turning),
         at_most(
             f"motion.pitch_acceleration.{engine}",
             SYSTEM,
@@ -259,7 +224,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             f"motion.rigid.{engine}",
             SYSTEM,
             f"share that no rigid body explains, the five rigid mounts, {engine}",
-            rigid.share,
+            quality(array, felt).share,
             "",
             BOUND,
             "rounding: far below the 5 % at which a mount is called loose",
@@ -272,14 +237,7 @@ def _follows(
     way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
 ) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
-    first = states[0].tolist()
-    start = Start(
-        (0.0, first[7], 0.0),
-        tuple(from_cardan(0.0, first[3], 0.0).tolist()),
-        (0.0, 0.0, first[6]),
-        (0.0, 0.0, first[2]),
-    )
-    found = motion(array, felt, 1e-3, start, rates=rates)
+    found = motion(array, felt, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
     errors = (
         ("pitch", found.angles()[:, 1] - states[:, 3], "rad", 1e-6),
         ("heave", found.position[:, 2] - states[:, 2], "m", 1e-5),
@@ -300,12 +258,6 @@ def _follows(
     ]
 
 
-def _pitch_acceleration(assembly: Any, scene: Any, run: Any) -> np.ndarray:
-    """Eq. (38) at every state of a run (rad/s^2)."""
-    equations = build("reference", assembly, settings_of(scene, "reference"))
-    return np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
-
-
 def _moving(count: int) -> tuple[np.ndarray, SensorArray, np.ndarray]:
     """True rates (n, 3) of a body that never stops turning, an array, and its clean readings without gravity."""
     t = PERIOD * np.arange(count)
@@ -321,32 +273,27 @@ def _noise(path: int, count: int) -> np.ndarray:
 
 def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     """Integration alone: the rate walks off as the square root of time."""
-    count = 6001
-    array = sensor_array(ARRAYS["5, one 1 m up"])
+    count, array = 6001, sensor_array(ARRAYS["5, one 1 m up"])
     errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
-    last = errors[:, -1] / array.gains()
-    law = NOISE**2 * PERIOD * (count - 1) * PERIOD
     row = mean_square(
         "motion.walk",
         SYSTEM,
         "rate error of integration alone after 60 s, mean square by its gain",
-        float(np.mean(last**2)),
-        law,
+        float(np.mean((errors[:, -1] / array.gains()) ** 2)),
+        NOISE**2 * PERIOD * (count - 1) * PERIOD,
         3 * paths,
         "m^2/s^2",
         f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
-    curve = np.sqrt(np.mean(errors**2, axis=(0, 2)))
-    return [row], {
-        "time": (PERIOD * np.arange(count))[::25].tolist(),
-        "integrated": curve[::25].tolist(),
-        "law": (NOISE * float(np.sqrt(np.mean(array.gains() ** 2))) * np.sqrt(PERIOD**2 * np.arange(count)))[
-            ::25
-        ].tolist(),
+    curves = {
+        "time": PERIOD * np.arange(count),
+        "integrated": np.sqrt(np.mean(errors**2, axis=(0, 2))),
+        "law": NOISE * rms(array.gains()) * np.sqrt(PERIOD**2 * np.arange(count)),
     }
+    return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
+def _held(curves: Data, quick: bool) -> list[Row]:
     """The symmetric part as a measurement: the error stays where it is."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
@@ -354,7 +301,7 @@ def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
     squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in found], axis=0)
     stated = np.sqrt(np.mean(found[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
-    walked = NOISE * float(np.sqrt(np.mean(array.gains() ** 2))) * np.sqrt(PERIOD * (count - 1) * PERIOD)
+    walked = NOISE * rms(array.gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
@@ -373,7 +320,7 @@ def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
             "motion.held.stated",
             SYSTEM,
             "the same by the standard deviation that the filter states",
-            late / float(np.sqrt(np.mean(stated[-count // 3 :] ** 2))),
+            late / rms(stated[-count // 3 :]),
             "",
             1.0,
             0.5 if quick else 0.2,
@@ -383,27 +330,15 @@ def _held(curves: dict[str, Any], quick: bool) -> list[Row]:
     ]
     if quick:  # too short to tell growth from settling
         return rows
-    grown = within(
-        "motion.held.growth",
-        SYSTEM,
-        "rms of the last third by that of the second sixth",
-        late / early,
-        "",
-        1.0,
-        0.2,
-        f"{why}; integration alone would grow by 1.8",
-        "closed form",
-    )
-    return [*rows, grown]
+    what, why = "rms of the last third by that of the second sixth", f"{why}; integration alone would grow by 1.8"
+    return [*rows, within("motion.held.growth", SYSTEM, what, late / early, "", 1.0, 0.2, why, "closed form")]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """What a flat arrangement costs."""
     rows = tuple(
-        (f"{line[0]:g}", *(f"{value:.3g}" for value in line[1:]))
-        if len(line) == 5
-        else (f"{line[0]:g}", "half and a bias", "", *(f"{value:.3g}" for value in line[1:]))
-        for line in data["gains"]
+        (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
+        for height, *gains in data["gains"]
     )
     note = (
         "Four sensors at the corners of a floor of 2 m by 1.2 m, a fifth above its middle: standard deviation of "
@@ -414,7 +349,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Noise gain by height, and the error of the rate over time."""
     from models.drawing.figures import plt
 
@@ -423,22 +358,22 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
         left.loglog(heights, [array.gains().max() for array in arrays], label=label)
-    both = [line for line in data["gains"] if len(line) == 5]
-    left.plot([line[0] for line in both], [line[2] for line in both], "ko", markersize=4, label="Monte Carlo")
-    left.plot([line[0] for line in both], [line[4] for line in both], "ko", markersize=4)
-    left.set_title("noise of the angular acceleration by that of the readings [1/m]")
-    left.set_xlabel("height of the fifth sensor above the plane of the others [m]")
+    height, _, spatial, _, plane = zip(*(line for line in data["gains"] if len(line) == 5), strict=True)
+    left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
+    left.plot(height, plane, "ko", markersize=4)
+    left.set(
+        title="noise of the angular acceleration by that of the readings [1/m]",
+        xlabel="height of the fifth sensor above the plane of the others [m]",
+    )
     curves = data["curves"]
-    names_ = {
-        "integrated": "integration alone",
-        "law": "its law, sqrt(t)",
-        "held": "with the symmetric part",
-        "stated": "what the filter states",
-    }
-    for key, style in (("integrated", "C0-"), ("law", "k--"), ("held", "C1-"), ("stated", "C7--")):
-        right.plot(curves["time"][: len(curves[key])], curves[key], style, label=names_[key], linewidth=1)
-    right.set_title("error of the angular velocity, rms [rad/s]")
-    right.set_xlabel("time [s]")
+    for key, style, label in (
+        ("integrated", "C0-", "integration alone"),
+        ("law", "k--", "its law, sqrt(t)"),
+        ("held", "C1-", "with the symmetric part"),
+        ("stated", "C7--", "what the filter states"),
+    ):
+        right.plot(curves["time"][: len(curves[key])], curves[key], style, label=label, linewidth=1)
+    right.set(title="error of the angular velocity, rms [rad/s]", xlabel="time [s]")
     for axis in (left, right):
         axis.legend()
     return [("What a flat arrangement costs, and what holds the rate", figure)]

@@ -1,13 +1,12 @@
 """Observed order of convergence of every fixed-step family on the study road."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import Row, System, Table, within
+from validation.common.rows import Data, Measured, System, Table, within
 from validation.common.scenes import road_scene
 
 TITLE = "Observed order of the largest state error on the study road"
@@ -61,7 +60,7 @@ def fitted(steps: tuple[float, ...], found: list[float]) -> float:
     return float(np.polyfit(np.log(steps), np.log(found), 1)[0])
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """A row per family; the truth is DOP853 at a tolerance of 1e-13; quick: one halving over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)
     truth = simulate(
@@ -88,7 +87,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"table": table, "steps": steps, "duration": duration}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.drift.point_mass import continuous, discrete, paths
 from validation.common.bands import mean_square
-from validation.common.rows import Row, System, Table, at_most, within
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, within
 
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
@@ -30,7 +29,7 @@ WHY = (
 )
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
     exact = {
         "continuous": [_continuous_error(x) for x in DAMPED],
@@ -175,7 +174,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     ]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
     note = (
@@ -185,9 +184,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import heading, plt
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
@@ -205,9 +204,6 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
     axes[1].set(title="Euler scheme against the limit, relative", xlabel="steps n")
     axes[1].legend()
-    figure.suptitle(
-        "A point mass under white force noise: 32 N at 1 kHz on 780 kg", x=0.01, ha="left", fontweight="bold"
-    )
-    return [
-        ("Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n).", figure)
-    ]
+    heading(figure, "A point mass under white force noise: 32 N at 1 kHz on 780 kg")
+    caption = "Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n)."
+    return [(caption, figure)]

@@ -14,7 +14,7 @@ from models.advice.price import runner as cost
 from models.advice.price.problem import Problem, Setting
 from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from validation.common.rows import Row, System, Table, aim, at_most, behaves, not_run, within
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.noise import normal
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.engines.spatial_reference import SpatialReference
 from models.vehicles.linear_vehicle import LinearVehicle, Rows, poles, shift

@@ -2,22 +2,18 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from models.core.noise import normal
-from models.core.result import Result
 from models.core.strict import read
 from models.core.systems import load
-from models.drift.score import errors
-from models.drift.section_forces import CHANNELS
+from models.drift.score import CHANNELS, errors
 from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import build
-from studies.stabilisers import Bench, Options, run
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
-from validation.common.scenes import force_scene, road_scene, write_forces
+from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
+from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, finding, within
+from validation.common.scenes import drive, force_scene
 from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
@@ -51,7 +47,7 @@ PROTOTYPE = {
 """Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
     rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
     with TemporaryDirectory() as name:
@@ -85,23 +81,20 @@ def _conventions() -> list[Row]:
             "rainflow reads turning points only; the sum is in another order",
             "native",
         ),
-        finding(
-            "score.damage.convention.walk",
-            SYSTEM,
-            "damage of a random walk with its residue closed, difference",
-            repeated["walk"],
-            "",
-            "0.34 between two libraries",
-            why,
-        ),
-        finding(
-            "score.damage.convention.white",
-            SYSTEM,
-            "the same for white noise",
-            repeated["white"],
-            "",
-            "0.001 between two libraries",
-            why,
+        *(
+            finding(
+                f"score.damage.convention.{name}",
+                SYSTEM,
+                what,
+                repeated[name],
+                "",
+                f"{told} between two libraries",
+                why,
+            )
+            for name, what, told in (
+                ("walk", "damage of a random walk with its residue closed, difference", 0.34),
+                ("white", "the same for white noise", 0.001),
+            )
         ),
     ]
 
@@ -115,7 +108,7 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     """The same run at rest and sinking as a whole: its heave runs away, and no section force knows."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        write_forces(simulate(road_scene(duration=duration), "reference"), folder, 1e-3)
+        drive(folder, duration)
         found = {engine: _sinking(engine, folder, duration) for engine in engines}
     rows = []
     for engine, (drift, worst) in found.items():
@@ -159,14 +152,12 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     """On a grade of 0.1 rad a spring is wrong and a prescribed pitch is right, in each implementation."""
     scene = load(SCENE, SHORT)
     options = read(Options, scene.options, "", "options")
-    table = scene.table()
-    table["effects"]["road"]["grade"] = options.grade
     (folder / "short").mkdir()
-    bench = Bench(build(table), "grade", options, folder / "short")
+    bench = Bench(roads(scene, options)["grade"], "grade", options, folder / "short")
     rows = []
     for engine in engines:
         for name, word in (("exact pitch prescribed", "accepted"), ("spring 300 N m/rad", "rejected")):
-            row = bench.row(name, bench.methods[name], bench.simulate(engine, bench.methods[name]))
+            row = _scored(bench, name, engine)
             rows.append(
                 behaves(
                     f"score.grade.{name.split()[0]}.{engine}",
@@ -183,67 +174,47 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study(folder: Path) -> list[dict[str, Any]]:
+def _study(folder: Path) -> list[Data]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
-    summary = run(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
-    assert not summary["failed"], summary["failed"]
-    return summary["rows"]
+    _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
+    assert not failed, failed
+    return rows
 
 
-def _verdicts(found: list[dict[str, Any]]) -> list[Row]:
+def _verdicts(found: list[Data]) -> list[Row]:
     """Known-good and known-bad runs get their words; the blind one is judged where it can know."""
     rows = []
     for row in found:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         place = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
-            wanted = "accepted" if name in GOOD else "rejected"
-            rows.append(
-                behaves(
-                    f"score.verdict.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, by damage",
-                    word,
-                    wanted,
-                    row["reason"],
-                    "closed form",
-                )
-            )
+            id, wanted = f"score.verdict.{_id(row)}", "accepted" if name in GOOD else "rejected"
+            rows.append(behaves(id, SYSTEM, f"{place}, by damage", word, wanted, row["reason"], "closed form"))
         if name in BAD:
-            found_alone = "accepted" if alone == "accepted" else "not accepted"
-            rows.append(
-                behaves(
-                    f"score.without-truth.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, without the truth",
-                    found_alone,
-                    "not accepted",
-                    row["reason without truth"],
-                    "none",
-                )
+            id, what, why = (
+                f"score.without-truth.{_id(row)}",
+                f"{place}, without the truth",
+                row["reason without truth"],
             )
+            told = "accepted" if alone == "accepted" else "not accepted"
+            rows.append(behaves(id, SYSTEM, what, told, "not accepted", why, "none"))
         elif word != "accepted" and alone == "accepted":
-            rows.append(
-                finding(
-                    f"score.unseen.{_id(row)}",
-                    SYSTEM,
-                    f"{place}, damage ratio of f3x where the run itself shows nothing",
-                    row["damage f3x"],
-                    "",
-                    word,
-                    "what an engineer without the truth cannot know",
-                    "none",
-                )
-            )
+            id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
+            why = "what an engineer without the truth cannot know"
+            rows.append(finding(id, SYSTEM, what, row["damage f3x"], "", word, why, "none"))
     return rows
 
 
-def _id(row: dict[str, Any]) -> str:
-    return ".".join((row["method"].replace(" ", "-").replace("/", "-"), row["road"], row["engine"]))
+def _slug(name: str) -> str:
+    return name.replace(" ", "-").replace("/", "-")
 
 
-def _blind(found: list[dict[str, Any]]) -> list[Row]:
+def _id(row: Data) -> str:
+    return ".".join((_slug(row["method"]), row["road"], row["engine"]))
+
+
+def _blind(found: list[Data]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
     return [
         within(
@@ -264,7 +235,7 @@ def _blind(found: list[dict[str, Any]]) -> list[Row]:
     ]
 
 
-def _long(folder: Path) -> list[dict[str, Any]]:
+def _long(folder: Path) -> list[Data]:
     """The prototype's methods over 60 s at 1 kHz on the road, in the reference."""
     scene = load(SCENE, LONG)
     (folder / "long").mkdir()
@@ -272,18 +243,17 @@ def _long(folder: Path) -> list[dict[str, Any]]:
     return [_scored(bench, name) for name in PROTOTYPE]
 
 
-def _scored(bench: Bench, name: str) -> dict[str, Any]:
+def _scored(bench: Bench, name: str, engine: str = "reference") -> Data:
     effects = bench.methods[name]
-    found: Result = bench.simulate("reference", effects)
-    return bench.row(name, effects, found)
+    return bench.row(name, effects, bench.simulate(engine, effects))
 
 
-def _beside(long: list[dict[str, Any]]) -> list[Row]:
+def _beside(long: list[Data]) -> list[Row]:
     """Pitch errors of 60 s beside the prototype's; a tumbled run has no damage to show."""
     rows = []
     for row in long:
         pitch, upright, along = PROTOTYPE[row["method"]]
-        name = row["method"].replace(" ", "-").replace("/", "-")
+        name = _slug(row["method"])
         why = "the same road, model and levels of noise; other noise samples, and here the filter estimates the inertia"
         shown = (
             ("pitch", "pitch error max [rad]", "largest pitch error", "rad", pitch),
@@ -307,7 +277,7 @@ def _beside(long: list[dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """Every stabiliser on both roads, and the same over 60 s beside the prototype."""
     found = []
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
@@ -336,7 +306,7 @@ HEADINGS = (
 )
 
 
-def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+def _cells(row: Data) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in CHANNELS)
     return (
         row.get("engine", "reference"),
@@ -352,11 +322,11 @@ def _cells(row: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """The study's figure to decide from."""
     if not data["study"]:
         return []
-    from studies.stabiliser_figures import decision
+    from models.drawing.drift import decision
 
     scene = load(SCENE)
     options = read(Options, scene.options, "", "options")

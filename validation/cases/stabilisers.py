@@ -2,7 +2,6 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -10,17 +9,16 @@ from models.core.noise import normal
 from models.core.result import Result
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble
+from models.systems.pitch_plane.virtual_measurement import Follow, follower, write_measurement
+from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from models.vehicles.pitch_plane import Parameters
-from studies.virtual_measurement import Follow, follower, write_measurement
-from studies.virtual_measurement import measure as measure_road
 from validation.common import checks
-from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.checks import trajectory_gap
+from validation.common.rows import Measured, Row, System, at_most, finding, within
 from validation.common.scenes import VEHICLES, road_scene
 
 TITLE = "Stabilisers"
@@ -42,7 +40,7 @@ EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
 BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""
     duration = 0.5 if quick else 10.0
     rows: list[Row] = []
@@ -51,7 +49,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             scene = road_scene(parameters, STEP, duration)
             measured, work = measure_road(scene), Path(name) / parameters
             work.mkdir()
-            write_measurement(measured, 1 / STEP, 1, work)
+            write_measurement(measured, work, STEP)
             follow, p = follower(scene, work), scene.vehicle_parameters()
             rows += _missing_mass(parameters, p, measured, follow, work)
             rows += _shifted_centre(parameters, p, measured, follow, work)
@@ -132,7 +130,7 @@ def _exact(follow: Follow, duration: float) -> list[Row]:
             f"stabilisers.{name}.{engine}",
             SYSTEM,
             f"{engine}, {words}: largest difference of any state to the reference",
-            checks.trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
+            trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
             "SI",
             1e-12,
             "the same stages see the same side of the band and the same moment",

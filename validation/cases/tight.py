@@ -1,11 +1,10 @@
 """Every engine at its recommended setting against an independent solution at tight tolerance, 20 s."""
 
 from pathlib import Path
-from typing import Any
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import Independence, Row, System, at_most
+from validation.common.rows import Independence, Measured, System, at_most
 from validation.common.scenes import gap, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
@@ -17,7 +16,7 @@ TOLERANCE = 1e-9
 """Of the solution that judges: the two families then differ by 5e-9, a twentieth of what they may; the row says so."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """A row for the reference's own uncertainty and one per implementation; quick: half a second."""
     duration = QUICK_DURATION if quick else DURATION
     scene = road_scene(step=STEP, duration=duration)

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from models.core.result import Result
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.rows import Row, System, at_most, not_run
-from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.rows import Measured, Row, System, at_most, not_run
+from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene
 
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
@@ -21,7 +21,7 @@ OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, 
 WHY = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> Measured:
     """Rows per road, excitation, vehicle and engine, each the worst over the steps; quick: one vehicle at one step."""
     rows: list[Row] = []
     steps = STEPS[-1:] if quick else STEPS
@@ -36,7 +36,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _forces(parameters: str, where: str, measured: Result, steps: tuple[float, ...]) -> list[Row]:
     """Force-excited by the wheel forces of a road-excited run, the samples held and linear."""
     with TemporaryDirectory() as name:
-        write_forces(measured, Path(name), 2e-3)
+        write_measurement(measured, Path(name), 2e-3)
         rows = []
         for interpolation in ("held", "linear"):
             scenes = [force_scene(Path(name), parameters, step, 2.0, interpolation) for step in steps]

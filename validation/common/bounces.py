@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.engines.assembly import Assembly
-from models.vehicles.linear import matrices
+from models.vehicles.description import matrices
 from models.vehicles.pitch_plane import Parameters
 
 AIR, PRESSED, HIT = range(3)

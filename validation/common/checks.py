@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE, RECOMMENDED
-from models.engines.protocol import Model, Settings, Trajectory, build
+from models.engines.protocol import build
 from models.vehicles import pitch_plane
 
 Make = Callable[[Assembly, Settings], Model]

@@ -47,6 +47,14 @@ class Row:
         return asdict(self)
 
 
+Data = dict[str, Any]
+"""What a case keeps for its tables and figures, by name."""
+Measured = tuple[list[Row], Data]
+"""What a case gives: rows and data."""
+Figures = list[tuple[str, Any]]
+"""Captions and figures of a case."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of the report: a title, a sentence on how to read it, headings and rows of text."""

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Result
-from models.core.time_series import write_time_series
+from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.virtual_measurement import write_measurement
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
 STUDY_ROAD = {"source": "study", "speed": 20.0}
@@ -36,6 +37,20 @@ def road_scene(
     )
 
 
+def drive(
+    folder: Path,
+    duration: float,
+    period: float = 1e-3,
+    step: float = 1e-3,
+    parameters: str = "itwm_drift",
+    road: dict[str, Any] | None = None,
+) -> Result:
+    """The virtual measurement on a road, in the reference: its files, sampled every ``period`` (s), in the folder."""
+    measured = run(road_scene(parameters, step, duration, road), "reference")
+    write_measurement(measured, folder, period)
+    return measured
+
+
 def force_scene(
     folder: Path,
     parameters: str = "itwm_drift",
@@ -45,7 +60,7 @@ def force_scene(
     override: dict[str, float] | None = None,
     effects: dict[str, Any] | None = None,
 ) -> Scene:
-    """The vehicle driven by the forces that ``write_forces`` left in the folder."""
+    """The vehicle driven by the forces that ``drive`` left in the folder."""
     forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": interpolation}}
     return build(
         {
@@ -57,16 +72,6 @@ def force_scene(
         "",
         folder,
     )
-
-
-def write_forces(measured: Result, folder: Path, period: float) -> None:
-    """Wheel forces and pitch of a road-excited run as the files that force-excited scenes read."""
-    every = round(period / float(measured.times[1] - measured.times[0]))
-    columns = {name: measured[name][::every] for name in ("f1", "f2", "pitch")}
-    write_time_series(
-        folder / "wheel_forces.csv", {"front": ("N", columns["f1"]), "rear": ("N", columns["f2"])}, period
-    )
-    write_time_series(folder / "pitch.csv", {"pitch": ("rad", columns["pitch"])}, period)
 
 
 def data_folder() -> Path | None:

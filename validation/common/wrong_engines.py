@@ -20,15 +20,30 @@ class Right:
 
     def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
         """States (len(times), 8) of y' = f(t, y)."""
-        return solve_ivp(f, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01).y.T
+
+        def rate(t: float, y: np.ndarray) -> np.ndarray:
+            return self.weighed(f(t, y))
+
+        solution = solve_ivp(
+            rate, times[[0, -1]], start, "DOP853", times, rtol=tolerance, atol=tolerance, max_step=0.01
+        )
+        return self.told(solution.y.T)
+
+    def weighed(self, rate: np.ndarray) -> np.ndarray:
+        """Rates (8,) as they are integrated."""
+        return rate
+
+    def told(self, states: np.ndarray) -> np.ndarray:
+        """States (n, 8) as they are told."""
+        return states
 
 
 class Still(Right):
     """The vehicle stays where it begins."""
 
-    def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def told(self, states: np.ndarray) -> np.ndarray:
         """The start, at all times."""
-        return np.tile(start, (len(times), 1))
+        return np.tile(states[0], (len(states), 1))
 
 
 class Boastful:
@@ -47,18 +62,17 @@ class Boastful:
 class Swapped(Right):
     """Front and rear wheel exchanged in the answer."""
 
-    def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    def told(self, states: np.ndarray) -> np.ndarray:
         """The states, two columns of which are exchanged."""
-        return super().integrate(f, times, start, tolerance)[:, [1, 0, 2, 3, 5, 4, 6, 7]]
+        return states[:, [1, 0, 2, 3, 5, 4, 6, 7]]
 
 
 class Weak(Right):
     """Every force 1 % too small."""
 
-    def integrate(self, f: Any, times: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
-        """The states of y' with accelerations that are 1 % smaller."""
-        scale = np.array([1.0] * 4 + [0.99] * 4)
-        return super().integrate(lambda t, y: scale * f(t, y), times, start, tolerance)
+    def weighed(self, rate: np.ndarray) -> np.ndarray:
+        """Accelerations that are 1 % smaller."""
+        return np.array([1.0] * 4 + [0.99] * 4) * rate
 
 
 WRONG = (Still, Boastful, Swapped, Weak)

@@ -11,21 +11,21 @@ from scipy.signal import butter, sosfiltfilt
 
 from models.core.noise import PITCH_SENSOR, normal
 from models.core.result import Result
-from models.core.strict import read
 from models.core.time_series import write_time_series
-from models.drift.section_forces import CHANNELS, section_forces
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.drift.growth import spring_of
+from models.drift.score import CHANNELS, rms, section_forces
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 from models.engines.stability import first_order, linearised
 from models.fatigue.damage import damage_ratio
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.effects.kalman_filter import guide_of, pull
-from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Estimate, Measurement, estimate
-from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE
+from models.systems.pitch_plane.effects.kalman_filter import BANDWIDTH, guide_of
+from models.systems.pitch_plane.pitch_filter import KEPT, PITCH, RATE, RELATIVE, Estimate, Measurement, estimate
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.scene import Scene, assemble, changed
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.common.scenes import road_scene, write_forces
+from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement, write_wheel_forces
+from models.vehicles.parameters.itwm_drift import PARAMETERS
+from validation.common.scenes import force_scene, road_scene
 
 ANGLE = float(np.deg2rad(0.1))
 """Deviation (rad) of the inertial unit, white at 1 kHz."""
@@ -35,8 +35,6 @@ FRACTION = 0.002
 """Deviation of the force noise by the largest force, at 1 kHz."""
 COARSE = 5e-3
 """Sampling period (s) of the statistics; deviations per sample then keep the intensity of those at 1 kHz."""
-WRONG = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
-"""The paper's perturbed model, as factors."""
 BAND = 15.0
 """Hz, up to which the artificial moment is judged."""
 
@@ -50,7 +48,7 @@ def at_period(deviation: float, period: float) -> float:
 def measured(folder: Path, duration: float, period: float) -> Result:
     """The virtual measurement on the study road, its files left in the folder; rows ``period`` (s) apart."""
     found = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
-    write_forces(found, folder, period)
+    write_measurement(found, folder, period)
     return found.every(period)
 
 
@@ -63,16 +61,10 @@ def driven(
     folder: Path, duration: float, effects: dict[str, Any], *, wrong: bool = False, geometry: str = "exact"
 ) -> Scene:
     """The vehicle under the forces in the folder, steps of 1 ms."""
-    plain = build_scene({"title": "kalman", "run": {"duration": duration, "step": 1e-3}}).vehicle_parameters()
-    override = {name: getattr(plain, name) * factor for name, factor in WRONG.items()} if wrong else {}
-    forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
-    table = {
-        "title": "kalman",
-        "vehicle": {"override": override, "geometry": geometry},
-        "run": {"duration": duration, "step": 1e-3},
-        "effects": forces | effects,
-    }
-    return build_scene(table, "", folder)
+    override = perturbed(PARAMETERS) if wrong else {}
+    return changed(
+        force_scene(folder, duration=duration, override=override, effects=effects), vehicle={"geometry": geometry}
+    )
 
 
 def noise_of(deviation: float, seed: int) -> dict[str, Any]:
@@ -131,10 +123,9 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
     import control
 
     force, angle = deviation, at_period(ANGLE, COARSE)
-    scene = driven(folder, 1.0, {}, geometry="linear")
-    assembly = assemble(scene)
-    stiffness, damping = pull(assembly, effect(scene))
-    free, pushes = _relative(assembly)
+    assembly = assemble(driven(folder, 1.0, {}, geometry="linear"))
+    stiffness, damping = spring_of(assembly.parameters, BANDWIDTH, 0.7)
+    free, pushes = relative(assembly)
     lever = np.zeros((6, 6))
     lever[RATE, [PITCH, RATE]] = np.array([stiffness, damping]) / assembly.parameters.I
     f, g0, g1 = first_order_hold(free, pushes)
@@ -154,14 +145,7 @@ def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]
     return step, control.dlyap(step, scaled @ scaled.T)
 
 
-def effect(scene: Scene) -> Any:
-    """The filter's settings as a scene without any of its own would have them."""
-    from models.systems.pitch_plane.effects.kalman_filter import Parameters
-
-    return read(Parameters, {"file": "", "force_deviation": 1.0, "pitch_deviation": 1.0}, "")
-
-
-def _relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
     """A (6, 6) and B (6, 2) of the relative states under the wheel forces, about zero pitch."""
     p = assembly.parameters
     pushes = np.zeros((8, 2))
@@ -189,8 +173,7 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     rest = assemble(build_scene({"title": "kalman", "vehicle": {"geometry": "linear"}, "run": {"duration": 1.0}}))
     p, start, angle = rest.parameters, rest.initial, at_period(ANGLE, COARSE)
     count = round(duration / COARSE) + 1
-    loads = np.tile([p.k1 * start[0], p.k2 * start[1]], (count, 1))
-    write_time_series(folder / "wheel_forces.csv", {"front": ("N", loads[:, 0]), "rear": ("N", loads[:, 1])}, COARSE)
+    write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE)
     seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE)
     own = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
@@ -234,9 +217,7 @@ INERTIA = 0.05
 def _scored(true: Result, run: Result) -> dict[str, float]:
     wanted, had = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (true, run))
     found = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
-    term = build_scene({"title": "", "run": {"duration": 1.0}}).vehicle_parameters().I * np.gradient(
-        true["pitch_rate"], true.times
-    )
+    term = PARAMETERS.I * np.gradient(true["pitch_rate"], true.times)
     moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
     low = butter(4, BAND, fs=1 / float(true.times[1]), output="sos")
     for name, moment in moments.items():
@@ -245,11 +226,6 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
     found["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
     found["inertia"] = float(run["inertia_share"][-1])
     return found
-
-
-def rms(values: np.ndarray) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:

@@ -13,14 +13,22 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.signals import Sampled, Smooth, Stacked
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, Trajectory
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.scene import Scene
+from models.engines.assembly import Assembly, Settings, Trajectory
+from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
 from validation.common import checks
-from validation.common.checks import Make
+from validation.common.checks import (
+    Make,
+    enforced_gap,
+    equilibrium_gap,
+    momentum_gap,
+    order_gap,
+    random_states,
+    relative,
+    run,
+    state_gap,
+)
 
 STEP = 1e-3
 PERIOD = 2e-3
@@ -108,7 +116,7 @@ class Bench:
     def accelerations(self, situation: str) -> np.ndarray:
         """The reference's accelerations (100, 4) in a situation."""
         reference, own = checks.engine("reference"), self.settings("reference")
-        return checks.accelerations(reference, getattr(self, situation), own, checks.random_states())
+        return checks.accelerations(reference, getattr(self, situation), own, random_states())
 
     def _swell(self, frequency: float) -> np.ndarray:
         """From 0 to 1 and back with a smooth start; frequency in rad/s."""
@@ -138,32 +146,32 @@ class Check:
 
 
 def _audit(bench: Bench, engine: str, make: Make) -> float:
-    own, states = bench.settings(engine), checks.random_states()
+    own, states = bench.settings(engine), random_states()
     return max(
-        checks.relative(checks.accelerations(make, getattr(bench, name), own, states), bench.accelerations(name))
+        relative(checks.accelerations(make, getattr(bench, name), own, states), bench.accelerations(name))
         for name in ("road", "linear")
     )
 
 
 def _order(bench: Bench, engine: str, make: Make) -> float:
-    return checks.order_gap(make, bench.road, replace(bench.settings(engine), step=SHORT), bench.truth)
+    return order_gap(make, bench.road, replace(bench.settings(engine), step=SHORT), bench.truth)
 
 
 def _momentum(bench: Bench, engine: str, make: Make) -> float:
-    return max(checks.momentum_gap(make, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
+    return max(momentum_gap(make, assembly, bench.settings(engine)) for assembly in (bench.linear, bench.held))
 
 
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
     """How far enforced moment and force are from the eliminated form."""
-    return lambda bench, engine, make: checks.enforced_gap(
+    return lambda bench, engine, make: enforced_gap(
         make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
     )
 
 
 def _twin(situation: str) -> Callable[[Bench, str, Make], float]:
     """Largest difference of the path to the reference's."""
-    return lambda bench, engine, make: checks.state_gap(
-        checks.run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
+    return lambda bench, engine, make: state_gap(
+        run(make, getattr(bench, situation), bench.settings(engine)), bench.path(situation)
     )
 
 
@@ -191,7 +199,7 @@ CHECKS: dict[str, Check] = {
         "SI",
         _rounding,
         "the closed form is exact",
-        lambda bench, engine, make: checks.equilibrium_gap(make, bench.flat, bench.settings(engine)),
+        lambda bench, engine, make: equilibrium_gap(make, bench.flat, bench.settings(engine)),
     ),
     "momentum": Check(
         "vertical momentum against impulse",

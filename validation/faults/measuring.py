@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from models.core import noise
-from models.drift import section_forces
+from models.drift import score
 from models.fatigue import counting, damage
 from models.measured import resampling, units
 from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
-from models.sensors.sensor_array import SensorArray, sensor_array
-from models.sensors.virtual_accelerometers import in_space
+from models.sensors.sensor_array import SensorArray, in_space, sensor_array
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Patch, attribute
 
@@ -101,10 +100,8 @@ def _gap() -> float:
 
 def _sections() -> float:
     """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
-    found = section_forces.section_forces(
-        np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6])
-    )
-    have = np.concatenate([found[name] for name in section_forces.CHANNELS])
+    found = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
+    have = np.concatenate([found[name] for name in score.CHANNELS])
     return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
 
@@ -257,21 +254,17 @@ FAULTS = (
     Fault(
         "section forces in the inertial frame",
         "sections",
-        attribute(
-            "models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)
-        ),
+        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, 0.0 * pitch)),
     ),
     Fault(
         "body turned the other way",
         "sections",
-        attribute(
-            "models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)
-        ),
+        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f3, f4, -pitch)),
     ),
     Fault(
         "front and rear sections exchanged",
         "sections",
-        attribute("models.drift.section_forces:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
+        attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
     ),
     Fault(
         "gravity turned round",

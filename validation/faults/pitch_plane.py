@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
-from validation.common.rows import Row, Table, finding, within
+from validation.common.rows import Data, Figures, Row, Table, finding, within
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
@@ -24,13 +23,13 @@ HIDDEN = (
 
 def measure(
     faults: Sequence[Fault] = FAULTS, clean: Sequence[Fault] = CLEAN, vehicles: Sequence[str] = (TWIN, SYMMETRIC)
-) -> dict[str, Any]:
+) -> Data:
     """Records of engines without a fault and with each of some, on some vehicles, under every check."""
     benches = [Bench(name, DURATION) for name in vehicles]
     return {name: [_record(fault, benches) for fault in own] for name, own in (("clean", clean), ("faults", faults))}
 
 
-def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
+def _record(fault: Fault, benches: list[Bench]) -> Data:
     """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
     ratios = {
         bench.parameters: {
@@ -38,7 +37,8 @@ def _record(fault: Fault, benches: list[Bench]) -> dict[str, Any]:
         }
         for bench in benches
     }
-    return {"fault": fault.name, "place": _place(fault), "engines": fault.engines, "ratios": ratios}
+    place = next((name for name, group in PLACES.items() if fault in group), "nowhere")
+    return {"fault": fault.name, "place": place, "engines": fault.engines, "ratios": ratios}
 
 
 def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
@@ -47,32 +47,30 @@ def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def _place(fault: Fault) -> str:
-    places = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
-    return next((name for name, group in places.items() if fault in group), "nowhere")
+PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
 
 
-def seen(record: dict[str, Any], check: str, vehicle: str = TWIN) -> bool:
+def seen(record: Data, check: str, vehicle: str = TWIN) -> bool:
     """Whether a check sees the fault in every engine that it was planted in."""
     return all(ratio is None or ratio > 1 for ratio in _of(record, check, vehicle))
 
 
-def least(record: dict[str, Any], check: str, vehicle: str) -> float:
+def least(record: Data, check: str, vehicle: str) -> float:
     """Smallest size over tolerance among the engines; infinite for refused runs."""
     return min(math.inf if ratio is None else ratio for ratio in _of(record, check, vehicle))
 
 
-def _of(record: dict[str, Any], check: str, vehicle: str) -> list[float | None]:
+def _of(record: Data, check: str, vehicle: str) -> list[float | None]:
     return [ratios[check] for ratios in record["ratios"][vehicle].values()]
 
 
-def caught(record: dict[str, Any], vehicle: str = TWIN) -> bool:
+def caught(record: Data, vehicle: str = TWIN) -> bool:
     """Whether in every engine at least one check sees the fault."""
     engines = record["ratios"][vehicle].values()
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
-def rows(data: dict[str, Any]) -> list[Row]:
+def rows(data: Data) -> list[Row]:
     """Caught, false alarms, hidden by symmetry where both vehicles ran, and what one check alone catches."""
     clean, found = data["clean"], data["faults"]
     alarms = sum(
@@ -83,6 +81,7 @@ def rows(data: dict[str, Any]) -> list[Row]:
         for ratio in ratios.values()
     )
     single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
+    told = [f"{record['fault']} ({next(name for name in CHECKS if seen(record, name))})" for record in single]
     return [
         within(
             "planted.caught",
@@ -114,18 +113,18 @@ def rows(data: dict[str, Any]) -> list[Row]:
             len(single),
             "faults",
             "few",
-            "what would pass if that check were dropped: " + _listed(single),
+            "what would pass if that check were dropped: " + (", ".join(told) or "none"),
             "native",
         ),
     ]
 
 
-def _both(data: dict[str, Any]) -> bool:
+def _both(data: Data) -> bool:
     """Whether the symmetric vehicle ran, too."""
     return all(SYMMETRIC in record["ratios"] for record in data["faults"])
 
 
-def _hidden(found: list[dict[str, Any]]) -> Row:
+def _hidden(found: list[Data]) -> Row:
     missed = [record for record in found if not caught(record, SYMMETRIC)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
     return within(
@@ -141,7 +140,7 @@ def _hidden(found: list[dict[str, Any]]) -> Row:
     )
 
 
-def lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
+def lines(data: Data) -> list[tuple[str, ...]]:
     """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
     return [
         (
@@ -155,18 +154,12 @@ def lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
     ]
 
 
-def _listed(records: list[dict[str, Any]]) -> str:
-    """Faults with the one check that sees each."""
-    sees = [(record["fault"], next(name for name in CHECKS if seen(record, name))) for record in records]
-    return ", ".join(f"{fault} ({name})" for fault, name in sees) or "none"
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Data) -> list[Table]:
     """The checks with their tolerances, and every fault with what sees it."""
     return [_check_table(data), _fault_table(data)]
 
 
-def _check_table(data: dict[str, Any]) -> Table:
+def _check_table(data: Data) -> Table:
     lines = []
     for name, check in CHECKS.items():
         worst = max(
@@ -193,7 +186,7 @@ def _check_table(data: dict[str, Any]) -> Table:
     return Table("The checks", note, headings, tuple(lines))
 
 
-def _fault_table(data: dict[str, Any]) -> Table:
+def _fault_table(data: Data) -> Table:
     lines = tuple(
         (
             record["fault"],
@@ -216,7 +209,7 @@ def _fault_table(data: dict[str, Any]) -> Table:
     )
 
 
-def _size(record: dict[str, Any], name: str) -> str:
+def _size(record: Data, name: str) -> str:
     """The smaller size among the engines, from its ratio to the tolerance."""
     sizes = [
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
@@ -226,7 +219,7 @@ def _size(record: dict[str, Any], name: str) -> str:
     return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Data) -> Figures:
     """How far above its tolerance each check stands, fault by fault, on both vehicles where both ran."""
     if not _both(data):
         return []

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.engines.assembly import Assembly
-from models.engines.protocol import Model, Settings, Trajectory, build
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.engines.protocol import build
 from validation.common.checks import Make
 from validation.faults import changes as change
 from validation.faults import patches
@@ -152,7 +152,7 @@ ADAPTER = (
     Fault(
         "gravity missing on one wheel",
         MUJOCO,
-        inside=attribute("models.engines.mujoco:_spec", patches.weightless_wheel),
+        inside=attribute("models.engines.mujoco:specification", patches.weightless_wheel),
     ),
     Fault(
         "strut measured along the rotating body",

@@ -10,9 +10,10 @@ from models.engines.protocol import build
 from models.sensors.rigid_body_motion import Start, angular_acceleration, motion, quality, spin
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import sensor_array
-from models.systems.pitch_plane.run import outputs
-from validation.hard_cases import setups
-from validation.hard_cases.case import IMPLEMENTATIONS, Case
+from models.systems.pitch_plane.effects.accelerometers import readings_of
+from models.systems.pitch_plane.run import run as simulate
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, driven, largest, rms, settings, vehicle
 
 PERIOD, NOISE = 1e-3, 0.1
 FLOOR = {
@@ -22,10 +23,9 @@ FLOOR = {
     "rr": (-0.9, 0.6, 0.2),
     "mid": (0.1, 0.0, 0.2),
 }
-RAISED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
+LIFTED = FLOOR | {"mid": (0.1, 0.0, 0.17)}
 ROOFED = FLOOR | {"mid": (0.1, 0.0, -0.8)}
 BRACKET = {"battery": {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}}
-REFUSED: dict[str, Any] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 
 def _read(
@@ -40,18 +40,16 @@ def _read(
     After a kick on a flat road, or in free fall from an initial state.
     """
     sensors = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()} | (extra or {})
-    start = setups.vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
-    base = setups.vehicle(
+    start = vehicle().initial + np.array([0, 0, 0, 0, 0, 0, 0.5, 1.5])
+    base = vehicle(
         initial=start if initial is None else initial,
         effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
     )
-    assembly = base if initial is None else setups.driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
-    model = build(engine, assembly, setups.settings(engine, PERIOD, 0.3))
-    run = model.run()
-    channels = outputs(assembly, run, model)
-    felt = np.stack(
-        [np.column_stack([channels[f"a{axis}{i + 1}"][2] for axis in "xyz"]) for i in range(len(sensors))], axis=1
-    )
+    assembly = base if initial is None else driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
+    own = settings(engine, PERIOD, 0.3)
+    model = build(engine, assembly, own)
+    run = simulate(assembly.scene, engine, own, assembly)
+    felt = readings_of(run, assembly.scene.effects["accelerometers"])
     true = np.array([model.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
     return felt, run.states, true
 
@@ -73,29 +71,29 @@ def plane(engine: str, folder: Path) -> float:
     """Sensors on a flat floor; the pitch axis lies in their plane."""
     felt, states, true = _read(engine, FLOOR)
     found = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
-    return setups.largest(found - true) / setups.largest(true)
+    return largest(found - true) / largest(true)
 
 
 def plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
     felt, _, true = _read("reference", FLOOR)
-    part = setups.rms(_plain(FLOOR, felt)) / setups.rms(true)
+    part = rms(_plain(FLOOR, felt)) / rms(true)
     return f"the printed formula gives {part:.2f} of the pitch acceleration"
 
 
 def nearly_plane(engine: str, folder: Path) -> float:
     """The fifth sensor 3 cm above the others, and noise: of what the noise of the readings must leave."""
-    felt, states, true = _read(engine, RAISED, noise=NOISE)
-    array = sensor_array(RAISED)
+    felt, states, true = _read(engine, LIFTED, noise=NOISE)
+    array = sensor_array(LIFTED)
     found = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
     least = array.gains(planar=True)[1]
-    return setups.rms(found - true) / (NOISE * least)
+    return rms(found - true) / (NOISE * least)
 
 
 def nearly_plane_naive(folder: Path) -> str:
     """The printed formula on the same readings."""
-    felt, _, true = _read("reference", RAISED, noise=NOISE)
-    error = setups.rms(_plain(RAISED, felt) - true)
+    felt, _, true = _read("reference", LIFTED, noise=NOISE)
+    error = rms(_plain(LIFTED, felt) - true)
     return f"the printed formula errs by {error:.1f} rad/s^2 for {NOISE:g} m/s^2 of noise"
 
 
@@ -107,13 +105,13 @@ def bracket(engine: str, folder: Path) -> float:
     keep = [name != loose for name in places]
     rest = sensor_array({name: place for name, place in places.items() if name != loose})
     found = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
-    return setups.largest(found - true) / setups.largest(true)
+    return largest(found - true) / largest(true)
 
 
 def bracket_naive(folder: Path) -> str:
     """The printed formula on all six."""
     felt, _, true = _read("reference", ROOFED, BRACKET)
-    wrong = setups.largest(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / setups.largest(true)
+    wrong = largest(_plain(ROOFED | {"battery": (0.6, 0.3, 0.0)}, felt) - true) / largest(true)
     return f"all six together are wrong by {100 * wrong:.0f} % of the largest pitch acceleration"
 
 
@@ -121,7 +119,7 @@ def gap(engine: str, folder: Path) -> float:
     """One reading is not a number."""
     felt, states, _ = _read(engine, ROOFED)
     felt[100, 2, 0] = np.nan
-    return setups.largest(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
+    return largest(motion(sensor_array(ROOFED), felt, PERIOD).rates - _turning(states))
 
 
 def gap_naive(folder: Path) -> str:
@@ -134,11 +132,10 @@ def gap_naive(folder: Path) -> str:
 
 def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.ndarray, Start]:
     """A vehicle in free fall that turns, its struts unstressed: readings, states and the start."""
-    p, sine, speed = setups.vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
+    p, sine, speed = vehicle().parameters, np.sin(pitch), np.cos(pitch) * rate
     start = np.array([-p.b * sine, p.a * sine, 0, pitch, -p.b * speed, p.a * speed, 0, rate])
     felt, states, _ = _read(engine, ROOFED, initial=start)
-    orientation = tuple(from_cardan(0.0, pitch, 0.0).tolist())
-    return felt, states, Start((0.0, rate, 0.0), orientation)
+    return felt, states, Start.pitched(pitch, rate)
 
 
 def tumbling(engine: str, folder: Path) -> float:
@@ -146,13 +143,13 @@ def tumbling(engine: str, folder: Path) -> float:
     felt, states, start = _falling(engine, 1.4, 3.0)
     found = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
     none = np.zeros(len(states))
-    return setups.largest(matrix(found) - matrix(from_cardan(none, states[:, 3], none)))
+    return largest(matrix(found) - matrix(from_cardan(none, states[:, 3], none)))
 
 
 def locked(engine: str, folder: Path) -> float:
     """The nose points straight up, and someone asks for roll and yaw."""
     felt, _, start = _falling(engine, np.pi / 2, 0.0)
-    return setups.largest(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
+    return largest(motion(sensor_array(ROOFED), felt, PERIOD, start).angles()[:, [0, 2]])
 
 
 def locked_naive(folder: Path) -> str:

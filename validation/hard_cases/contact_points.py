@@ -6,11 +6,10 @@ import mujoco
 import numpy as np
 
 from models.core.signals import Sampled
-from models.engines.assembly import Assembly
-from models.engines.protocol import Trajectory
+from models.engines.assembly import Assembly, Trajectory
 from models.systems.pitch_plane.effects.contact_points import contact_points
-from validation.hard_cases import setups
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import IMPLICIT, driven, largest, run, vehicle
 
 STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 LOAD = 1000.0
@@ -24,19 +23,19 @@ def _compressions(assembly: Assembly, found: Trajectory) -> np.ndarray:
 
 def step_answer(engine: str, folder: Path) -> float:
     """A force from 0 to 1 kN, steps from a tenth to twenty times the time constant."""
-    base = setups.vehicle()
+    base = vehicle()
     values = np.zeros((10, 2))
     values[1:] = LOAD
     p, worst = base.parameters, 0.0
     for step in STEPS:
-        assembly = setups.driven(base, Sampled(values, 2e-2, held=True))
+        assembly = driven(base, Sampled(values, 2e-2, held=True))
         if engine == "exudyn":  # its implicit integrators refuse held samples
-            found = setups.run(engine, assembly, min(step, 2e-3), 0.1)
+            found = run(engine, assembly, min(step, 2e-3), 0.1)
         else:
-            found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
+            found = run(engine, assembly, step, 0.1, IMPLICIT[engine])
         since = np.maximum(found.times - 2e-2, 0.0)
         truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
-        worst = max(worst, setups.largest(_compressions(assembly, found)[:, 0] - truth) / (LOAD / p.k1))
+        worst = max(worst, largest(_compressions(assembly, found)[:, 0] - truth) / (LOAD / p.k1))
     return worst
 
 
@@ -58,14 +57,15 @@ def step_answer_naive(folder: Path) -> str:
 
 def linear_load(engine: str, folder: Path) -> float:
     """A ramp of 1 kN in 20 ms: the compression lags by exactly what has not arrived."""
-    base = setups.vehicle()
-    values = LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
-    assembly = setups.driven(base, Sampled(values, 2e-2, held=False))
-    p, worst = base.parameters, 0.0
-    for step in (1e-3, 5e-3, 2e-2):
-        found = setups.run(engine, assembly, step, 0.1, setups.IMPLICIT[engine])
-        worst = max(worst, setups.largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)))
-    return worst / (LOAD / p.k1)
+    return max(_ramp_error(engine, step, IMPLICIT[engine]) for step in (1e-3, 5e-3, 2e-2))
+
+
+def _ramp_error(engine: str, step: float, integrator: str) -> float:
+    """Largest difference to the ramp's closed form at each row's own time, of f/k."""
+    base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
+    assembly, p = driven(base, Sampled(rising, 2e-2, held=False)), base.parameters
+    found = run(engine, assembly, step, 0.1, integrator)
+    return largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)) / (LOAD / p.k1)
 
 
 def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
@@ -80,23 +80,17 @@ def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
 
 def stamps(engine: str, folder: Path) -> float:
     """The same ramp along an adaptive run, whose rows lie anywhere."""
-    name = {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4")
-    base = setups.vehicle()
-    values = LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
-    assembly = setups.driven(base, Sampled(values, 2e-2, held=False))
-    found = setups.run(engine, assembly, 1e-3, 0.1, name)
-    p = base.parameters
-    return setups.largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)) / (LOAD / p.k1)
+    return _ramp_error(engine, 1e-3, {"reference": "DOP853", "exudyn": "DOPRI5"}.get(engine, "RK4"))
 
 
 def undamped(engine: str, folder: Path) -> float:
     """A tyre without damping: the contact point has no state and follows its force at once."""
-    base = setups.vehicle(d1=0.0, d2=0.0)
+    base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
-    assembly = setups.driven(base, Sampled(values, 1e-3, held=True))
-    found = setups.run(engine, assembly, 1e-3, 0.1)
+    assembly = driven(base, Sampled(values, 1e-3, held=True))
+    found = run(engine, assembly, 1e-3, 0.1)
     stiffness = base.parameters.k1
-    return setups.largest(_compressions(assembly, found)[:100] - values / stiffness) / (LOAD / stiffness)
+    return largest(_compressions(assembly, found)[:100] - values / stiffness) / (LOAD / stiffness)
 
 
 CASES = (

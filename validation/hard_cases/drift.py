@@ -9,13 +9,14 @@ import numpy as np
 from models.core.result import Result
 from models.drift.growth import drift_off_time
 from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.scenes import STUDY_ROAD, force_scene, road_scene, write_forces
-from validation.hard_cases import setups
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from models.systems.pitch_plane.virtual_measurement import write_measurement
+from validation.common.scenes import STUDY_ROAD, force_scene, road_scene
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, largest
 
 DURATION = 8.0
 TILT = 0.1
@@ -37,7 +38,7 @@ def measured(grade: float = 0.0) -> Result:
 
 def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, tilt: float = 0.0) -> Scene:
     """The vehicle under the forces of that run, started with a wrong pitch rate (rad/s)."""
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=DURATION, effects=effects)
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
@@ -171,7 +172,7 @@ def before_drift(engine: str, folder: Path) -> float:
     other = "mujoco" if engine == "reference" else "reference"
     one, two = (simulate(scene, name) for name in (engine, other))
     held = slice(None, _off(one, measured()))
-    return setups.largest(one.states[held] - two.states[held]) / setups.largest(two.states[held])
+    return largest(one.states[held] - two.states[held]) / largest(two.states[held])
 
 
 def _off(run: Result, truth: Result) -> int | None:
@@ -183,15 +184,13 @@ def _off(run: Result, truth: Result) -> int | None:
 def before_drift_naive(folder: Path) -> str:
     """Two step sizes of the reference, compared over 30 s."""
     truth = simulate(road_scene(duration=30.0), "reference")
-    write_forces(truth, folder, 1e-3)
+    write_measurement(truth, folder, 1e-3)
     scene = force_scene(folder, duration=30.0, effects={"force_noise": {"deviation": HEAVY}})
     coarse, fine = (simulate(scene, "reference", Settings("RK4", step, 30.0)) for step in (1e-3, 5e-4))
     gap = np.abs(coarse["pitch"] - fine["pitch"][::2])
     before = gap[: _off(coarse, truth)].max()
     return f"two step sizes of the reference differ by {before:.0e} rad before, {gap.max():.0e} after"
 
-
-REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
 
 CASES = (
     Case(

@@ -7,7 +7,8 @@ import numpy as np
 
 from models.engines.assembly import Assembly
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case, Word
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, exact, largest, run, unchecked, vehicle
 
 IMPLICIT = {**setups.IMPLICIT, "reference": "LSODA"}
 """Radau takes minutes here: its error estimate chases the rounding of kN on a wheel of a gram."""
@@ -22,65 +23,68 @@ def _off(base: Assembly) -> Assembly:
 
 def _settled(engine: str, base: Assembly, integrator: str = "") -> float:
     """Distance from the equilibrium after 3 s, relative to the start's."""
-    end = setups.run(engine, _off(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
-    return setups.largest(end - base.initial) / 0.01
+    end = run(engine, _off(base), 1e-3, 3.0, integrator, tolerance=TOLERANCE).states[-1]
+    return largest(end - base.initial) / 0.01
 
 
 def undamped(engine: str, folder: Path) -> float:
     """No damper at all, 1 s, against the matrix exponential."""
-    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    found = setups.run(engine, base, 1e-3, 1.0).states
-    truth = setups.exact(base, 1e-3, 1000)
-    return setups.largest(found - truth) / setups.largest(truth - base.initial)
+    return _ringing(engine)
+
+
+def _ringing(engine: str, integrator: str = "") -> float:
+    base, truth = _undamped()
+    return largest(run(engine, base, 1e-3, 1.0, integrator).states - truth) / largest(truth - base.initial)
+
+
+def _undamped() -> tuple[Assembly, np.ndarray]:
+    """The vehicle without dampers, off its equilibrium, and its states over 1 s."""
+    base = _off(vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
+    return base, exact(base, 1e-3, 1000)
 
 
 def undamped_naive(folder: Path) -> str:
     """Explicit Euler past the check: every mode grows."""
-    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    found = setups.unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
-    truth = setups.exact(base, 1e-3, 1000)
+    base, truth = _undamped()
+    found = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
-        f"Exudyn's explicit Euler past the check: {setups.largest(found - base.initial):.2g} where the truth "
-        f"stays below {setups.largest(truth - base.initial):.2g}, finite and unwarned"
+        f"Exudyn's explicit Euler past the check: {largest(found - base.initial):.2g} where the truth "
+        f"stays below {largest(truth - base.initial):.2g}, finite and unwarned"
     )
 
 
 def undamped_euler(engine: str, folder: Path) -> float:
     """The same with a first-order explicit method."""
-    base = _off(setups.vehicle("asymmetric_twin", "linear", d1=0.0, d2=0.0, d3=0.0, d4=0.0))
-    name = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine]
-    found, truth = setups.run(engine, base, 1e-3, 1.0, name).states, setups.exact(base, 1e-3, 1000)
-    return setups.largest(found - truth) / setups.largest(truth - base.initial)
+    return _ringing(engine, {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}[engine])
 
 
 def light_wheel(engine: str, folder: Path) -> float:
     """Wheels of 0.75 g under 750 kg at the recommended setting: poles of -1.4e7 1/s."""
-    return _settled(engine, setups.vehicle(m1=7.5e-4, m2=7.5e-4))
+    return _settled(engine, vehicle(m1=7.5e-4, m2=7.5e-4))
 
 
 def light_wheel_implicit(engine: str, folder: Path) -> float:
     """The same with an implicit integrator."""
-    return _settled(engine, setups.vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
+    return _settled(engine, vehicle(m1=7.5e-4, m2=7.5e-4), IMPLICIT[engine])
 
 
 def stiff_tyre(engine: str, folder: Path) -> float:
     """Tyres of 1e9 N/m at the recommended setting: wheels at 8,200 rad/s."""
-    return _settled(engine, setups.vehicle(k1=1e9, k2=1e9))
+    return _settled(engine, vehicle(k1=1e9, k2=1e9))
 
 
 def stiff_tyre_implicit(engine: str, folder: Path) -> float:
     """The same with an implicit integrator."""
-    return _settled(engine, setups.vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
+    return _settled(engine, vehicle(k1=1e9, k2=1e9), IMPLICIT[engine])
 
 
 def stiff_tyre_naive(folder: Path) -> str:
     """Two steps past the check."""
-    base = setups.vehicle(k1=1e9, k2=1e9)
-    end = setups.unchecked("mujoco", _off(base), 1e-3, 2e-3).states[-1]
-    return f"MuJoCo past the check: {setups.largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
+    base = vehicle(k1=1e9, k2=1e9)
+    end = unchecked("mujoco", _off(base), 1e-3, 2e-3).states[-1]
+    return f"MuJoCo past the check: {largest(end - base.initial):.0f} m/s after 2 ms, finite and unwarned"
 
 
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
 AT_REST = "the vehicle is back in its equilibrium after 3 s"
 GONE = "the slowest mode, -10 1/s, has shrunk to 1e-13; first-order steps damp it a little less"
 

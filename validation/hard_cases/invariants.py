@@ -10,11 +10,10 @@ from models.core.result import Result
 from models.core.signals import Sampled
 from models.engines.assembly import Assembly, Mode
 from models.engines.protocol import build
-from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.hard_cases import setups
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import driven, largest, run, settings, static_forces, tight, vehicle
 
 VEHICLES = ("itwm_drift", "asymmetric_twin")
 G = 9.81
@@ -25,15 +24,15 @@ def rest(engine: str, folder: Path) -> float:
     worst = 0.0
     for parameters in VEHICLES:
         for geometry in ("exact", "linear"):
-            base = setups.vehicle(parameters, geometry)
-            worst = max(worst, setups.largest(setups.run(engine, base, 1e-3, 2.0).states - base.initial))
+            base = vehicle(parameters, geometry)
+            worst = max(worst, largest(run(engine, base, 1e-3, 2.0).states - base.initial))
     return worst
 
 
 def rest_naive(folder: Path) -> str:
     """What a start at zero, the unstressed vehicle, does."""
-    base = setups.vehicle(initial=np.zeros(8))
-    fall = setups.largest(setups.run("reference", base, 1e-3, 2.0).states[:, 4:7])
+    base = vehicle(initial=np.zeros(8))
+    fall = largest(run("reference", base, 1e-3, 2.0).states[:, 4:7])
     return f"a start from the coordinates' zero falls at up to {fall:.2f} m/s"
 
 
@@ -41,113 +40,109 @@ def down(engine: str, folder: Path) -> float:
     """Tyre loads of the vehicle at rest: half of (750 + 30) kg each, and by the lever for the twin."""
     worst = 0.0
     for parameters in VEHICLES:
-        base = setups.vehicle(parameters)
+        base = vehicle(parameters)
         p = base.parameters
-        found = setups.run(engine, base, 1e-3, 0.1)
-        channels = outputs(base, found)
+        found = simulate(base.scene, engine, settings(engine, 1e-3, 0.1), base)
         front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
         rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
         for name, load in (("f1", front), ("f2", rear)):
-            worst = max(worst, setups.largest(channels[name][2] - load))
+            worst = max(worst, largest(found[name] - load))
     return worst
 
 
 def nose_up(engine: str, folder: Path) -> float:
     """Accelerations at rest with the nose 0.01 rad up, written out by hand for the linear geometry."""
-    base, tilt = setups.vehicle("asymmetric_twin", "linear"), 0.01
+    base, tilt = vehicle("asymmetric_twin", "linear"), 0.01
     p, state = base.parameters, base.initial.copy()
     state[3] += tilt
-    found = build(engine, base, setups.settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
+    found = build(engine, base, settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
     front, rear = -p.k3 * p.b * tilt, p.k4 * p.a * tilt  # the front strut is pulled, the rear one pressed
     hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
     if not (found[0] < 0 < found[1] and found[3] < 0):
         return np.inf
-    return setups.largest(found - hand) / setups.largest(hand)
+    return largest(found - hand) / largest(hand)
 
 
 def push(engine: str, folder: Path) -> float:
     """Each wheel pushed up by 100 N beside the loads that carry it: the accelerations, whole, against 100 N / mass."""
-    base = setups.vehicle("asymmetric_twin")
+    base = vehicle("asymmetric_twin")
     p, worst = base.parameters, 0.0
     for wheel, mass in enumerate((p.m1, p.m2)):
-        forces = setups.static_forces(base, 3, 1e-3)
+        forces = static_forces(base, 3, 1e-3)
         forces.values[:, wheel] += 100.0
-        model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 2e-3))
+        model = build(engine, driven(base, forces), settings(engine, 1e-3, 2e-3))
         wanted = np.zeros(4)
         wanted[wheel] = -100.0 / mass
-        worst = max(worst, setups.largest(model.acceleration(0.0, base.initial) - wanted) * mass / 100.0)
+        worst = max(worst, largest(model.acceleration(0.0, base.initial) - wanted) * mass / 100.0)
     return worst
 
 
 def raised_front(engine: str, folder: Path) -> float:
     """More force under the front wheel, for 50 ms: the front must rise, the pitch grow."""
-    base = setups.vehicle("asymmetric_twin")
-    forces = setups.static_forces(base, 51, 1e-3)
+    base = vehicle("asymmetric_twin")
+    forces = static_forces(base, 51, 1e-3)
     forces.values[:, 0] += 500.0
-    end = setups.run(engine, setups.driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
-    truth = setups.tight(setups.driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    end = run(engine, driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
+    truth = tight(driven(base, forces), 1e-3, 0.05).states[-1] - base.initial
     if not (end[3] > 0 and end[0] < 0 and end[2] - base.parameters.b * np.sin(end[3]) < 0):
         return np.inf
-    return setups.largest(end - truth) / setups.largest(truth)
+    return largest(end - truth) / largest(truth)
 
 
 def momentum(engine: str, folder: Path) -> float:
     """I b' - m1 b z1' + m2 a z2' and sum m z', linear geometry, held noise, whatever the springs do."""
-    base = setups.vehicle("asymmetric_twin", "linear")
+    base = vehicle("asymmetric_twin", "linear")
     p = base.parameters
-    forces = setups.static_forces(base, 1000, 1e-3, noise=800.0)
-    rates = setups.run(engine, setups.driven(base, forces), 1e-3, 1.0).states[:, 4:]
+    forces = static_forces(base, 1000, 1e-3, noise=800.0)
+    rates = run(engine, driven(base, forces), 1e-3, 1.0).states[:, 4:]
     t = 1e-3 * np.arange(1001)[:, None]
     pushed = np.vstack((np.zeros(2), np.cumsum(forces.values * 1e-3, axis=0)))
     angular = rates @ np.array([-p.m1 * p.b, p.m2 * p.a, 0.0, p.I])
     linear = rates @ np.array([p.m1, p.m2, p.m3, 0.0])
     turned = pushed @ np.array([p.b, -p.a]) + (p.a * p.m2 - p.b * p.m1) * p.g * t[:, 0]
     fallen = (p.m1 + p.m2 + p.m3) * p.g * t[:, 0] - pushed.sum(axis=1)
-    return max(
-        setups.largest(angular - turned) / setups.largest(turned - turned[0]),
-        setups.largest(linear - fallen) / setups.largest(pushed),
-    )
+    return max(largest(angular - turned) / largest(turned - turned[0]), largest(linear - fallen) / largest(pushed))
 
 
 def free_heave(engine: str, folder: Path) -> float:
     """Centre-of-mass acceleration at 50 random states, pitch up to 3 rad, against the external forces."""
-    base = setups.vehicle("asymmetric_twin")
+    base = vehicle("asymmetric_twin")
     p = base.parameters
-    forces = setups.static_forces(base, 100, 1e-3, noise=2000.0)
-    model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 0.1))
+    forces = static_forces(base, 100, 1e-3, noise=2000.0)
+    model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
         found = model.acceleration(2 * i * 1e-3, state)[:3]
         wanted = p.g - forces.values[2 * i].sum() / masses.sum()
-        worst, size = max(worst, abs(found @ masses / masses.sum() - wanted)), max(size, setups.largest(found))
+        worst, size = max(worst, abs(found @ masses / masses.sum() - wanted)), max(size, largest(found))
     return worst / size
 
 
 def _spun(geometry: str) -> Assembly:
     """The twin under its own weight, turning at 6 rad/s."""
-    base = setups.vehicle("asymmetric_twin", geometry)
+    base = vehicle("asymmetric_twin", geometry)
     start = base.initial.copy()
     start[7] = 6.0
-    return setups.driven(replace(base, initial=start), setups.static_forces(base, 2, 2.0, held=False))
+    return driven(replace(base, initial=start), static_forces(base, 2, 2.0, held=False))
 
 
 @cache
 def _tumbled() -> np.ndarray:
-    return setups.tight(_spun("exact"), 2.5e-4, 1.0).states
+    return tight(_spun("exact"), 2.5e-4, 1.0).states
 
 
 def tumbling(engine: str, folder: Path) -> float:
     """Over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
-    found = setups.run(engine, _spun("exact"), 2.5e-4, 1.0).states
+    found = run(engine, _spun("exact"), 2.5e-4, 1.0).states
     truth = _tumbled()
     if truth[:, 3].max() < np.pi / 2:
         return np.inf
-    return setups.largest(found - truth)
+    return largest(found - truth)
 
 
 def tumbling_naive(folder: Path) -> str:
     """The linear geometry in the same scene."""
-    ends = [setups.run("reference", _spun(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
+    ends = [run("reference", _spun(geometry), 1e-3, 1.0).states[-1, 3] for geometry in ("exact", "linear")]
     return f"exact geometry turns to {ends[0]:.2f} rad, the linear one says {ends[1]:.2f} rad"
 
 
@@ -166,11 +161,11 @@ def _measured() -> Sampled:
 
 def growth(engine: str, mode: Mode) -> float:
     """How a pitch error of 1e-6 rad at the start has grown at the end of the drive."""
-    base = setups.vehicle()
+    base = vehicle()
     start = base.initial.copy()
     start[3] += 1e-6
     ends = [
-        setups.run(engine, setups.driven(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
+        run(engine, driven(replace(base, initial=y), _measured(), mode), 1e-3, DRIVE).states[-1, 3]
         for y in (base.initial, start)
     ]
     return abs(ends[1] - ends[0]) / 1e-6

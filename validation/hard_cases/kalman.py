@@ -12,13 +12,13 @@ from scipy.linalg import expm
 from models.core.noise import PITCH_SENSOR, normal
 from models.core.signals import Sampled
 from models.core.time_series import write_time_series
-from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.pitch_filter import PITCH, Measurement, estimate
-from models.systems.pitch_plane.pitch_step import KEPT, RELATIVE, PitchStep
+from models.systems.pitch_plane.pitch_filter import PITCH, RELATIVE, Measurement, PitchStep, estimate
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
-from validation.hard_cases import setups
+from models.systems.pitch_plane.virtual_measurement import write_wheel_forces
+from validation.drift.kalman_runs import relative
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import REFUSED, driven, largest, static_forces, vehicle
 
 PERIOD, DURATION = 5e-3, 6.0
 FORCE, ANGLE, TURN = 16.0, 8e-4, 0.2
@@ -33,9 +33,9 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
     The filter starts from a pitch that is ``turn`` (rad) wrong.
     """
     count = round(DURATION / PERIOD) + 1
-    base = setups.vehicle()
-    forces = setups.static_forces(base, count, PERIOD, held=False).values
-    write_time_series(folder / "forces.csv", {"front": ("N", forces[:, 0]), "rear": ("N", forces[:, 1])}, PERIOD)
+    base = vehicle()
+    forces = static_forces(base, count, PERIOD, held=False).values
+    write_wheel_forces(folder, forces[:, 0], forces[:, 1], PERIOD)
     seen = base.initial[3] + ANGLE * normal(7, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     seen[lost] = np.nan
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", seen)}, PERIOD)
@@ -47,7 +47,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
             "run": {"duration": DURATION, "step": 1e-3},
             "start": {"z1": start[0], "z2": start[1], "pitch": start[3]},
             "effects": {
-                "wheel_forces": {"file": "forces.csv", "interpolation": "linear"},
+                "wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"},
                 "force_noise": {"deviation": FORCE, "seed": 7},
                 "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own},
             },
@@ -58,7 +58,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
     run = simulate(scene, engine)
     ended = PERIOD * (lost.stop or 0)
     late = (run.times < ended) | (run.times > ended + 1.0)  # the moment takes a while to draw the vehicle back
-    return setups.largest(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
+    return largest(((run["pitch"] - base.initial[3]) / run["pitch_deviation"])[late & (run.times > 0.1)])
 
 
 def outage(engine: str, folder: Path) -> float:
@@ -82,9 +82,9 @@ def wrong_start(engine: str, folder: Path) -> float:
 def sure(engine: str, folder: Path) -> float:
     """Angles known to 1e-9 rad after a start known to 1 rad: pitch error by its deviation, covariance not negative."""
     count, exact = 400, 1e-9
-    base = setups.vehicle()
-    forces = setups.static_forces(base, count + 1, PERIOD, held=False)
-    own = setups.driven(base, forces)
+    base = vehicle()
+    forces = static_forces(base, count + 1, PERIOD, held=False)
+    own = driven(base, forces)
     own = replace(
         own, scene=own.scene.model_copy(update={"run": own.scene.run.model_copy(update={"duration": count * PERIOD})})
     )
@@ -106,10 +106,7 @@ def nothing(engine: str, folder: Path) -> float:
 
 def _exact() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A (6, 6) and B (6, 2) of the relative states, and the exact response (6, 2) to forces held over SLOW."""
-    base = setups.vehicle(geometry="linear").without_tyres()
-    pushes = np.zeros((8, 2))
-    pushes[4, 0], pushes[5, 1] = -1 / base.parameters.m1, -1 / base.parameters.m2
-    a, b = RELATIVE @ first_order(linearised(base.vehicle))[:, KEPT], RELATIVE @ pushes
+    a, b = relative(vehicle(geometry="linear").without_tyres())
     block = np.zeros((8, 8))
     block[:6, :6], block[:6, 6:] = a, b
     return a, b, expm(block * SLOW)[:6, 6:]
@@ -117,9 +114,9 @@ def _exact() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def stiff(engine: str, folder: Path) -> float:
     """Process noise of forces sampled at 10 Hz beside a pole of -697 1/s."""
-    base = setups.vehicle(geometry="linear")
-    forces = Sampled(setups.static_forces(base, 2, SLOW).values, SLOW, held=True)
-    step = PitchStep(setups.driven(base, forces), SLOW, 1)
+    base = vehicle(geometry="linear")
+    forces = Sampled(static_forces(base, 2, SLOW).values, SLOW, held=True)
+    step = PitchStep(driven(base, forces), SLOW, 1)
     early = step.advance(np.append(RELATIVE @ base.initial, 0.0), 0)[2][:6]
     wanted = _exact()[2]
     return float(np.linalg.norm(early @ early.T - wanted @ wanted.T) / np.linalg.norm(wanted @ wanted.T))
@@ -175,7 +172,7 @@ CASES = (
         0.0,
         "there is nothing to follow",
         nothing,
-        dict.fromkeys(("reference", "exudyn", "mujoco"), "refused"),
+        REFUSED,
     ),
     Case(
         "process noise of a stiff vehicle",

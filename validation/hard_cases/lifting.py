@@ -24,7 +24,7 @@ from models.road.iso8608 import iso8608_road
 from models.road.polyline import PolylineProfile
 from models.road.signal import RoadUnderWheels
 from models.systems.hub_forces.measurement import truth, two_tracks
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.cut_vehicle import cut
 from models.vehicles.spatial_linear import Kinematics

@@ -9,11 +9,22 @@ import numpy as np
 
 from models.core.signals import Sampled, Signal
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly
-from models.engines.mujoco import _spec
-from models.engines.protocol import Trajectory
+from models.engines.assembly import Assembly, Trajectory
+from models.engines.mujoco import specification
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import (
+    CONSTRAINED,
+    driven,
+    largest,
+    rms,
+    run,
+    settings,
+    smooth_pitch,
+    static_forces,
+    tight,
+    vehicle,
+)
 
 DURATION = 0.5
 NOISE = 1e-6
@@ -29,23 +40,23 @@ def angle(t: np.ndarray) -> np.ndarray:
 
 def scene(period: float = PERIOD, noise: float = 0.0) -> Assembly:
     """The guided vehicle under its weight, pitch sampled every ``period``, with noise (rad) on the samples."""
-    base = setups.vehicle()
+    base = vehicle()
     samples = angle(period * np.arange(round(DURATION / period) + 1))
     samples = samples + noise * np.random.default_rng(5).standard_normal(len(samples))
-    return setups.guided(_settled(base), _weight(), setups.smooth_pitch(samples, period))
+    return setups.guided(_settled(base), _weight(), smooth_pitch(samples, period))
 
 
 def _weight() -> Sampled:
-    return setups.static_forces(setups.vehicle(), 2, DURATION, held=False)
+    return static_forces(vehicle(), 2, DURATION, held=False)
 
 
 @cache
 def _settled_state() -> np.ndarray:
     """A state in which the struts' fast modes have died, so that the comparison is one of multipliers."""
-    base = setups.vehicle()
+    base = vehicle()
     samples = angle(PERIOD * np.arange(-500, 2))
-    before = setups.guided(base, _weight(), setups.smooth_pitch(samples, PERIOD))
-    return setups.tight(before, PERIOD, DURATION).states[-1]
+    before = setups.guided(base, _weight(), smooth_pitch(samples, PERIOD))
+    return tight(before, PERIOD, DURATION).states[-1]
 
 
 def _settled(base: Assembly) -> Assembly:
@@ -56,7 +67,7 @@ def _settled(base: Assembly) -> Assembly:
 @cache
 def solution(period: float = PERIOD, noise: float = 0.0) -> Trajectory:
     """The pitch eliminated, order 8, tolerance 1e-12, rows every 1 ms."""
-    return setups.tight(scene(period, noise), PERIOD, DURATION)
+    return tight(scene(period, noise), PERIOD, DURATION)
 
 
 def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
@@ -74,26 +85,26 @@ def moment_error(found: Trajectory, wanted: np.ndarray) -> float:
     """
     assert found.moment is not None
     every = (len(found.moment) - 1) // (len(wanted) - 1)
-    return setups.rms((found.moment[::every] - wanted)[20:])
+    return rms((found.moment[::every] - wanted)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
     """The enforced moment at 1 ms with the recommended settings."""
-    found = setups.run(engine, scene(), 1e-3, DURATION, setups.CONSTRAINED[engine])
-    return moment_error(found, truth()) / setups.rms(truth())
+    found = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine])
+    return moment_error(found, truth()) / rms(truth())
 
 
 def soft_naive(folder: Path) -> str:
     """MuJoCo's own equality constraint, target set before each step."""
     errors = [_soft_error(step) for step in (1e-3, 5e-4)]
-    share = [error / setups.rms(truth()) for error in errors]
+    share = [error / rms(truth()) for error in errors]
     return f"MuJoCo's equality constraint: moment off by {share[0]:.0%} of its rms at 1 ms, {share[1]:.0%} at 0.5 ms"
 
 
 def _soft_error(step: float) -> float:
     """Rms error (N m) of the moment of a soft equality constraint on the pitch joint."""
     assembly, count = scene(), round(DURATION / step)
-    spec = _spec(assembly.vehicle, setups.settings("mujoco", step, DURATION, "Euler"))
+    spec = specification(assembly.vehicle, settings("mujoco", step, DURATION, "Euler"))
     spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="chassis pitch", name2="", data=[0.0] * 12)
     model = spec.compile()
@@ -108,13 +119,13 @@ def _soft_error(step: float) -> float:
         mujoco.mj_step(model, data)
         moment[i] = data.qfrc_constraint[3]
     wanted = truth()[:-1]
-    return setups.rms((moment[:: round(1e-3 / step)] - wanted)[20:])
+    return rms((moment[:: round(1e-3 / step)] - wanted)[20:])
 
 
 def undamped_multiplier(engine: str, folder: Path) -> float:
     """Generalised-alpha with spectral radius 1; the others eliminate the pitch and have no such setting."""
-    found = setups.run(engine, scene(), 1e-3, DURATION, setups.CONSTRAINED[engine], spectral_radius=1.0)
-    return moment_error(found, truth()) / setups.rms(truth())
+    found = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine], spectral_radius=1.0)
+    return moment_error(found, truth()) / rms(truth())
 
 
 class AsItComes(exudyn_engine.ExudynModel):
@@ -141,39 +152,40 @@ class Inconsistent(AsItComes):
 
 def as_it_comes(assembly: Assembly, step: float, integrator: str = "GeneralizedAlpha") -> Trajectory:
     """Exudyn past all checks, with the spectral radius of its own default."""
-    return AsItComes(assembly, setups.settings("exudyn", step, DURATION, integrator, spectral_radius=0.9)).run()
+    return AsItComes(assembly, settings("exudyn", step, DURATION, integrator, spectral_radius=0.9)).run()
 
 
 def undamped_multiplier_naive(folder: Path) -> str:
     """Exudyn past the check and with its own start, late in the run."""
     parts = []
     for name, radius in (("GeneralizedAlpha", 1.0), ("TrapezoidalIndex2", 0.6)):
-        own = setups.settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
+        own = settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
         found = Inconsistent(scene(), own).run()
         assert found.moment is not None
         late = (found.moment - truth())[-100:]
-        heave = setups.largest((found.states - solution().states)[-100:, :4])
-        parts.append(f"{name} by {setups.rms(late):.0f} N m (states by {heave:.0e})")
-    return f"moment of {setups.rms(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
+        heave = largest((found.states - solution().states)[-100:, :4])
+        parts.append(f"{name} by {rms(late):.0f} N m (states by {heave:.0e})")
+    return f"moment of {rms(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
 
 def noisy(engine: str, folder: Path) -> float:
     """What noise of 1e-6 rad on the samples adds to the moment, in units of its finite-difference value."""
-    found = setups.run(engine, scene(noise=NOISE), 1e-3, DURATION, setups.CONSTRAINED[engine])
-    inertia = setups.vehicle().parameters.I
-    return moment_error(found, truth()) / (inertia * NOISE * np.sqrt(6) / PERIOD**2)
+    return _noisy(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
     """The same at 0.125 ms."""
-    found = setups.run(engine, scene(noise=NOISE), 1.25e-4, DURATION, setups.CONSTRAINED[engine])
-    inertia = setups.vehicle().parameters.I
-    return moment_error(found, truth()) / (inertia * NOISE * np.sqrt(6) / PERIOD**2)
+    return _noisy(engine, 1.25e-4)
+
+
+def _noisy(engine: str, step: float) -> float:
+    found = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED[engine])
+    return moment_error(found, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
 
 
 def noisy_naive(folder: Path) -> str:
     """Exudyn's default on linearly interpolated noisy samples."""
-    base = setups.vehicle()
+    base = vehicle()
     samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
     assembly = setups.guided(_settled(base), _weight(), Straight(samples, PERIOD))
     found = as_it_comes(assembly, 1e-3)
@@ -216,10 +228,7 @@ class Straight:
 
 def refined(engine: str, folder: Path) -> float:
     """Error of the moment at 0.5 ms over that at 1 ms, data sampled every 1 ms."""
-    errors = [
-        moment_error(setups.run(engine, scene(), h, DURATION, setups.CONSTRAINED[engine]), truth())
-        for h in (1e-3, 5e-4)
-    ]
+    errors = [moment_error(run(engine, scene(), h, DURATION, CONSTRAINED[engine]), truth()) for h in (1e-3, 5e-4)]
     return errors[1] / errors[0]
 
 
@@ -228,54 +237,54 @@ def refined_naive(folder: Path) -> str:
     errors = []
     for step in (1e-3, 5e-4):
         pitch = Straight(angle(PERIOD * np.arange(501)), PERIOD)
-        assembly = setups.guided(_settled(setups.vehicle()), _weight(), pitch)
+        assembly = setups.guided(_settled(vehicle()), _weight(), pitch)
         errors.append(moment_error(as_it_comes(assembly, step), truth()))
     return f"Exudyn on straight lines between clean samples: {errors[0]:.1f} N m at 1 ms, {errors[1]:.2g} at 0.5 ms"
 
 
 def explicit(engine: str, folder: Path) -> float:
     """The explicit fourth-order solver of each engine."""
-    found = setups.run(engine, scene(), 1e-3, DURATION)
-    return moment_error(found, truth()) / setups.rms(truth())
+    found = run(engine, scene(), 1e-3, DURATION)
+    return moment_error(found, truth()) / rms(truth())
 
 
 def explicit_naive(folder: Path) -> str:
     """Exudyn's explicit solver with the constraint in it, past the check."""
     found = as_it_comes(scene(), 1e-3, "RK44")
     assert found.moment is not None
-    off = setups.largest(found.states[:, 3] - angle(found.times))
-    moment = setups.largest(found.moment[1:])
+    off = largest(found.states[:, 3] - angle(found.times))
+    moment = largest(found.moment[1:])
     return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
 
 
 def fed_back(engine: str, folder: Path) -> float:
     """The pitch of an unconstrained run, prescribed: no moment is needed to follow it."""
-    base = setups.vehicle("asymmetric_twin")
-    forces: Signal = setups.static_forces(base, 2, DURATION, held=False)
+    base = vehicle("asymmetric_twin")
+    forces: Signal = static_forces(base, 2, DURATION, held=False)
     base.initial[3] += 0.05
-    free = setups.tight(setups.driven(base, forces), 2.5e-4, DURATION).states
-    guided = setups.guided(base, forces, setups.smooth_pitch(free[:, 3], 2.5e-4))
+    free = tight(driven(base, forces), 2.5e-4, DURATION).states
+    guided = setups.guided(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
     guided.initial[:] = free[0]
-    found = setups.run(engine, guided, 2.5e-4, DURATION, setups.CONSTRAINED[engine])
+    found = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED[engine])
     assert found.moment is not None and guided.input is not None
     inertia = base.parameters.I * guided.input.sample(0.0, 2.5e-4, len(found.times))[:, 4]
-    return setups.rms(found.moment[40:]) / setups.rms(inertia)
+    return rms(found.moment[40:]) / rms(inertia)
 
 
 def gap(engine: str, folder: Path) -> float:
     """Distance of the pitch from what was prescribed."""
     assembly = scene()
-    found = setups.run(engine, assembly, 1e-3, DURATION, setups.CONSTRAINED[engine])
+    found = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
     assert assembly.input is not None
-    return setups.largest(found.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 2])
+    return largest(found.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 2])
 
 
 def gap_naive(folder: Path) -> str:
     """The gap of the rate, which nothing enforces."""
     assembly = scene()
-    found = setups.run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
+    found = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None
-    off = setups.largest(found.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 3])
+    off = largest(found.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 3])
     return f"Exudyn enforces the angle alone: its rate is off by {off:.1e} rad/s"
 
 

@@ -31,6 +31,7 @@ from models.systems.ride.of_scene import linear_vehicle
 from models.vehicles.vehicle_file import load_vehicle
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import driven, largest, settings, static_forces
 
 BEYOND = 3.29
 """Standard errors that a normal value exceeds once in a thousand."""
@@ -42,13 +43,13 @@ WALK, PATHS, SAMPLES, RATE = 0.5, 600, 100, 50.0
 def asked_again(engine: str, folder: Path) -> float:
     """Largest difference of accelerations asked forwards, backwards and twice, noise of 800 N on the samples."""
     base = setups.vehicle("asymmetric_twin")
-    forces = setups.static_forces(base, 200, 1e-3, noise=800.0)
-    model = build(engine, setups.driven(base, forces), setups.settings(engine, 1e-3, 0.1))
+    forces = static_forces(base, 200, 1e-3, noise=800.0)
+    model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     asked = [(2e-3 * i, state) for i, state in enumerate(states)]
     once = [model.acceleration(*own).copy() for own in asked]
     again = [model.acceleration(*own).copy() for own in reversed(asked)][::-1]
-    return setups.largest(np.array(once) - again)
+    return largest(np.array(once) - again)
 
 
 def streams(implementation: str, folder: Path) -> float:

@@ -19,22 +19,33 @@ from models.road.signal import RoadUnderWheels
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
-from validation.hard_cases.case import Case, Word
+from validation.hard_cases.case import Case
+from validation.hard_cases.setups import (
+    RAISED,
+    REFUSED,
+    exact,
+    largest,
+    run,
+    settings,
+    static_forces,
+    unchecked,
+    vehicle,
+)
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
     """Largest error of sum m z' against the exact impulse of the forces, relative to the largest impulse."""
-    base = setups.vehicle("asymmetric_twin")
+    base = vehicle("asymmetric_twin")
     forces = Sampled(values, period, held=interpolation == "held")
     steps = round((len(values) - 1) * period / step)
-    found = setups.run(engine, setups.driven(base, forces), step, steps * step)
+    found = run(engine, setups.driven(base, forces), step, steps * step)
     p, every = base.parameters, round(period / step)
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     held = np.concatenate(([0.0], np.cumsum(total[:-1] * period)))
     impulse = held if forces.held else held + period * (total - total[0]) / 2
     truth = masses.sum() * p.g * period * np.arange(len(values)) - impulse
-    return setups.largest(found.states[::every, 4:7] @ masses - truth) / setups.largest(impulse)
+    return largest(found.states[::every, 4:7] @ masses - truth) / largest(impulse)
 
 
 def ramp(engine: str, folder: Path) -> float:
@@ -64,10 +75,10 @@ def impulse(engine: str, folder: Path) -> float:
 
 def impulse_naive(folder: Path) -> str:
     """How far the two rules are apart in pitch."""
-    base = setups.vehicle()
-    values = setups.static_forces(base, 1002, 2e-3, noise=800.0).values
+    base = vehicle()
+    values = static_forces(base, 1002, 2e-3, noise=800.0).values
     ends = [
-        setups.run("reference", setups.driven(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
+        run("reference", setups.driven(base, Sampled(values, 2e-3, held)), 1e-3, 2.0).states[-1, 3]
         for held in (True, False)
     ]
     return f"held and linear end {abs(ends[0] - ends[1]) / abs(ends[0]):.1%} apart in pitch: half a sample of shift"
@@ -75,11 +86,11 @@ def impulse_naive(folder: Path) -> str:
 
 def halved(engine: str, folder: Path) -> float:
     """Held noise at 2 ms, steps of 1 and 0.5 ms, against the matrix exponential on the samples."""
-    base = setups.vehicle(geometry="linear")
-    forces = setups.static_forces(base, 250, 2e-3, noise=500.0)
-    truth = setups.exact(setups.driven(base, forces), 2e-3, 250, forces.values)
-    coarse, fine = (setups.run(engine, setups.driven(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
-    return setups.largest(fine[::4] - truth) / setups.largest(coarse[::2] - truth)
+    base = vehicle(geometry="linear")
+    forces = static_forces(base, 250, 2e-3, noise=500.0)
+    truth = exact(setups.driven(base, forces), 2e-3, 250, forces.values)
+    coarse, fine = (run(engine, setups.driven(base, forces), h, 0.5).states for h in (1e-3, 5e-4))
+    return largest(fine[::4] - truth) / largest(coarse[::2] - truth)
 
 
 @dataclass(frozen=True)
@@ -94,12 +105,12 @@ class ByTime(Sampled):
 
 def halved_naive(folder: Path) -> str:
     """The same with a force that is looked up at each stage's time."""
-    base = setups.vehicle(geometry="linear")
-    values = setups.static_forces(base, 251, 2e-3, noise=500.0).values
-    truth = setups.exact(setups.driven(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
+    base = vehicle(geometry="linear")
+    values = static_forces(base, 251, 2e-3, noise=500.0).values
+    truth = exact(setups.driven(base, Sampled(values, 2e-3, True)), 2e-3, 250, values[:250])
     forces = ByTime(values, 2e-3, held=False)
     errors = [
-        setups.largest(setups.run("reference", setups.driven(base, forces), h, 0.5).states[:: round(2e-3 / h)] - truth)
+        largest(run("reference", setups.driven(base, forces), h, 0.5).states[:: round(2e-3 / h)] - truth)
         for h in (1e-3, 5e-4)
     ]
     return f"looked up at each stage's time: error {errors[0]:.1e} at 1 ms, {errors[1]:.1e} at 0.5 ms, order 1"
@@ -115,11 +126,11 @@ def _points() -> tuple[np.ndarray, np.ndarray]:
 
 def order(engine: str, profile: SplineProfile) -> float:
     """Observed order over steps of 2, 1 and 0.5 ms, from the largest state difference over 1 s."""
-    base = setups.vehicle()
+    base = vehicle()
     road = base.with_input("road", RoadUnderWheels(profile, 20.0, 2.0))
-    runs = [setups.run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
+    runs = [run(engine, road, h, 1.0).states for h in (2e-3, 1e-3, 5e-4)]
     first, second = runs[1][::2] - runs[0], runs[2][::4] - runs[1][::2]
-    return float(np.log2(setups.largest(first) / setups.largest(second)))
+    return float(np.log2(largest(first) / largest(second)))
 
 
 def c2_road(engine: str, folder: Path) -> float:
@@ -137,16 +148,16 @@ def noise_adaptive(engine: str, folder: Path) -> float:
     """An adaptive solver on held noise: restarted at each sample, or refused."""
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
-    base = setups.vehicle(geometry="linear")
-    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
-    found = setups.run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
-    return setups.largest(found.states - setups.exact(setups.driven(base, forces), 1e-3, 200, forces.values))
+    base = vehicle(geometry="linear")
+    forces = static_forces(base, 200, 1e-3, noise=500.0)
+    found = run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
+    return largest(found.states - exact(setups.driven(base, forces), 1e-3, 200, forces.values))
 
 
 def noise_adaptive_naive(folder: Path) -> str:
     """scipy's RK45 straight across the jumps."""
-    base = setups.vehicle(geometry="linear")
-    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
+    base = vehicle(geometry="linear")
+    forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven(base, forces)
     linear = linearised(driven.vehicle)
     a, masses, g = first_order(linear), linear[0].diagonal(), base.parameters.g
@@ -156,7 +167,7 @@ def noise_adaptive_naive(folder: Path) -> str:
         return a @ y + np.array([0, 0, 0, 0, g - u[0] / masses[0], g - u[1] / masses[1], g, 0])
 
     found = solve_ivp(rhs, (0, 0.2), base.initial, rtol=1e-4, atol=1e-6)
-    error = setups.largest(found.y[:, -1] - setups.exact(driven, 1e-3, 200, forces.values)[-1])
+    error = largest(found.y[:, -1] - exact(driven, 1e-3, 200, forces.values)[-1])
     return f"RK45 straight across the jumps: {found.nfev} force calls for 200 samples, error {error:.0e}"
 
 
@@ -175,7 +186,7 @@ def damaged(engine: str, folder: Path) -> float:
         folder,
     )
     try:
-        return setups.largest(simulate(scene, engine).states)
+        return largest(simulate(scene, engine).states)
     except InputError as error:
         if "line 59" not in str(error):
             raise AssertionError(f"the line is not named: {error}") from error
@@ -184,21 +195,17 @@ def damaged(engine: str, folder: Path) -> float:
 
 def damaged_past_reader(engine: str, folder: Path) -> float:
     """The same NaN given past the reader: the guard after the run must see it."""
-    base = setups.vehicle()
-    forces = setups.static_forces(base, 200, 1e-3)
+    base = vehicle()
+    forces = static_forces(base, 200, 1e-3)
     forces.values[57, 0] = np.nan
-    return setups.largest(setups.run(engine, setups.driven(base, forces), 1e-3, 0.2).states)
+    return largest(run(engine, setups.driven(base, forces), 1e-3, 0.2).states)
 
 
 def uneven(engine: str, folder: Path) -> float:
     """Samples every 1 ms, steps of 0.7 ms."""
-    base = setups.vehicle()
-    forces = setups.static_forces(base, 211, 1e-3, noise=500.0)
-    return setups.largest(setups.run(engine, setups.driven(base, forces), 0.7e-3, 0.21).states)
-
-
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
-RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
+    base = vehicle()
+    forces = static_forces(base, 211, 1e-3, noise=500.0)
+    return largest(run(engine, setups.driven(base, forces), 0.7e-3, 0.21).states)
 
 
 @cache
@@ -212,16 +219,16 @@ def _bump() -> RoadUnderWheels:
 def bump(engine: str, folder: Path) -> float:
     """An adaptive solver (MuJoCo has none) that has seen nothing for ten seconds must not step over the bump."""
     name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
-    assembly = setups.vehicle().with_input("road", _bump())
-    found = setups.run(engine, assembly, 1e-3, 10.5, name)
-    truth = setups.run("reference", assembly, 5e-4, 10.5).states[:, 3]
-    return abs(setups.largest(found.states[:, 3]) - setups.largest(truth)) / setups.largest(truth)
+    assembly = vehicle().with_input("road", _bump())
+    found = run(engine, assembly, 1e-3, 10.5, name)
+    truth = run("reference", assembly, 5e-4, 10.5).states[:, 3]
+    return abs(largest(found.states[:, 3]) - largest(truth)) / largest(truth)
 
 
 def bump_naive(folder: Path) -> str:
     """scipy's LSODA as it comes."""
-    assembly = setups.vehicle().with_input("road", _bump())
-    model = build("reference", assembly, setups.settings("reference", 5e-4, 10.5))
+    assembly = vehicle().with_input("road", _bump())
+    model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
         lambda t, y: np.concatenate((y[4:], model.acceleration(t, y))),
         (0.0, 10.5),
@@ -240,14 +247,14 @@ def largest_pitch(states: np.ndarray) -> str:
 
 def passed_over(engine: str, folder: Path) -> float:
     """The study road at 280 m/s in steps of 2 ms: 0.56 m each."""
-    base = setups.vehicle(effects={"road": {"source": "study", "speed": 280.0}})
-    return setups.largest(setups.run(engine, base, 2e-3, 0.2).states)
+    base = vehicle(effects={"road": {"source": "study", "speed": 280.0}})
+    return largest(run(engine, base, 2e-3, 0.2).states)
 
 
 def passed_over_naive(folder: Path) -> str:
     """The same past the check, and in steps that see every wave."""
-    base = setups.vehicle(effects={"road": {"source": "study", "speed": 280.0}})
-    ends = [setups.unchecked("reference", base, step, 0.2).states[-1, 4] for step in (2e-3, 1e-4)]
+    base = vehicle(effects={"road": {"source": "study", "speed": 280.0}})
+    ends = [unchecked("reference", base, step, 0.2).states[-1, 4] for step in (2e-3, 1e-4)]
     return f"past the check the front wheel ends at {ends[0]:.2f} m/s, in steps of 0.1 ms at {ends[1]:.2f} m/s"
 
 

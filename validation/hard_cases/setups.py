@@ -7,17 +7,21 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.core.signals import Sampled, Signal, Smooth, Stacked
-from models.engines.assembly import Assembly, Mode
+from models.engines.assembly import Assembly, Mode, Settings, Trajectory
 from models.engines.catalogue import RECOMMENDED
-from models.engines.protocol import Settings, Trajectory, build
+from models.engines.protocol import build
 from models.engines.protocol import unchecked as build_unchecked
 from models.engines.stability import first_order, linearised
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
+from validation.hard_cases.case import IMPLEMENTATIONS, Word
 
 IMPLICIT = {"reference": "Radau", "exudyn": "GeneralizedAlpha", "mujoco": "discrete"}
 """For each implementation an integrator that no step makes unstable."""
 CONSTRAINED = {"reference": "RK4", "exudyn": "GeneralizedAlpha", "mujoco": "RK4"}
+REFUSED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "refused")
+RAISED: dict[str, Word] = dict.fromkeys(IMPLEMENTATIONS, "raised")
+"""In every implementation."""
 
 
 def vehicle(

@@ -13,40 +13,49 @@ import numpy as np
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.time_series import write_time_series
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly
-from models.engines.protocol import Trajectory
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Assembly, Trajectory
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring
-from validation.hard_cases import setups
 from validation.hard_cases.case import Case
+from validation.hard_cases.setups import (
+    CONSTRAINED,
+    REFUSED,
+    driven,
+    largest,
+    rms,
+    run,
+    static_forces,
+    tight,
+    unchecked,
+    vehicle,
+)
 
 STEP, DURATION = 1e-3, 0.5
 BAND, STIFFNESS = 0.02, 1e5
 """rad, N m/rad: the pitch crosses the band in 0.1 s and turns round within 0.1 s."""
 NOISE = 1e-6
-EVERYWHERE: dict[str, Any] = dict.fromkeys(("reference", "exudyn", "mujoco"), "refused")
 
 
 def sprung(band: float) -> Assembly:
     """Under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
-    base = setups.vehicle("asymmetric_twin")
+    base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
-    own = setups.driven(base, setups.static_forces(base, 2, DURATION, held=False))
+    own = driven(base, static_forces(base, 2, DURATION, held=False))
     spring = PitchSpring("chassis", STIFFNESS, 0.0, band)
     return replace(own, initial=start, vehicle=replace(own.vehicle, pitch_springs=(spring,)))
 
 
 def kink(engine: str, folder: Path) -> float:
     """Pitch over many crossings of the band's edges."""
-    found = setups.run(engine, sprung(BAND), STEP, DURATION)
-    return setups.largest((found.states - _kink_truth().states)[:, 3])
+    found = run(engine, sprung(BAND), STEP, DURATION)
+    return largest((found.states - _kink_truth().states)[:, 3])
 
 
 @cache
 def _kink_truth() -> Trajectory:
-    return setups.tight(sprung(BAND), STEP, DURATION)
+    return tight(sprung(BAND), STEP, DURATION)
 
 
 def kink_naive(folder: Path) -> str:
@@ -57,13 +66,10 @@ def kink_naive(folder: Path) -> str:
 
 
 def _limit_stop(built: exudyn_engine.Build, spring: PitchSpring) -> None:
-    ground = built.mbs.AddMarker(
-        items.MarkerNodeCoordinate(nodeNumber=built.mbs.AddNode(items.NodePointGround()), coordinate=0)
-    )
     state = built.mbs.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     built.mbs.AddObject(
         items.CoordinateSpringDamperExt(
-            markerNumbers=[ground, built.places[spring.body, "pitch"]],
+            markerNumbers=[exudyn_engine.ground_marker(built.mbs), built.places[spring.body, "pitch"]],
             nodeNumber=state,
             useLimitStops=True,
             limitStopsUpper=spring.dead_band,
@@ -78,70 +84,70 @@ def never_left(engine: str, folder: Path) -> float:
     """A band that is wider than the motion, against no spring at all."""
     own = sprung(1.0)
     free = replace(own, vehicle=replace(own.vehicle, pitch_springs=()))
-    one, other = (setups.run(engine, assembly, STEP, DURATION).states for assembly in (own, free))
-    return setups.largest(one - other)
+    one, other = (run(engine, assembly, STEP, DURATION).states for assembly in (own, free))
+    return largest(one - other)
 
 
 def beside_held(moment_held: bool = False) -> Assembly:
     """A moment of 2 kN m at 20 Hz beside held forces with noise, both sampled every 4 ms."""
-    base = setups.vehicle("asymmetric_twin")
-    own = setups.driven(base, setups.static_forces(base, 126, 4e-3, noise=300.0))
+    base = vehicle("asymmetric_twin")
+    own = driven(base, static_forces(base, 126, 4e-3, noise=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
     return replace(own, moment=Sampled(samples, 4e-3, moment_held))
 
 
 def moving_moment(engine: str, folder: Path) -> float:
     """Pitch under held forces and a moment that is not held."""
-    found = setups.run(engine, beside_held(), STEP, DURATION)
-    return setups.largest((found.states - _moving_truth().states)[:, 3])
+    found = run(engine, beside_held(), STEP, DURATION)
+    return largest((found.states - _moving_truth().states)[:, 3])
 
 
 @cache
 def _moving_truth() -> Trajectory:
-    return setups.tight(beside_held(), STEP, DURATION)
+    return tight(beside_held(), STEP, DURATION)
 
 
 def moving_moment_naive(folder: Path) -> str:
     """The moment held like the forces that it stands beside."""
-    found = setups.unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
-    return f"held as well: pitch off by {setups.largest((found.states - _moving_truth().states)[:, 3]):.1e} rad"
+    found = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
+    return f"held as well: pitch off by {largest((found.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
     """A moment sampled every 1.5 ms under a step of 1 ms."""
     moment = Sampled(np.zeros((400, 1)), 1.5e-3, held=False)
-    setups.run(engine, replace(beside_held(), moment=moment), STEP, DURATION)
+    run(engine, replace(beside_held(), moment=moment), STEP, DURATION)
     return 0.0
 
 
 @cache
 def _free_motion() -> np.ndarray:
     """States every 0.25 ms of the vehicle under its weight, released from a tilt."""
-    base = setups.vehicle("asymmetric_twin")
+    base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
-    own = setups.driven(base, setups.static_forces(setups.vehicle("asymmetric_twin"), 2, DURATION, held=False))
-    return setups.tight(own, 2.5e-4, DURATION).states
+    own = driven(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
+    return tight(own, 2.5e-4, DURATION).states
 
 
 def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
     """That motion prescribed, with noise (m, rad) on its samples, to a vehicle with ``mass`` times its chassis."""
     states = _free_motion()
     motion = states[:, 2:4] + noise * np.random.default_rng(7).standard_normal((len(states), 2))
-    base = setups.vehicle("asymmetric_twin")
-    forces = setups.static_forces(base, 2, DURATION, held=False)
+    base = vehicle("asymmetric_twin")
+    forces = static_forces(base, 2, DURATION, held=False)
     signal = Stacked((forces, Smooth(motion, 2.5e-4, derivatives=2, degree=5)))
-    own = setups.vehicle("asymmetric_twin", initial=states[0], m3=mass * base.parameters.m3)
+    own = vehicle("asymmetric_twin", initial=states[0], m3=mass * base.parameters.m3)
     own.initial[[2, 3, 6, 7]] = signal.at(0.0)[2:6]
     return own.without_tyres().with_input("heave-pitch", signal)
 
 
 def _guided(engine: str, assembly: Assembly) -> Trajectory:
-    return setups.run(engine, assembly, 2.5e-4, DURATION, setups.CONSTRAINED[engine])
+    return run(engine, assembly, 2.5e-4, DURATION, CONSTRAINED[engine])
 
 
 def missing_mass(engine: str, folder: Path) -> float:
     """A chassis that is 5 % too light: mean force, by 0.05 m3 (g - z3'')."""
-    p, states = setups.vehicle("asymmetric_twin").parameters, _free_motion()
+    p, states = vehicle("asymmetric_twin").parameters, _free_motion()
     found = _guided(engine, on_rails(mass=0.95)).force
     assert found is not None
     wanted = 0.05 * p.m3 * (p.g - (states[-1, 6] - states[0, 6]) / DURATION)
@@ -151,12 +157,12 @@ def missing_mass(engine: str, folder: Path) -> float:
 def missing_mass_naive(folder: Path) -> str:
     """What the states of the guided run say of it."""
     one, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
-    return f"the states of the guided run differ by {setups.largest(one - other):.1e}: only the force can tell"
+    return f"the states of the guided run differ by {largest(one - other):.1e}: only the force can tell"
 
 
 def rough_rails(engine: str, folder: Path) -> float:
     """Noise of 1e-6 m and rad on the motion: the loads, in units of their finite-difference values."""
-    p = setups.vehicle("asymmetric_twin").parameters
+    p = vehicle("asymmetric_twin").parameters
     found, clean = _guided(engine, on_rails(NOISE)).enforced, _guided("reference", on_rails()).enforced
     assert found is not None and clean is not None
     sizes = np.array([p.m3, p.I]) * NOISE * np.sqrt(6) / 2.5e-4**2
@@ -179,22 +185,22 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
 def smoothed(engine: str, folder: Path) -> float:
     """The moment after smoothing to 5 Hz, against the eliminated form."""
     own = measured_pitch(folder, bandwidth=5.0)
-    found = setups.run(engine, own, STEP, 1.0, setups.CONSTRAINED[engine]).moment
-    true = setups.run("reference", own, STEP / 8, 1.0).moment
+    found = run(engine, own, STEP, 1.0, CONSTRAINED[engine]).moment
+    true = run("reference", own, STEP / 8, 1.0).moment
     assert found is not None and true is not None
-    return setups.rms((found - true[::8])[50:]) / setups.rms(true)
+    return rms((found - true[::8])[50:]) / rms(true)
 
 
 def smoothed_naive(folder: Path) -> str:
     """The same pitch as it is."""
-    raw = setups.run("reference", measured_pitch(folder), STEP, 1.0).moment
+    raw = run("reference", measured_pitch(folder), STEP, 1.0).moment
     assert raw is not None
-    return f"without a bandwidth the moment is {setups.rms(raw):.1e} N m rms, and Exudyn's multiplier raises"
+    return f"without a bandwidth the moment is {rms(raw):.1e} N m rms, and Exudyn's multiplier raises"
 
 
 def beyond_nyquist(engine: str, folder: Path) -> float:
     """A bandwidth above half of the file's sampling rate."""
-    setups.run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, setups.CONSTRAINED[engine])
+    run(engine, measured_pitch(folder, bandwidth=600.0), STEP, 1.0, CONSTRAINED[engine])
     return 0.0
 
 
@@ -205,7 +211,7 @@ def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
         measured_pitch(folder)  # writes the files
         forces = {"wheel_forces": {"file": "forces.csv", "interpolation": "linear"}}
         table = {"title": "hard case", "run": {"duration": 1.0}, "effects": forces | effects}
-        setups.run(engine, assemble(build_scene(table, "", folder)), STEP, 1.0)
+        run(engine, assemble(build_scene(table, "", folder)), STEP, 1.0)
         return 0.0
 
     return error
@@ -253,7 +259,7 @@ CASES = (
         0.0,
         "a corner within a step costs Runge-Kutta its order",
         moment_off_the_grid,
-        EVERYWHERE,
+        REFUSED,
         against="none",
     ),
     Case(
@@ -298,7 +304,7 @@ CASES = (
         0.0,
         "the filter does not exist",
         beyond_nyquist,
-        EVERYWHERE,
+        REFUSED,
         against="none",
     ),
     Case(
@@ -309,7 +315,7 @@ CASES = (
         0.0,
         "an error would grow",
         _refusing({"high_pass": {"cut_off": 1000.0}}),
-        EVERYWHERE,
+        REFUSED,
         against="none",
     ),
     Case(
@@ -320,7 +326,7 @@ CASES = (
         0.0,
         "a scene that says two things",
         _refusing({"pitch_spring": {"stiffness": 1e3}, "prescribed_pitch": {"file": "pitch.csv"}}),
-        EVERYWHERE,
+        REFUSED,
         against="none",
     ),
 )

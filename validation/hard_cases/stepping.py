@@ -12,8 +12,23 @@ from models.engines import exudyn as exudyn_engine
 from models.engines import mujoco as mujoco_engine
 from models.engines.protocol import build
 from models.systems.pitch_plane.scene import build as build_scene
-from validation.hard_cases import setups
-from validation.hard_cases.case import IMPLEMENTATIONS, Case, Word
+from validation.hard_cases.case import IMPLEMENTATIONS, Case
+from validation.hard_cases.setups import (
+    CONSTRAINED,
+    IMPLICIT,
+    RAISED,
+    REFUSED,
+    driven,
+    exact,
+    exact_decay,
+    largest,
+    run,
+    settings,
+    static_forces,
+    tight,
+    unchecked,
+    vehicle,
+)
 
 ROAD = {"road": {"source": "study", "speed": 20.0}}
 EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
@@ -21,49 +36,48 @@ EULER = {"reference": "RK4", "exudyn": "ExplicitEuler", "mujoco": "Euler"}
 
 def _pushed(geometry: str = "linear"):
     """One wheel 1 mm off its equilibrium."""
-    base = setups.vehicle(geometry=geometry)
+    base = vehicle(geometry=geometry)
     return replace(base, initial=base.initial + np.array([1e-3, 0, 0, 0, 0, 0, 0, 0]))
 
 
 def inside_limit(engine: str, folder: Path) -> float:
     """RK4 at 3.9 ms for 300 steps: the fastest mode must have died."""
     assembly = _pushed()
-    found = setups.run(engine, assembly, 3.9e-3, 1.17)
-    return setups.largest(found.states[-1] - setups.exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
+    found = run(engine, assembly, 3.9e-3, 1.17)
+    return largest(found.states[-1] - exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
 def beyond_limit(engine: str, folder: Path) -> float:
     """RK4 at 5 ms over 40 ms: eight steps, all values small and finite."""
-    assembly = setups.vehicle(effects=ROAD)
-    found = setups.run(engine, assembly, 5e-3, 0.04)
+    assembly = vehicle(effects=ROAD)
+    found = run(engine, assembly, 5e-3, 0.04)
     return _against_tight(assembly, found.states, 5e-3)
 
 
 def _against_tight(assembly, states, step: float) -> float:
     """Error of the states relative to the motion of the tight solution."""
-    truth = setups.tight(assembly, step, (len(states) - 1) * step).states
-    return setups.largest(states - truth) / setups.largest(truth - truth[0])
+    truth = tight(assembly, step, (len(states) - 1) * step).states
+    return largest(states - truth) / largest(truth - truth[0])
 
 
 def beyond_limit_naive(folder: Path) -> str:
     """The same run without the check."""
-    assembly = setups.vehicle(effects=ROAD)
+    assembly = vehicle(effects=ROAD)
     shares = [
-        _against_tight(assembly, setups.unchecked(engine, assembly, 5e-3, 0.04).states, 5e-3)
-        for engine in IMPLEMENTATIONS
+        _against_tight(assembly, unchecked(engine, assembly, 5e-3, 0.04).states, 5e-3) for engine in IMPLEMENTATIONS
     ]
     return f"unchecked, all three answer, finite, off by {min(shares):.0%} to {max(shares):.0%} of the motion"
 
 
 def reset(engine: str, folder: Path) -> float:
     """RK4 at 8 ms past the checks: only the guard after the run is left."""
-    assembly = setups.vehicle(effects=ROAD)
-    return _against_tight(assembly, setups.unchecked(engine, assembly, 8e-3, 2.0).states, 8e-3)
+    assembly = vehicle(effects=ROAD)
+    return _against_tight(assembly, unchecked(engine, assembly, 8e-3, 2.0).states, 8e-3)
 
 
 def reset_naive(folder: Path) -> str:
     """MuJoCo as it comes: the state is reset and time begins again."""
-    model = mujoco_engine.MujocoModel(_pushed("exact"), setups.settings("mujoco", 8e-3, 2.0)).model
+    model = mujoco_engine.MujocoModel(_pushed("exact"), settings("mujoco", 8e-3, 2.0)).model
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
     data.qpos[:] = _pushed("exact").initial[:4]
@@ -77,68 +91,68 @@ def reset_naive(folder: Path) -> str:
 
 def huge(engine: str, folder: Path) -> float:
     """A first-order explicit run at 5 ms past the checks."""
-    assembly = setups.vehicle(effects=ROAD)
-    return _against_tight(assembly, setups.unchecked(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
+    assembly = vehicle(effects=ROAD)
+    return _against_tight(assembly, unchecked(engine, assembly, 5e-3, 2.0, EULER[engine]).states, 5e-3)
 
 
 def huge_naive(folder: Path) -> str:
     """Exudyn's own verdict and the largest finite state."""
-    assembly = setups.vehicle(geometry="linear", initial=_pushed().initial)
-    model = exudyn_engine.build(assembly, setups.settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
+    assembly = vehicle(geometry="linear", initial=_pushed().initial)
+    model = exudyn_engine.build(assembly, settings("exudyn", 5e-3, 2.0, "ExplicitEuler"))
     said = model.built.mbs.SolveDynamic(model._options(), solverType=exu.DynamicSolverType.ExplicitEuler)
     _, states = model._recorded()
-    return f"Exudyn returns {said} with states of up to {setups.largest(states[np.isfinite(states)]):.0e}"
+    return f"Exudyn returns {said} with states of up to {largest(states[np.isfinite(states)]):.0e}"
 
 
 def sudden(engine: str, folder: Path) -> float:
     """Front force up by 1 kN from one sample to the next, 1 ms steps."""
     assembly, forces = _step_force()
-    found = setups.run(engine, assembly, 1e-3, 0.2)
-    truth = setups.exact(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
-    return setups.largest(found.states - truth) / setups.largest(truth[:, 4])
+    found = run(engine, assembly, 1e-3, 0.2)
+    truth = exact(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
+    return largest(found.states - truth) / largest(truth[:, 4])
 
 
 def _step_force():
-    base = setups.vehicle(geometry="linear")
-    values = setups.static_forces(base, 20, 10e-3).values.copy()
+    base = vehicle(geometry="linear")
+    values = static_forces(base, 20, 10e-3).values.copy()
     values[5:, 0] += 1000.0
     forces = Sampled(values, 10e-3, held=True)
-    return setups.driven(base, forces), forces
+    return driven(base, forces), forces
 
 
 def sudden_naive(folder: Path) -> str:
     """Generalised-alpha with a step that does not see the fast pole."""
     assembly, forces = _step_force()
-    found = setups.unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
-    truth = setups.exact(assembly, 10e-3, 20, forces.values)
+    found = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
+    truth = exact(assembly, 10e-3, 20, forces.values)
     off = (found.states - truth)[6:9, 4]
     return (
         "Exudyn's default at 10 ms overshoots: front wheel velocity off by "
-        f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {setups.largest(truth[:, 4]):.3f})"
+        f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {largest(truth[:, 4]):.3f})"
     )
 
 
 def repeat(engine: str, folder: Path) -> float:
     """The same model run twice, asked for an acceleration in between: the same bits."""
-    base = setups.vehicle()
-    forces = setups.static_forces(base, 200, 1e-3, noise=500.0)
+    base = vehicle()
+    forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
-    for integrator in ("", "DOP853" if engine == "reference" else setups.IMPLICIT[engine]):
+    for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT[engine]):
         own = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
-        model = build(engine, setups.driven(base, own), setups.settings(engine, 1e-3, 0.2, integrator))
+        model = build(engine, driven(base, own), settings(engine, 1e-3, 0.2, integrator))
         first = model.run().states
         model.acceleration(0.05, first[50])
-        worst = max(worst, setups.largest(model.run().states - first))
+        worst = max(worst, largest(model.run().states - first))
     return worst
 
 
 def restart(engine: str, folder: Path) -> float:
     """Stopped after half the time and continued from the saved state."""
-    base = setups.vehicle()
-    forces = setups.static_forces(base, 400, 1e-3, noise=500.0)
-    whole = setups.run(engine, setups.driven(base, forces), 1e-3, 0.4).states
-    rest = setups.driven(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
-    return setups.largest(setups.run(engine, rest, 1e-3, 0.2).states - whole[200:])
+    base = vehicle()
+    forces = static_forces(base, 400, 1e-3, noise=500.0)
+    whole = run(engine, driven(base, forces), 1e-3, 0.4).states
+    rest = driven(replace(base, initial=whole[200].copy()), Sampled(forces.values[200:], 1e-3, True))
+    return largest(run(engine, rest, 1e-3, 0.2).states - whole[200:])
 
 
 def stamps(engine: str, folder: Path) -> float:
@@ -146,36 +160,33 @@ def stamps(engine: str, folder: Path) -> float:
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     assembly = _pushed()
-    found = setups.run(engine, assembly, 1e-3, 0.2, name)
-    return setups.largest(found.states - setups.exact_decay(assembly, found.times))
+    found = run(engine, assembly, 1e-3, 0.2, name)
+    return largest(found.states - exact_decay(assembly, found.times))
 
 
 def stamps_naive(folder: Path) -> str:
     """Rows taken for times."""
     assembly = _pushed()
-    found = setups.run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
+    found = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
     off = np.abs(found.times - 1e-3 * np.arange(len(found.times)))
-    truth = setups.exact(assembly, 1e-3, len(found.times) - 1)
+    truth = exact(assembly, 1e-3, len(found.times) - 1)
     return (
         f"Exudyn's rows lie up to {off.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
-        f"shows an error of {setups.largest(found.states - truth):.0e}"
+        f"shows an error of {largest(found.states - truth):.0e}"
     )
 
-
-REFUSED: dict[str, Word] = {"reference": "refused", "exudyn": "refused", "mujoco": "refused"}
-RAISED: dict[str, Word] = {"reference": "raised", "exudyn": "raised", "mujoco": "raised"}
 
 ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
 def keeps_order(engine: str, folder: Path) -> float:
     """By how much the observed order falls short while the step is halved four times, from 2 ms on."""
-    base = setups.vehicle("asymmetric_twin", "linear")
+    base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
-    truth, errors = setups.exact(base, 0.1, 2)[-1], []
+    truth, errors = exact(base, 0.1, 2)[-1], []
     for step in (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4):
-        end = setups.run(engine, base, step, 0.2, setups.CONSTRAINED[engine]).states[-1]
-        errors.append(setups.largest(end - truth))
+        end = run(engine, base, step, 0.2, CONSTRAINED[engine]).states[-1]
+        errors.append(largest(end - truth))
     return float(ORDERS[engine] - np.log2(np.array(errors[:-1]) / errors[1:]).min())
 
 

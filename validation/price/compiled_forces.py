@@ -13,10 +13,9 @@ from mujoco import rollout
 from numba import carray, cfunc, types
 
 from models.engines import mujoco as adapter
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import offsets
-from models.engines.protocol import Settings
 from models.machine.stack import array_at, double_at
 
 PARAMETERS = 17
@@ -60,7 +59,7 @@ class CompiledForces:
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
         bare = replace(assembly.vehicle, struts=())
-        spec = adapter._spec(bare, settings)
+        spec = adapter.specification(bare, settings)
         assert assembly.input is not None
         table = assembly.input.sample(0.0, settings.step / 2, 2 * settings.steps + 1)
         header = [2.0 / settings.step, len(table), *assembly.parameters.array()]

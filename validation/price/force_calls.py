@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 
 AT_START = {"VelocityVerlet": 1, "GeneralizedAlpha": 1, "TrapezoidalIndex2": 1}
 """Evaluations before the first step, for the accelerations that a method starts from; not in the reports."""

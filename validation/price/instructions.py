@@ -19,7 +19,7 @@ import numpy as np
 
 from models.drawing.figures import LABELS
 from models.engines.stability import linearised
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from validation.common.rows import Row, System, Table, at_most, not_run
 from validation.common.scenes import road_scene
 from validation.price import instructions_run

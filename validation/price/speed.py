@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, build
+from models.engines.assembly import Assembly, Settings
+from models.engines.protocol import build
 from models.machine.timing import describe, interleave, median, paired_ratio
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.compiled_forces import CompiledForces
 

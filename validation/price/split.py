@@ -13,16 +13,16 @@ import numpy as np
 from numba import carray
 
 from models.drawing.figures import LABELS
+from models.engines.assembly import Settings
 from models.engines.contact_bridge import Wheels, forces
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law
 from models.engines.mujoco_callback import installed
-from models.engines.protocol import Settings
 from models.engines.reference import derivative_of
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from validation.common.rows import Row, System, Table, finding
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches

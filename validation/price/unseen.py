@@ -21,8 +21,7 @@ from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommenda
 from models.advice.price.search import Tried
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
-from models.engines.protocol import Settings
-from models.engines.protocol import build as build_model
+from models.engines.assembly import Settings
 from models.machine.timing import interleave, paired_ratio
 from models.systems.pitch_plane.scene import Scene, build
 from models.vehicles.parameters.itwm_drift import PARAMETERS
@@ -226,8 +225,7 @@ def _fine(scene: OwnPitchPlane, parts: int) -> int:
 
 
 def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
-    model = build_model("reference", scene.assembly, Settings("DOP853", spacing, scene.whole, TIGHT))
-    return scene.answer((model, model.run()))
+    return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TIGHT)))
 
 
 def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:

@@ -1,21 +1,19 @@
 """A user's pitch-plane scene as the search of the price of accuracy sees it."""
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.advice.price import Answer, Ladder
 from models.advice.price.problem import Setting
 from models.core.errors import InputError
+from models.core.result import Result
 from models.core.steps import divides
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE
-from models.engines.protocol import Settings, build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import Scene, assemble
 
 ADAPTIVE_STEP = {"exudyn": 5e-3, "reference": 1e-3}
 """Largest step of Exudyn's adaptive solvers, which they also begin with, and the spacing of scipy's output (s)."""
@@ -121,16 +119,19 @@ class OwnPitchPlane:
         """LSODA, unless it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 
-    def solve(self, setting: Setting, duration: float) -> Any:
-        """Model and trajectory."""
-        model = build(setting.engine, self.assembly, self._settings(setting, duration))
-        return model, model.run()
+    def solve(self, setting: Setting, duration: float) -> Result:
+        """The run's result, at every step."""
+        return self.run(setting.engine, self._settings(setting, duration))
 
-    def answer(self, solution: Any) -> Answer:
+    def run(self, engine: str, settings: Settings) -> Result:
+        """The same with any settings."""
+        scene: Scene = self.assembly.scene
+        every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
+        return run(every_step, engine, settings, self.assembly)
+
+    def answer(self, solution: Result) -> Answer:
         """The quantity's channels."""
-        model, run = solution
-        found = outputs(self.assembly, run, model)
-        return Answer(run.times, np.column_stack([found[name][2] for name in self.channels]), run.counts)
+        return Answer(solution.times, np.column_stack([solution[name] for name in self.channels]), solution.counts())
 
     def lines(self, setting: Setting) -> list[str]:
         """The setting as the scene file holds it."""
@@ -173,44 +174,35 @@ def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitc
     assembly = assemble(scene)
     channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))
     base, first = _lengths(assembly)
-    found = OwnPitchPlane(assembly, engines, channels, "", base, first)
-    return OwnPitchPlane(assembly, engines, channels, _unit(found), base, first)
+    asked = OwnPitchPlane(assembly, engines, channels, "", base, first)
+    return replace(asked, unit=_unit(asked))
 
 
 def _lengths(assembly: Assembly) -> tuple[float, float]:
     """Step (s) whose parts divide the run and its samples; how much of the run is searched (s)."""
-    run, period = assembly.scene.run, _period(assembly)
+    length, step = assembly.scene.run.duration, assembly.scene.run.step
+    sampled = (signal for signal in (assembly.input, assembly.moment) if signal is not None)
+    period = next((signal.period for signal in sampled if signal.period is not None), None)
     if period is None:
-        first = run.duration / math.ceil(run.duration / FIRST * (1 - 1e-9))
+        first = length / math.ceil(length / FIRST * (1 - 1e-9))
         return first, first
-    if divides(period, run.duration):
-        base = period
-    else:
-        base = run.step * math.gcd(round(run.duration / run.step), round(period / run.step))
-    return base, min(run.duration, base * math.ceil(FIRST / base * (1 - 1e-9)))
-
-
-def _period(assembly: Assembly) -> float | None:
-    """The sampling period (s) that fixed steps must divide."""
-    return next((s.period for s in (assembly.input, assembly.moment) if s is not None and s.period is not None), None)
+    whole = divides(period, length)
+    base = period if whole else step * math.gcd(round(length / step), round(period / step))
+    return base, min(length, base * math.ceil(FIRST / base * (1 - 1e-9)))
 
 
 def _unit(scene: OwnPitchPlane) -> str:
     """The one unit of the quantity's channels; InputError for what is no channel, or several units."""
     step = float(scene.assembly.scene.settings("reference").step or 0.0)
-    model = build("reference", scene.assembly, Settings("RK4", min(step, scene.base), scene.base))
-    found = outputs(scene.assembly, model.run(), model)
+    settings = Settings("RK4", min(step, scene.base), scene.base)
+    channels = scene.run("reference", settings).data.data_vars
     for name in scene.channels:
-        if name not in found:
-            raise InputError("--quantity", "", name, "is no channel of this scene", tuple(found))
-    units = list(dict.fromkeys(found[name][0] for name in scene.channels))
+        if name not in channels:
+            raise InputError("--quantity", "", name, "is no channel of this scene", tuple(map(str, channels)))
+    units = list(dict.fromkeys(channels[name].attrs["units"] for name in scene.channels))
     if len(units) > 1:
-        raise InputError(
-            "--quantity",
-            "",
-            ",".join(scene.channels),
-            f"has several units, {' and '.join(units)}: one tolerance cannot hold for all",
-        )
+        allowed = f"has several units, {' and '.join(units)}: one tolerance cannot hold for all"
+        raise InputError("--quantity", "", ",".join(scene.channels), allowed)
     return units[0]
 
 

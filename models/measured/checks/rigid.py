@@ -9,8 +9,6 @@ from models.core.finding import Finding
 from models.measured.checks.evidence import Evidence
 from models.measured.checks.spectra import noise
 from models.measured.signal import Place, Signal
-from models.sensors.rigid_body_motion import quality
-from models.sensors.sensor_array import sensor_array
 
 NAME = "rigid"
 MOST = 6000
@@ -37,6 +35,9 @@ def _bodies(evidence: Evidence) -> dict[str, dict[str, tuple[Place, Axes]]]:
 
 
 def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[Place, Axes]]) -> Finding:
+    from models.sensors.rigid_body_motion import quality
+    from models.sensors.sensor_array import sensor_array
+
     try:
         array = sensor_array({name: place.position for name, (place, _) in sensors.items()})
     except InputError as error:

@@ -18,8 +18,7 @@ from models.core.finding import Finding
 from models.core.result import Result
 from models.core.time_series import write_time_series
 from models.drift import score
-from models.drift.score import Limits, Verdict
-from models.drift.section_forces import section_forces
+from models.drift.score import Limits, Verdict, section_forces
 from models.measured import axle_forces
 from models.measured.axle_balance import AXLES, axle_signals, axles
 from models.measured.columns import Columns
@@ -29,9 +28,8 @@ from models.measured.signal import Quantity, Signal
 from models.systems.measured.section_run import Hold, Outcome
 from models.systems.measured.sections import Answer
 from models.systems.pitch_plane import trust as drift_trust
-from models.systems.pitch_plane.assembly import assemble
 from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.scene import Scene, assemble, build
 from models.systems.pitch_plane.trust import Trust
 
 CHASSIS = "chassis"

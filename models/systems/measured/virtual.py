@@ -25,7 +25,7 @@ from models.measured.signal import HUB, Quantity, Signal
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import from_cardan, matrix
-from models.sensors.virtual_accelerometers import in_space
+from models.sensors.sensor_array import in_space
 from models.systems.hub_forces.measurement import truth, two_tracks
 from models.systems.hub_forces.scene import Frame, Road
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z

@@ -4,8 +4,14 @@ Every effect that has a parameter ``path`` (``force_noise``) gets the number; wh
 assembled once. A path is then marched by the engine's own adapter, so there is no second copy of the equations, and
 whatever an engine can run can be an ensemble. The reference takes some 220 ns per path and step, 30 of them for the
 noise.
+
+MuJoCo computes them in its own threads, too. Its callbacks are global to a process, so its runs cannot each bring their
+own into several Python threads: the compiled callback is installed once and ``rollout`` shares the models, each of
+which holds its path's forces as a table, among its threads. Exudyn, and anything else, runs in processes:
+``noise_paths(..., engine="exudyn")`` on ``workers.processes``.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,13 +22,12 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import module_of
 from models.core.steps import divides
 from models.core.systems import DEFAULT
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, Trajectory, build
+from models.engines.protocol import build, guard
 from models.ensemble.runner import PathFailed
 from models.ensemble.store import Arrays
-from models.systems.pitch_plane.assembly import assemble, ordered
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, ordered, settings_of
 
 DRIFT = 0.05
 """A path has drifted off when its pitch is this far (rad) from the true one, unless the job says otherwise."""
@@ -78,16 +83,16 @@ class NoisePaths:
         from the truth, infinite if never; ``failed`` (n,): last good time (s) of a path that left all bounds, whose
         states are then nan and whose drift-off is at the latest that time; nan for all others.
         """
-        found = [self._kept(run) for run in self.runs(paths)]
-        return {name: np.stack([one[name] for one in found]) for name in found[0]}
+        columns = zip(*map(self._kept, self.runs(paths)), strict=True)
+        return {name: np.array(column) for name, column in zip(("states", "drift_off", "failed"), columns, strict=True)}
 
-    def _kept(self, run: Trajectory | RunFailed) -> Arrays:
+    def _kept(self, run: Trajectory | RunFailed) -> tuple[np.ndarray, float, float]:
         if isinstance(run, RunFailed):
             last = 0.0 if run.time is None else run.time
-            return _labelled(np.full((len(self.rows), 8), np.nan), last, last)
+            return np.full((len(self.rows), 8), np.nan), last, last
         far = np.abs(run.states[:, 3] - self.truth) > self.threshold
         first = far.argmax()
-        return _labelled(run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan)
+        return run.states[self.rows], run.times[first] if far[first] else np.inf, np.nan
 
     def facts(self) -> dict[str, Any]:
         """Everything that the paths depend on."""
@@ -102,10 +107,6 @@ class NoisePaths:
             "truth": self.truth,
             "threshold": self.threshold,
         }
-
-
-def _labelled(states: np.ndarray, drift_off: float, failed: float) -> Arrays:
-    return {"states": states, "drift_off": np.array(drift_off), "failed": np.array(failed)}
 
 
 def noise_paths(
@@ -132,10 +133,13 @@ def noise_paths(
             "picks its own steps: an ensemble keeps states at common times and needs fixed ones",
         )
     base, rest = _split(scene)
-    true = _quiet_pitch(scene) if truth is None else truth
-    if true.shape != (settings.steps + 1,):
-        raise InputError(scene.file, "truth", list(true.shape), f"must have one pitch per step: {settings.steps + 1}")
-    return NoisePaths(base, rest, engine, settings, _rows(scene, settings, times), true, threshold)
+    if truth is None:
+        silent = scene.effects["force_noise"].model_copy(update={"deviation": 0.0})
+        quiet = scene.model_copy(update={"effects": scene.effects | {"force_noise": silent}})
+        truth = build("reference", assemble(quiet), settings_of(quiet, "reference")).run().states[:, 3]
+    if truth.shape != (settings.steps + 1,):
+        raise InputError(scene.file, "truth", list(truth.shape), f"must have one pitch per step: {settings.steps + 1}")
+    return NoisePaths(base, rest, engine, settings, _rows(scene, settings, times), truth, threshold)
 
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
@@ -149,14 +153,6 @@ def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in own)
 
 
-def _quiet_pitch(scene: Scene) -> np.ndarray:
-    """Pitch (steps + 1,) of the scene without noise on its forces, in the reference."""
-    silent = scene.effects["force_noise"].model_copy(update={"deviation": 0.0})
-    quiet = scene.model_copy(update={"effects": scene.effects | {"force_noise": silent}})
-    settings = settings_of(quiet, "reference")
-    return build("reference", assemble(quiet), settings).run().states[:, 3]
-
-
 def _rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
     """Steps at the asked times."""
     for time in times:
@@ -164,3 +160,77 @@ def _rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
             allowed = f"must lie between 0 and {settings.duration:g} s, on a multiple of the step {settings.step:g} s"
             raise InputError(scene.file, "times", float(time), allowed)
     return np.rint(np.asarray(times) / settings.step).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class MujocoThreads(NoisePaths):
+    """Noise paths whose blocks MuJoCo computes with this many threads; the bits do not depend on their number."""
+
+    threads: int = 2
+
+    def __post_init__(self) -> None:
+        if self.engine != "mujoco" or self.base.guided:
+            raise InputError(self.base.scene.file, "engine", self.engine, "only free runs of mujoco have its threads")
+
+    def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
+        """Every path's run, from one call of ``rollout``; a path that MuJoCo warned of is run again alone."""
+        models = [build("mujoco", self.assembly(path), self.settings) for path in paths]
+        times = self.settings.step * np.arange(self.settings.steps + 1)
+        marched, warned = self._rollout(models)
+        if warned:
+            yield from super().runs(paths)
+            return
+        for states in marched:
+            try:
+                guard("mujoco", times, states, self.settings.duration)
+                yield Trajectory(times, states)
+            except RunFailed as error:
+                yield error
+
+    def _rollout(self, models: list[Any]) -> tuple[np.ndarray, bool]:
+        """States (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
+        from mujoco import rollout
+
+        from models.engines.mujoco_quiet import quiet
+
+        start = np.concatenate(([0.0], self.base.initial))
+        held = models[0].drive.controls is not None
+        controls = np.concatenate([model.padded(model.drive.controls) for model in models]) if held else None
+        working = models[: self.threads]
+        with models[0].callback(), quiet():
+            found, _ = rollout.rollout(
+                [model.model for model in models],
+                [model.data for model in working],
+                np.tile(start, (len(models), 1)),
+                control=controls,
+                nstep=self.settings.steps,
+            )
+        states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), found[:, :, 1:9]), axis=1)
+        return states, any(model.warnings() for model in working)
+
+    def facts(self) -> dict[str, Any]:
+        """As of all noise paths."""
+        return {**super().facts(), "way": "threads"}
+
+
+def mujoco_threads(
+    scene: Scene, times: np.ndarray, truth: np.ndarray | None = None, threshold: float = DRIFT, threads: int = 2
+) -> MujocoThreads:
+    """The job of ``noise_paths`` in MuJoCo's threads."""
+    return MujocoThreads(**vars(noise_paths(scene, times, truth, threshold, "mujoco")), threads=threads)
+
+
+def gap(reference: Arrays, other: Arrays, times: np.ndarray) -> float:
+    """Largest difference of any state before both paths' drift-off, by the reference's largest state there.
+
+    reference, other : arrays of ``NoisePaths`` of which the second may hold fewer paths; times (rows,) in s. After
+    drift-off a rounding error is as large as the run, and no comparison says anything; nan where all paths have
+    drifted off before the first row past the start.
+    """
+    count = len(other["states"])
+    until = np.minimum(reference["drift_off"][:count], other["drift_off"])
+    if not (times[times > 0.0] < until[:, None]).any():
+        return math.nan
+    one = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
+    two = np.where((times < until[:, None])[:, :, None], other["states"], 0.0)
+    return float(np.abs(one - two).max() / np.abs(one).max())

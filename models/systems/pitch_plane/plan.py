@@ -9,9 +9,8 @@ from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.protocol import check as check_engine
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import state_names
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.vehicles.pitch_plane import STATE_NAMES
 from models.vehicles.plausible_plane import plausible_plane
 
 MODES = {
@@ -44,7 +43,8 @@ def describe(scene: Scene) -> str:
     """The scene's plan as text: vehicle, states, effects, channels, and what each engine builds."""
     assembly = assemble(scene)
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}")]
-    lines += [_line("motion", _motion(scene, assembly))]
+    motion = f"{MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
+    lines += [_line("motion", motion)]
     lines += _vehicle(scene, assembly) + effect_lines(scene)
     lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
     lines += ["", *_engines(scene, assembly)]
@@ -53,10 +53,6 @@ def describe(scene: Scene) -> str:
 
 def _line(head: str, text: str) -> str:
     return f"  {head:<10} {text}"
-
-
-def _motion(scene: Scene, assembly: Assembly) -> str:
-    return f"{MODES[assembly.mode]}, geometry {scene.vehicle.geometry}, {scene.run.duration:g} s"
 
 
 def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
@@ -76,9 +72,9 @@ def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
         band = f", beyond {spring.dead_band:g} rad" if spring.dead_band else ""
         text = f"{spring.body:<12} {spring.stiffness:g} N m/rad, {spring.damping:g} N m s/rad, to the ground{band}"
         lines.append(_line("  spring", text))
-    values = zip(state_names(), assembly.initial, strict=True)
+    values = zip(STATE_NAMES, assembly.initial, strict=True)
     start = ", ".join(f"{name} {value:.4g}" for name, value in values if value)
-    return [*lines, _line("states", ", ".join(state_names())), _line("start", start or "all zero")]
+    return [*lines, _line("states", ", ".join(STATE_NAMES)), _line("start", start or "all zero")]
 
 
 def _channels(assembly: Assembly) -> list[str]:

@@ -8,35 +8,50 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Channels, Model, Settings, Trajectory
 from models.engines.catalogue import OUTSIDE
-from models.engines.protocol import Model, Settings, Trajectory, build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.scene import Scene, settings_of
-from models.vehicles import pitch_plane
+from models.engines.protocol import build
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+from models.vehicles.pitch_plane import STATES
+from models.vehicles.pitch_plane_equations import suspension_loads
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
+MEANINGS = ("front wheel, down", "rear wheel, down", "chassis heave, down", "pitch, nose up")
+"""Of STATES."""
 
 
-def run(scene: Scene, engine: str, settings: Settings | None = None) -> Result:
+def run(scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None) -> Result:
     """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
 
-    A run of an engine from outside the tree is compared with the reference, and says so in "beside reference".
+    settings : in place of the scene's own; assembly : what runs, where it is known already or was changed by hand.
+    The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the tree is compared with
+    the reference, and says so in "beside reference".
     """
-    assembly = assemble(scene)
-    own = settings or settings_of(scene, engine)
-    keep = _keep_every(scene, own)
-    model = build(engine, assembly, own)
+    assembly, settings = assembly or assemble(scene), settings or settings_of(scene, engine)
+    rows = slice(None, None, _keep_every(scene, settings))
+    model = build(engine, assembly, settings)
     start = time.perf_counter()
     trajectory = model.run()
     seconds = time.perf_counter() - start
-    channels = outputs(assembly, trajectory, model)
-    found = _labelled(assembly, engine, own, trajectory, channels, keep, seconds)
+    channels, beside = outputs(assembly, trajectory, model), dict[str, str]()
     if engine in OUTSIDE:
-        from models.engines.beside_reference import beside_reference
+        from models.engines.outside import beside_reference
 
-        found.data.attrs["beside reference"] = beside_reference(engine, assembly, own, trajectory)
-    return found
+        beside["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
+    return result(
+        scene,
+        {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
+        {"time": Channel("time", trajectory.times[rows], "s", "time")},
+        engine=engine,
+        counts=trajectory.counts,
+        seconds=seconds,
+        doubts=assembly.doubts,
+        detail=trajectory,
+        mode=assembly.mode,
+        integrator=settings.integrator,
+        step=settings.step,
+        integrated=json.dumps(STATES),
+        **beside,
+    )
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:
@@ -50,43 +65,17 @@ def _keep_every(scene: Scene, settings: Settings) -> int:
     return round(ratio)
 
 
-def _labelled(
-    assembly: Assembly, engine: str, settings: Settings, run: Trajectory, channels: Channels, keep: int, seconds: float
-) -> Result:
-    rows = slice(None, None, keep)
-    return result(
-        assembly.scene,
-        {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
-        {"time": Channel("time", run.times[rows], "s", "time")},
-        engine=engine,
-        counts=run.counts,
-        seconds=seconds,
-        doubts=assembly.doubts,
-        mode=assembly.mode,
-        integrator=settings.integrator,
-        step=settings.step,
-        integrated=json.dumps(pitch_plane.STATES),
-    )
-
-
 def outputs(assembly: Assembly, run: Trajectory, model: Model | None = None) -> Channels:
     """All channels of a run as name -> (unit, meaning, values): states, forces, and what its effects add.
 
     ``model`` is the one that made the run, and is asked where an effect reads accelerations.
     """
-    names = {
-        "z1": "front wheel, down",
-        "z2": "rear wheel, down",
-        "z3": "chassis heave, down",
-        "pitch": "pitch, nose up",
-    }
     channels: Channels = {}
-    for i, (name, meaning) in enumerate(names.items()):
+    for i, (name, meaning) in enumerate(zip(STATES, MEANINGS, strict=True)):
         unit = "rad" if name == "pitch" else "m"
         channels[name] = (unit, meaning, run.states[:, i])
         channels[f"{name}_rate"] = (f"{unit}/s", f"rate of {meaning}", run.states[:, 4 + i])
-    inputs = _inputs(assembly, run.times)
-    channels |= _forces(assembly, run, inputs)
+    channels |= _forces(assembly, run, _inputs(assembly, run.times))
     for output in assembly.outputs:
         channels |= output(assembly, run.times, run.states)
     for sensor in assembly.sensors:
@@ -107,13 +96,8 @@ def _inputs(assembly: Assembly, times: np.ndarray) -> np.ndarray | None:
 
 def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> Channels:
     """Wheel forces f1, f2, suspension forces f3, f4, inertia term and enforced moment (eqs 33, 35, 36)."""
-    p, y = assembly.parameters, run.states
-    exact = assembly.vehicle.geometry == "exact"
-    sine, cosine = (np.sin(y[:, 3]), np.cos(y[:, 3])) if exact else (y[:, 3], np.ones(len(y)))
-    f3 = p.k3 * (y[:, 2] - y[:, 0] - p.b * sine) + p.d3 * (y[:, 6] - y[:, 4] - p.b * y[:, 7] * cosine)
-    f4 = p.k4 * (y[:, 2] - y[:, 1] + p.a * sine) + p.d4 * (y[:, 6] - y[:, 5] + p.a * y[:, 7] * cosine)
-    f1, f2 = _wheel_forces(assembly, y, inputs)
-    moment = cosine * (p.b * f3 - p.a * f4)
+    f1, f2 = _wheel_forces(assembly, run.states, inputs)
+    f3, f4, moment = suspension_loads(run.states.T, assembly.parameters, assembly.vehicle.geometry)
     channels: Channels = {
         "f1": ("N", "front wheel force, up", f1),
         "f2": ("N", "rear wheel force, up", f2),
@@ -127,7 +111,7 @@ def _forces(assembly: Assembly, run: Trajectory, inputs: np.ndarray | None) -> C
     if run.force is not None:
         channels["enforced_force"] = ("N", "force on the chassis, down, that the prescribed heave takes", run.force)
     if run.moment is not None and inputs is not None:
-        channels["inertia_term"] = ("N m", "I beta''", p.I * inputs[:, -1])
+        channels["inertia_term"] = ("N m", "I beta''", assembly.parameters.I * inputs[:, -1])
         channels["enforced_moment"] = ("N m", "moment, nose up, that the prescribed pitch takes", run.moment)
     return channels
 
@@ -143,11 +127,6 @@ def _wheel_forces(assembly: Assembly, y: np.ndarray, inputs: np.ndarray | None) 
     if any(tyre.pushes_only for tyre in assembly.vehicle.tyres):
         forces = np.maximum(np.minimum(forces, 2.0 * pressed), 0.0)
     return forces[:, 0], forces[:, 1]
-
-
-def state_names() -> tuple[str, ...]:
-    """Names of the eight state channels."""
-    return (*pitch_plane.STATES, *(f"{name}_rate" for name in pitch_plane.STATES))
 
 
 def summary(result: Result) -> dict[str, Any]:

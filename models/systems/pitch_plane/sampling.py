@@ -2,16 +2,21 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from models.core.errors import InputError
+from models.core.noise import normal
 from models.core.result import Result
 from models.core.steps import divides, fitting
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
 from models.systems.pitch_plane.scene import Scene
 
+SEED = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
+PATH = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
 SLACK = 1e-6
 """Part of a period by which a row may lie beside its instant; a run's times are whole numbers of steps."""
 NO_ROW = "each sample needs a row of the run: use an integrator of fixed steps, which must divide the sampling period"
@@ -31,6 +36,16 @@ def check_rate(scene: Scene, place: str, rate: float) -> None:
             raise InputError(scene.file, place, rate, allowed)
 
 
+def check_end(scene: Scene, place: str, file: str, end: float) -> None:
+    """Refuse a file that ends (s) before the run does."""
+    length = scene.run.duration
+    if end < length * (1 - 1e-9):
+        from models.core.time_series import other_unit
+
+        allowed = f"ends at {end:g} s, but the run lasts {length:g} s: shorten run.duration{other_unit(end, length)}"
+        raise InputError(scene.file, place, file, allowed)
+
+
 def numbers(times: np.ndarray, rate: float) -> np.ndarray:
     """Number (n,) of the sensor's instant at or last before each time (n,) in s."""
     return np.floor(times * rate + SLACK).astype(np.int64)
@@ -46,6 +61,13 @@ def read(times: np.ndarray, values: np.ndarray, rate: float, scene: Scene, place
     if np.abs(times[row] * rate - number).max() > SLACK:
         raise InputError(scene.file, place, rate, NO_ROW)
     return values[row]
+
+
+def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Scene, place: str) -> np.ndarray:
+    """The reading with white noise on each sample: ``sampling_rate``, ``deviation``, ``seed`` and ``path`` of p."""
+    number = numbers(times, p.sampling_rate)
+    noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
+    return read(times, values, p.sampling_rate, scene, place) + noise[number]
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:

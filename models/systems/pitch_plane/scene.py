@@ -1,4 +1,4 @@
-"""Scenes of the pitch-plane vehicle."""
+"""Scenes of the pitch-plane vehicle, and what a run of one computes: vehicle, input and effects, and nothing else."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -9,15 +9,16 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.scene_effects import read_tables
+from models.core.scene_effects import legal, module_of, read_tables
 from models.core.scene_file import SceneFile, checked, existing, parse
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity, read
 from models.core.systems import DEFAULT
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, RECOMMENDED
-from models.engines.protocol import Settings
 from models.vehicles import pitch_plane
 from models.vehicles.description import Geometry
+from models.vehicles.pitch_plane import STATE_NAMES
 
 SETS = Path(pitch_plane.__file__).with_name("parameters")
 """Folder of the published parameter sets."""
@@ -83,12 +84,10 @@ class Scene(SceneFile):
 
     def settings(self, engine: str) -> EngineTable:
         """Settings of one engine, with recommended values where the scene says nothing."""
-        given = self.engines.get(engine, EngineTable())
-        name = given.integrator or ("GeneralizedAlpha" if self._constrained(engine) else RECOMMENDED[engine])
-        return given.model_copy(update={"integrator": name, "step": given.step or self.run.step})
-
-    def _constrained(self, engine: str) -> bool:
-        return engine == "exudyn" and not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
+        named = self.engines.get(engine, EngineTable())
+        guided = not {"prescribed_pitch", "prescribed_heave_and_pitch"}.isdisjoint(self.effects)
+        usual = "GeneralizedAlpha" if guided and engine == "exudyn" else RECOMMENDED[engine]
+        return named.model_copy(update={"integrator": named.integrator or usual, "step": named.step or self.run.step})
 
 
 def parameter_set(name: str, file: str, folder: Path) -> pitch_plane.Parameters:
@@ -134,6 +133,13 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Sc
     return scene.model_copy(update={"effects": effects})
 
 
+def changed(scene: Scene, **tables: Mapping[str, Any]) -> Scene:
+    """The scene with some values of its tables changed, by the tables' names."""
+    table = scene.table()
+    tables_now = {name: {**table.get(name, {}), **values} for name, values in tables.items()}
+    return build({**table, **tables_now}, scene.file, Path(scene.folder))
+
+
 def _check_engine(name: str, scene: Scene) -> None:
     """Known names, and no setting that the integrator would not read."""
     if name not in CATALOGUE:
@@ -161,18 +167,15 @@ def _check_times(scene: Scene) -> None:
         own = name in scene.engines and scene.engines[name].step is not None
         _check_step(scene, f"engines.{name}.step" if own else "run.step", float(scene.settings(name).step or 0))
     wanted = scene.run.output_step
-    _check_rows(scene)
-    if wanted is not None and wanted > scene.run.duration * (1 + 1e-9):
+    if wanted is None:
+        return
+    name = str(scene.settings("exudyn").integrator)
+    if "exudyn" in scene.engines and CATALOGUE["exudyn"][name].adaptive:
+        allowed = f"has no meaning for exudyn's {name}, whose rows lie where its own steps end: drop one of the two"
+        raise InputError(scene.file, "run.output_step", wanted, allowed)
+    if wanted > scene.run.duration * (1 + 1e-9):
         allowed = f"must be at most run.duration = {scene.run.duration:g} s"
         raise InputError(scene.file, "run.output_step", wanted, allowed)
-
-
-def _check_rows(scene: Scene) -> None:
-    """An engine that picks its own steps saves its rows where they end."""
-    name = str(scene.settings("exudyn").integrator)
-    if scene.run.output_step is not None and "exudyn" in scene.engines and CATALOGUE["exudyn"][name].adaptive:
-        allowed = f"has no meaning for exudyn's {name}, whose rows lie where its own steps end: drop one of the two"
-        raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
 
 
 def _check_step(scene: Scene, place: str, step: float) -> None:
@@ -193,3 +196,36 @@ def settings_of(scene: Scene, engine: str) -> Settings:
     own = scene.settings(engine)
     assert own.integrator is not None and own.step is not None
     return Settings(own.integrator, own.step, scene.run.duration, own.tolerance, own.spectral_radius)
+
+
+def assemble(scene: Scene) -> Assembly:
+    """Build what the scene names; only the files of its effects are imported."""
+    p = scene.vehicle_parameters()
+    vehicle = pitch_plane.describe(p, scene.vehicle.geometry)
+    assembly = Assembly(scene, vehicle, p, "free", None, _initial(scene, p))
+    for name in ordered(scene):
+        assembly = module_of(DEFAULT, name).extend(assembly, scene.effects[name])
+    return assembly
+
+
+def _initial(scene: Scene, p: pitch_plane.Parameters) -> np.ndarray:
+    """Static equilibrium, with the coordinates that the scene sets put in its place."""
+    state = pitch_plane.equilibrium(p, scene.vehicle.geometry)
+    for name, value in scene.start.items():
+        if name not in STATE_NAMES:
+            raise InputError(scene.file, f"start.{name}", value, "not a state", STATE_NAMES)
+        state[STATE_NAMES.index(name)] = value
+    return state
+
+
+def ordered(scene: Scene) -> list[str]:
+    """The scene's effects, each after those that it needs; refuses illegal combinations."""
+    modules = {name: module_of(DEFAULT, name) for name in scene.effects}
+    legal(modules, scene)
+    done: list[str] = []
+    waiting = list(modules)
+    while waiting:
+        ready = [n for n in waiting if all(m in done for m in (*modules[n].NEEDS, *modules[n].AFTER) if m in modules)]
+        done += ready
+        waiting = [n for n in waiting if n not in ready]
+    return done

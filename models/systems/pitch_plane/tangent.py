@@ -3,10 +3,18 @@
 An error x (8,) of the state obeys x' = A(t) x + g(t), where A is the Jacobian of eq. (37) at the path and g what
 wrong forces or wrong parameters add. The march below is the exact linearisation of the reference's Runge-Kutta
 step, so it gives what a run with a very small error would give, free of rounding.
+
+Covariance under white noise on the samples of the forces, which are held over each period or linear in between: from
+one sample to the next x+ = Phi x + G0 w + G1 w+, with Phi, G0 and G1 from the same linearisation, so the recursion
+gives what a Monte Carlo with the same samples gives, as long as the errors are small. Linear samples reach into two
+periods: x and w are correlated, E[x w^T] = s^2 G1 of the period before. No matrix exponential is taken: van Loan's
+block form holds exp(-A T) of a pole at -697 1/s and overflows without a word (filterpy's ``van_loan_discretization`` is
+wrong from T = 0.05 s on).
 """
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +24,7 @@ from models.core.signals import Sampled, Smooth
 from models.engines.assembly import Assembly
 from models.engines.reference import compiled
 from models.machine.compiled import named
-from models.vehicles.pitch_plane import Parameters
+from models.vehicles.pitch_plane import STATES, Parameters
 from models.vehicles.pitch_plane_equations import RIGHT_HAND_SIDES, suspension
 
 STEP = 1e-3
@@ -107,16 +115,11 @@ def compile_carry(one_step, key):
     return compiled(carry, key)
 
 
-_MARCHES: dict[tuple[Any, ...], Any] = {}
-
-
-def march_along(compile_march: Any, mode: str, geometry: str):
+@cache
+def march_along(compile_march: Any, mode: str, geometry: str) -> Any:
     """A march along the path of a mode and a geometry, compiled when first asked for."""
-    key = (mode, geometry)
-    if (compile_march, key) not in _MARCHES:
-        one_step = _step_of(RIGHT_HAND_SIDES[key], mode == "force-body", geometry == "linear")
-        _MARCHES[compile_march, key] = compile_march(one_step, key)
-    return _MARCHES[compile_march, key]
+    one_step = _step_of(RIGHT_HAND_SIDES[mode, geometry], mode == "force-body", geometry == "linear")
+    return compile_march(one_step, (mode, geometry))
 
 
 @dataclass(frozen=True)
@@ -141,14 +144,17 @@ class Path:
         """Rows of the input table from a step's start to its middle, its end and the next step."""
         return (0, 0, 1) if self.forces.held else (1, 2, 2)
 
-    def table(self, signal: Any) -> np.ndarray:
-        """A signal at the stages of all steps, shape (rows, channels)."""
-        count = self.per_sample * self.samples
-        return (
-            signal.sample(0.0, self.step, count)
-            if self.forces.held
-            else signal.sample(0.0, self.step / 2, 2 * count + 1)
-        )
+    @property
+    def steps(self) -> int:
+        """Number of steps of the march."""
+        return self.per_sample * self.samples
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """The wheel forces (rows, 2) in N at the stages of all steps."""
+        if self.forces.held:
+            return self.forces.sample(0.0, self.step, self.steps)
+        return self.forces.sample(0.0, self.step / 2, 2 * self.steps + 1)
 
     def march(self, compile_march: Any):
         """A compiled march that fits the assembly."""
@@ -162,19 +168,16 @@ class Path:
         errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
         the parameters of a wrong model, whose error forces every column.
         """
-        count = self.per_sample * self.samples
-        inputs = self.table(self.forces)
-        p = self.assembly.parameters.array()
+        count, p = self.steps, self.assembly.parameters.array()
         wrong = p if other is None else p + SMALL * (other.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
-        march = self.march(compile_carry)
-        march(
+        self.march(compile_carry)(
             self.assembly.initial.copy(),
             np.array(columns, dtype=float),
             self.step,
             count,
-            inputs,
+            self.inputs,
             pushes,
             self.rows,
             p,
@@ -187,7 +190,7 @@ class Path:
     @property
     def times(self) -> np.ndarray:
         """Ends of the steps (s), the start included."""
-        return self.step * np.arange(self.per_sample * self.samples + 1)
+        return self.step * np.arange(self.steps + 1)
 
 
 def path_of(assembly: Assembly, longest: float = STEP) -> Path:
@@ -236,3 +239,72 @@ def swing(path: Path) -> float:
     """Frequency (rad/s) of the slow swing of a tilt error along a path; 0 where it grows instead."""
     half = 0.5 * float(np.trace(tilt_map(path)))
     return math.acos(half) / (path.forces.period * path.samples) if abs(half) <= 1.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the state, products of two."""
+
+    times: np.ndarray
+    matrices: np.ndarray
+
+    def deviation(self, coordinate: str) -> np.ndarray:
+        """Standard deviation (n,) of a coordinate by its name: m or rad."""
+        i = STATES.index(coordinate)
+        return np.sqrt(self.matrices[:, i, i])
+
+
+def covariance(assembly: Assembly, deviation: float, longest: float = STEP) -> Covariance:
+    """Covariance along a free force-excited run, of noise with a standard deviation (N) of each sample.
+
+    longest : of the steps (s). Raises ValueError for any other run and for samples that a spline goes through:
+    every sample of a spline reaches into all periods.
+    """
+    path = path_of(assembly, longest)
+    if assembly.scene.effects["wheel_forces"].interpolation == "smooth":
+        raise ValueError("the noise of samples that a spline goes through has no recursion: hold it, or take it linear")
+    return Covariance(path.forces.period * np.arange(path.samples + 1), carried(path, deviation))
+
+
+def carried(path: Path, deviation: float) -> np.ndarray:
+    """Covariances (samples + 1, 8, 8) at the samples of a path, of noise of ``deviation`` (N); 0 at its start."""
+    matrices = np.zeros((path.samples + 1, 8, 8))
+    stages = np.arange(2 * path.per_sample + 1) / (2 * path.per_sample)
+    weights = np.zeros((len(stages), 12, 2))  # force errors of 1 N in the sample at the start and in that at the end
+    for wheel in range(2):
+        weights[:, 8 + wheel, wheel] = 1.0 if path.forces.held else 1.0 - stages
+        weights[:, 10 + wheel, wheel] = 0.0 if path.forces.held else stages
+    path.march(_compile_covariance)(
+        path.assembly.initial.copy(),
+        path.step,
+        path.per_sample,
+        path.inputs,
+        weights,
+        path.rows,
+        path.assembly.parameters.array(),
+        deviation**2,
+        matrices,
+    )
+    return matrices
+
+
+def _compile_covariance(one_step, key):
+    def covariance_march(y, step, per_sample, inputs, weights, rows, p, intensity, matrices):
+        """The recursion of this file; x holds the columns of Phi, G0 and G1."""
+        to_middle, to_end, to_next = rows
+        x, before = np.empty((12, 8)), np.zeros((2, 8))
+        for i in range(len(matrices) - 1):
+            x[:] = 0.0
+            for j in range(8):
+                x[j, j] = 1.0
+            for j in range(per_sample):
+                row = (i * per_sample + j) * to_next
+                at = (row, row + to_middle, row + to_end)
+                one_step(y, x, step, inputs, weights, (at, (2 * j, 2 * j + 1, 2 * j + 2)), p, p)
+            moved, begun, ended = x[:8], x[8:10], x[10:]
+            cross = intensity * moved.T @ before.T @ begun
+            matrices[i + 1] = moved.T @ matrices[i] @ moved + intensity * (begun.T @ begun + ended.T @ ended)
+            matrices[i + 1] += cross + cross.T
+            before[:] = ended
+
+    return compiled(covariance_march, key)

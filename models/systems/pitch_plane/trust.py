@@ -86,10 +86,9 @@ def interpolation_error(path: Path) -> np.ndarray:
     spline as late as that, and err by -f'' T^2 / 24 on average.
     """
     spline = Smooth(_covering(path), path.forces.period, degree=5)
-    count = path.per_sample * path.samples
+    count, given = path.steps, path.inputs
     late = path.forces.period / 2 if path.forces.held else 0.0
     true = spline.sample(-late, path.step / 2, 2 * count + 1)
-    given = path.table(path.forces)
     read = [given] * 3 if path.forces.held else [given[0:-1:2], given[1::2], given[2::2]]
     return np.stack([read[0] - true[0:-1:2], read[1] - true[1::2], read[2] - true[2::2]], axis=1).reshape(3 * count, 2)
 

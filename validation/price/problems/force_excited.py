@@ -13,10 +13,10 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.core.signals import Sampled
-from models.engines.assembly import Assembly
-from models.engines.protocol import Model, Settings, Trajectory, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.engines.protocol import build
 from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.scene import assemble
 from validation.price.problems.road_excited import SPEED, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0

@@ -11,8 +11,7 @@ import numpy as np
 
 from models.core.noise import normal
 from models.core.signals import Sampled
-from models.engines.assembly import Assembly
-from models.engines.protocol import Trajectory
+from models.engines.assembly import Assembly, Trajectory
 from models.systems.pitch_plane.run import outputs
 from validation.price.problems import force_excited
 from validation.price.problems.force_excited import PERIOD, ForceExcited

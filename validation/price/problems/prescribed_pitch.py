@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 
 from models.core.signals import Sampled, Smooth, Stacked
-from models.engines.assembly import Assembly
-from models.engines.protocol import Settings, Trajectory, build
-from models.systems.pitch_plane.assembly import assemble
+from models.engines.assembly import Assembly, Settings, Trajectory
+from models.engines.protocol import build
+from models.systems.pitch_plane.scene import assemble
 from validation.price.problems.force_excited import DURATION, MS, PERIOD, STEPS, ForceExcited
 from validation.price.problems.force_excited import driven as by_forces
 from validation.price.problems.road_excited import scene

@@ -14,11 +14,11 @@ from scipy.integrate import OdeSolution, solve_ivp
 
 from models.advice.price.pitch_plane import engine_settings
 from models.advice.price.problem import Setting
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Model, Settings, Trajectory, build
+from models.engines.protocol import build
 from models.engines.reference import derivative_of
-from models.systems.pitch_plane.assembly import assemble
+from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 
 DURATION, SPEED = 2.0, 20.0

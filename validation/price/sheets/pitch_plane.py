@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.engines.protocol import Settings, build
+from models.engines.assembly import Settings
+from models.engines.protocol import build
 from models.road.study import WINDOW, study_road
 from validation.price.problems import force_excited, noisy_forces, prescribed_pitch, road_excited
 from validation.price.problems.force_excited import DURATION, FINE, PERIOD, ForceExcited

@@ -4,10 +4,8 @@ import time
 from typing import Any
 
 from models.advice.choice.answer import Answer, Quantity
-from models.engines.protocol import build
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import outputs
-from models.systems.pitch_plane.scene import Scene, settings_of
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import Scene, assemble
 
 ENGINE, WINDOWED = "reference", True
 CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
@@ -16,15 +14,17 @@ CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
 
 def answer(scene: Scene, engine: str) -> Answer:
     """Run the scene."""
-    assembly, own = assemble(scene), settings_of(scene, engine)
-    model = build(engine, assembly, own)
+    assembly = assemble(scene)
     begun = time.process_time()
-    run = model.run()
-    found = outputs(assembly, run, model)
+    found = run(scene, engine, assembly=assembly)
     seconds = time.process_time() - begun
-    counts = {"steps": run.counts.get("steps", len(run.times) - 1), "states": run.states.shape[1]}
-    counts["calls"] = run.counts.get("force calls", CALLS.get(own.integrator, 1) * counts["steps"])
-    return Answer({name: Quantity(unit, (values,)) for name, (unit, _, values) in found.items()}, counts, seconds)
+    told, states = found.counts(), found.detail.states
+    counts = {"steps": told.get("steps", len(states) - 1), "states": states.shape[1]}
+    counts["calls"] = told.get("force calls", CALLS.get(found.data.attrs["integrator"], 1) * counts["steps"])
+    quantities = {
+        str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in found.data.data_vars.items()
+    }
+    return Answer(quantities, counts, seconds)
 
 
 def steps(scene: Scene) -> int:

@@ -5,25 +5,21 @@ reading is held.
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from models.core.noise import ACCELEROMETERS, normal
+from models.core.result import Result
 from models.core.strict import Strict, quantity
-from models.engines.assembly import Assembly
-from models.systems.pitch_plane.sampling import check_rate, numbers, read
-
-if TYPE_CHECKING:
-    from models.engines.protocol import Model, Trajectory
+from models.engines.assembly import Assembly, Channels, Model, Trajectory
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
 COUNTS = {"all": {"channels": 3}}
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values."""
 CHANNELS = ("ax1", "ay1", "az1 and so on, three per sensor")
 PLACE = "effects.accelerometers.sampling_rate"
 
@@ -50,8 +46,8 @@ class Parameters(Strict):
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     sensors: dict[str, Sensor] = Field(min_length=1, description="tables with x, y, z of each sensor, by its name")
     deviation: float = quantity("m/s^2", "standard deviation of each sample's white noise", default=0.0, zero=True)
-    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
-    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+    seed: int = SEED
+    path: int = PATH
 
     def positions(self) -> dict[str, tuple[float, float, float]]:
         """Places (m) of all sensors by name."""
@@ -63,13 +59,18 @@ def names(p: Parameters) -> list[tuple[str, ...]]:
     return [tuple(f"a{axis}{i + 1}" for axis in "xyz") for i in range(len(p.sensors))]
 
 
+def readings_of(result: Result, p: Parameters) -> np.ndarray:
+    """Readings (n, sensors, 3) in m/s^2 of a run's result."""
+    return np.stack([np.column_stack([result[channel] for channel in channels]) for channels in names(p)], axis=1)
+
+
 @dataclass(frozen=True)
 class Accelerometers:
     """The sensors as an output of the run."""
 
     parameters: Parameters
 
-    def __call__(self, assembly: Assembly, run: "Trajectory", model: "Model") -> Channels:
+    def __call__(self, assembly: Assembly, run: Trajectory, model: Model) -> Channels:
         """Three channels per sensor: specific force (m/s^2) along the chassis' x, y and z."""
         p, number = self.parameters, numbers(run.times, self.parameters.sampling_rate)
         row = read(run.times, np.arange(len(run.times)), p.sampling_rate, assembly.scene, PLACE)
@@ -80,9 +81,9 @@ class Accelerometers:
             for j, (axis, channel) in enumerate(zip("xyz", channels, strict=True))
         }
 
-    def _felt(self, assembly: Assembly, run: "Trajectory", model: "Model", rows: np.ndarray) -> np.ndarray:
+    def _felt(self, assembly: Assembly, run: Trajectory, model: Model, rows: np.ndarray) -> np.ndarray:
         """Readings (samples, sensors, 3) at the rows of the sensors' instants."""
-        from models.sensors.virtual_accelerometers import on_bracket, readings
+        from models.sensors.sensor_array import on_bracket, readings
 
         p, y = self.parameters, run.states[rows]
         moved = np.array([model.acceleration(run.times[row], run.states[row]) for row in rows])

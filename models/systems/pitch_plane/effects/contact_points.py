@@ -13,7 +13,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.strict import Strict
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Channels
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
@@ -22,8 +22,6 @@ COST = "two exact first-order filters after the run; no state in any engine"
 EXAMPLE: dict[str, float] = {}
 COUNTS = {"all": {"channels": 2}}
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values."""
 CHANNELS = ("zeta1", "zeta2")
 
 

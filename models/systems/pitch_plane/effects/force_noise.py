@@ -7,12 +7,11 @@ forces in every engine and at every step.
 from dataclasses import replace
 from typing import Any
 
-from pydantic import Field
-
 from models.core.noise import normal
 from models.core.signals import Sampled, Smooth
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
+from models.systems.pitch_plane.sampling import PATH, SEED
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("road",)
@@ -24,8 +23,8 @@ class Parameters(Strict):
     """[effects.force_noise]."""
 
     deviation: float = quantity("N", "standard deviation of each sample", zero=True)
-    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
-    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+    seed: int = SEED
+    path: int = PATH
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:

@@ -7,19 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
-from models.core.noise import GYRO, normal
+from models.core.noise import GYRO
 from models.core.strict import Strict, quantity
-from models.engines.assembly import Assembly
-from models.systems.pitch_plane.sampling import check_rate, numbers, read
+from models.engines.assembly import Assembly, Channels
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy
 
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.1}
 COUNTS = {"all": {"channels": 1}}
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values."""
 CHANNELS = ("gyro",)
 PLACE = "effects.gyro.sampling_rate"
 
@@ -29,8 +26,8 @@ class Parameters(Strict):
 
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     deviation: float = quantity("rad/s", "standard deviation of each sample", zero=True)
-    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
-    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+    seed: int = SEED
+    path: int = PATH
 
 
 @dataclass(frozen=True)
@@ -41,11 +38,8 @@ class Gyro:
 
     def __call__(self, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
         """Channel ``gyro`` (rad/s), nose up positive."""
-        p = self.parameters
-        true = read(times, states[:, 7], p.sampling_rate, assembly.scene, PLACE)
-        number = numbers(times, p.sampling_rate)
-        noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=GYRO)[:, 0]
-        return {"gyro": ("rad/s", "pitch rate as a gyro reads it, nose up", true + noise[number])}
+        reading = noisy(self.parameters, GYRO, times, states[:, 7], assembly.scene, PLACE)
+        return {"gyro": ("rad/s", "pitch rate as a gyro reads it, nose up", reading)}
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:

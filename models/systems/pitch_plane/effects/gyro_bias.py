@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from models.core.strict import Strict, quantity
-from models.engines.assembly import Assembly
-from models.sensors.gyro import DEGREES_PER_HOUR, bias
-from models.systems.pitch_plane.effects.gyro import Channels, Gyro
-from models.systems.pitch_plane.sampling import numbers
+from models.engines.assembly import Assembly, Channels
+from models.sensors.inertial_unit import DEGREES_PER_HOUR, bias
+from models.systems.pitch_plane.effects.gyro import Gyro
+from models.systems.pitch_plane.sampling import PATH, numbers
 
 NEEDS = ("gyro",)
 COST = "one filter over the gyro's samples after the run; no state in any engine"
@@ -30,7 +30,7 @@ class Parameters(Strict):
     instability: float = quantity("deg/h", "standard deviation of the part that wanders", default=0.0, zero=True)
     correlation_time: float = quantity("s", "time in which the wandering part forgets itself", default=300.0)
     seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the bias")
-    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+    path: int = PATH
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,12 @@ Integrating the pitch acceleration through a second-order high-pass, s^2 / (s^2 
 chassis with the wheels on its arms, I + J (``models.drift.growth.rigid_pitch``): pitch drift moves the wheels along.
 """
 
-import math
-from dataclasses import replace
 from typing import Any
 
 from models.core.strict import Strict, quantity
-from models.drift.growth import rigid_pitch
+from models.drift.growth import spring_of
 from models.engines.assembly import Assembly
 from models.vehicles.description import PitchSpring
-from models.vehicles.pitch_plane import Parameters as Vehicle
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring", "prescribed_pitch", "prescribed_heave_and_pitch")
@@ -31,12 +28,4 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle whose slow pitch is held back."""
-    spring = PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio))
-    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
-    return replace(assembly, vehicle=vehicle)
-
-
-def spring_of(p: Vehicle, cut_off: float, damping_ratio: float = 0.7) -> tuple[float, float]:
-    """Stiffness k = (I + J) wc^2 in N m/rad and damping d = 2 zeta (I + J) wc in N m s/rad, cut_off in Hz."""
-    corner, inertia = 2 * math.pi * cut_off, rigid_pitch(p).total
-    return inertia * corner**2, 2 * damping_ratio * inertia * corner
+    return assembly.with_spring(PitchSpring("chassis", *spring_of(assembly.parameters, p.cut_off, p.damping_ratio)))

@@ -9,9 +9,9 @@ functions of time and state alone, and every engine gets the very same estimate.
 """
 
 import math
+import pickle
 from dataclasses import dataclass, replace
 from functools import partial
-from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,9 +22,10 @@ from models.core.signals import Sampled, Smooth
 from models.core.steps import divides
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS, RADIANS_PER_SECOND
-from models.drift.growth import rigid_pitch
+from models.drift.growth import rigid_pitch, spring_of
 from models.drift.innovations import Consistency, consistency
-from models.engines.assembly import Assembly
+from models.engines.assembly import Assembly, Channels
+from models.systems.pitch_plane.sampling import check_end
 from models.vehicles.description import PitchSpring
 
 if TYPE_CHECKING:
@@ -41,8 +42,6 @@ COUNTS = {
     "all": {"channels": 10},
 }
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values."""
 CHANNELS = (
     "kalman_moment",
     "inertia_moment",
@@ -95,22 +94,15 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     guide = guide_of(assembly, p)
     _check_surprise(assembly, p, guide)
     _check_bandwidth(assembly, p, guide)
-    stiffness, damping = pull(assembly, p)
+    stiffness, damping = spring_of(assembly.parameters, p.bandwidth, p.damping_ratio)
     moment = guide.values @ np.array([[stiffness], [damping]]) + guide.lacking[:, None]
-    spring = PitchSpring("chassis", stiffness, damping)
-    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
-    guided = replace(assembly, vehicle=vehicle).with_moment(Sampled(moment, guide.period, held=False))
+    sprung = assembly.with_spring(PitchSpring("chassis", stiffness, damping))
+    guided = sprung.with_moment(Sampled(moment, guide.period, held=False))
     return replace(
         guided,
         outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
         doubts=(*guided.doubts, *_doubts(p, guide)),
     )
-
-
-def pull(assembly: Assembly, p: Parameters) -> tuple[float, float]:
-    """Stiffness (N m/rad) and damping (N m s/rad) of the moment towards the estimate."""
-    corner, inertia = 2 * math.pi * p.bandwidth, rigid_pitch(assembly.parameters).total
-    return inertia * corner**2, 2 * p.damping_ratio * inertia * corner
 
 
 @dataclass(frozen=True)
@@ -137,16 +129,19 @@ class Guide:
     consistency: Consistency
 
 
-_LATEST: dict[str, Guide] = {}
-"""The last guide, by a digest of all that it depends on: a check and a run per engine need it once."""
+_LATEST: dict[bytes, Guide] = {}
+"""The last guide, by all that it depends on: a check and a run per engine need it once."""
 
 
 def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     """What a force-excited assembly would follow; raises InputError for a file that is none, RunFailed."""
     from models.systems.pitch_plane.pitch_filter import estimate
 
-    measured = _measurement(assembly, p)
-    key = _digest(assembly, measured, p)
+    measured, forces, p_vehicle = _measurement(assembly, p), assembly.input, assembly.parameters
+    assert isinstance(forces, Sampled | Smooth)
+    signal = type(forces).__name__, forces.values, forces.period, forces.held
+    kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
+    key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, p))
     if key not in _LATEST:
         found = estimate(
             assembly,
@@ -162,10 +157,14 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
 
 
 def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Guide:
-    from models.systems.pitch_plane.pitch_filter import INERTIA, PITCH, RATE, suspension_moment
+    from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
+    from models.vehicles.pitch_plane_equations import suspension_loads
 
     deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
     share, names = found.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    relative = np.zeros((8, len(share)))
+    relative[KEPT] = found.states[:, :6].T
+    moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
     fits = consistency(found.innovations, [names[column] for column in measured.columns])
     return Guide(
         found.period,
@@ -173,7 +172,7 @@ def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Gui
         found.states[:, [PITCH, RATE]],
         deviations,
         share,
-        share * suspension_moment(assembly, found.states),
+        share * moment,
         np.cumsum(found.used),
         np.cumsum(found.missed),
         np.nancumsum(found.surprises),
@@ -181,31 +180,9 @@ def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Gui
     )
 
 
-def _digest(assembly: Assembly, measured: "Measurement", p: Parameters) -> str:
-    forces = assembly.input
-    assert isinstance(forces, Sampled | Smooth)
-    named = (
-        assembly.mode,
-        assembly.vehicle.geometry,
-        assembly.scene.run.duration,
-        forces.period,
-        forces.held,
-        type(forces).__name__,
-        measured.period,
-        measured.columns,
-        measured.deviations,
-        p.force_deviation,
-        p.start_deviation,
-        p.inertia_deviation,
-        p.smoother,
-    )
-    arrays = (assembly.parameters.array(), assembly.initial, forces.values, measured.values)
-    return sha256(b"".join((repr(named).encode(), *(array.tobytes() for array in arrays)))).hexdigest()
-
-
 def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     """The file's columns with their deviations; refuses what the filter could not use."""
-    from models.core.time_series import other_unit, read_time_series
+    from models.core.time_series import read_time_series
     from models.systems.pitch_plane.pitch_filter import PITCH, RATE, Measurement
 
     scene, place = assembly.scene, "effects.kalman_filter"
@@ -218,29 +195,17 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     for name, column in zip(given, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
-    if len(values) * period < scene.run.duration * (1 - 1e-9):
+    check_end(scene, f"{place}.file", p.file, len(values) * period)
+    assert assembly.input is not None and assembly.input.period is not None
+    if not divides(*sorted((period, assembly.input.period))):
         raise InputError(
             scene.file,
             f"{place}.file",
             p.file,
-            f"ends at {len(values) * period:g} s, but the run lasts {scene.run.duration:g} s"
-            f"{other_unit(len(values) * period, scene.run.duration)}",
-        )
-    _check_periods(assembly, p, period)
-    return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))
-
-
-def _check_periods(assembly: Assembly, p: Parameters, period: float) -> None:
-    assert assembly.input is not None and assembly.input.period is not None
-    short, long = sorted((period, assembly.input.period))
-    if not divides(short, long):
-        raise InputError(
-            assembly.scene.file,
-            "effects.kalman_filter.file",
-            p.file,
             f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
             "a multiple of the other",
         )
+    return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))
 
 
 def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:

@@ -8,19 +8,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
-from models.core.noise import PITCH_SENSOR, normal
+from models.core.noise import PITCH_SENSOR
 from models.core.strict import Strict, quantity
-from models.engines.assembly import Assembly
-from models.systems.pitch_plane.sampling import check_rate, numbers, read
+from models.engines.assembly import Assembly, Channels
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy
 
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.01}
 COUNTS = {"all": {"channels": 1}}
 
-Channels = dict[str, tuple[str, str, np.ndarray]]
-"""Name -> unit, meaning, values."""
 CHANNELS = ("pitch_reading",)
 PLACE = "effects.pitch_sensor.sampling_rate"
 
@@ -30,8 +27,8 @@ class Parameters(Strict):
 
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     deviation: float = quantity("rad", "standard deviation of each sample", zero=True)
-    seed: int = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
-    path: int = Field(0, ge=0, lt=2**64, description="number of the path within an ensemble of this seed")
+    seed: int = SEED
+    path: int = PATH
 
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
@@ -42,7 +39,5 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 def pitch_reading(p: Any, assembly: Assembly, times: np.ndarray, states: np.ndarray) -> Channels:
     """Channel ``pitch_reading`` (rad), nose up."""
-    true = read(times, states[:, 3], p.sampling_rate, assembly.scene, PLACE)
-    number = numbers(times, p.sampling_rate)
-    noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=PITCH_SENSOR)[:, 0]
-    return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", true + noise[number])}
+    reading = noisy(p, PITCH_SENSOR, times, states[:, 3], assembly.scene, PLACE)
+    return {"pitch_reading": ("rad", "pitch as a sensor reads it, nose up", reading)}

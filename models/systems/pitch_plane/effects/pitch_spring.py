@@ -1,6 +1,5 @@
 """A rotational spring and damper between chassis and ground: the folk remedy against drift."""
 
-from dataclasses import replace
 from typing import Any
 
 from models.core.strict import Strict, quantity
@@ -23,6 +22,4 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with the spring on its chassis."""
-    spring = PitchSpring("chassis", p.stiffness, p.damping, p.dead_band)
-    vehicle = replace(assembly.vehicle, pitch_springs=(*assembly.vehicle.pitch_springs, spring))
-    return replace(assembly, vehicle=vehicle)
+    return assembly.with_spring(PitchSpring("chassis", p.stiffness, p.damping, p.dead_band))

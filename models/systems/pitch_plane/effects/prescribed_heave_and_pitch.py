@@ -35,7 +35,7 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle with heave and pitch of its chassis as inputs, twice differentiable."""
-    from models.systems.pitch_plane.prescribed import prescribe
+    from models.systems.pitch_plane.effects.prescribed_pitch import prescribe
 
     columns = {"z3": METRES, "pitch": RADIANS}
     return prescribe(assembly, "prescribed_heave_and_pitch", p, "heave-pitch", columns)

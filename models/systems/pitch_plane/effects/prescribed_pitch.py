@@ -4,13 +4,19 @@ A measured pitch is differentiated twice: white noise of 0.1 degrees at 1 kHz wo
 smooths it before.
 """
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from pydantic import Field
 
+from models.core.errors import InputError
+from models.core.signals import Smooth, Stacked
+from models.core.smoothing import smoothed
 from models.core.strict import Strict, quantity
 from models.core.tables import RADIANS
-from models.engines.assembly import Assembly
+from models.engines.assembly import GUIDED, Assembly, Mode
+from models.systems.pitch_plane.sampling import check_end
 
 NEEDS = ("wheel_forces",)
 EXCLUDES = ("pitch_spring",)
@@ -35,6 +41,37 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The force-excited vehicle with its pitch as an input, twice differentiable by a quintic spline."""
-    from models.systems.pitch_plane.prescribed import prescribe
-
     return prescribe(assembly, "prescribed_pitch", p, "pitch", {"pitch": RADIANS})
+
+
+def prescribe(
+    assembly: Assembly, effect: str, p: Any, mode: Mode, columns: Mapping[str, Mapping[str, float]]
+) -> Assembly:
+    """The force-excited vehicle with the coordinates of ``mode`` as inputs, by a quintic spline through the samples.
+
+    ``p`` holds the effect's ``file`` and ``bandwidth`` (Hz or None); ``columns`` names the file's columns, with the
+    factors of their units, in the order of the mode's coordinates. Raises InputError.
+    """
+    from models.core.time_series import CHASSIS, read_time_series, sparse
+
+    scene = assembly.scene
+    _check_scene(scene, columns)
+    values, period = read_time_series(scene.path(p.file, f"effects.{effect}.file"), columns)
+    if p.bandwidth is not None:
+        values = smoothed(values, period, p.bandwidth, scene.file, f"effects.{effect}.bandwidth")
+    motion = Smooth(values, period, derivatives=2, degree=5)
+    check_end(scene, f"effects.{effect}.file", p.file, motion.end)
+    assert assembly.input is not None
+    guided = assembly.with_input(mode, Stacked((assembly.input, motion)))
+    guided.initial[[*GUIDED[mode], *(4 + i for i in GUIDED[mode])]] = motion.at(0.0)[: 2 * len(columns)]
+    doubt = sparse(len(values), period, scene.run.duration, CHASSIS)
+    return replace(guided, doubts=(*guided.doubts, doubt)) if doubt else guided
+
+
+def _check_scene(scene: Any, columns: Mapping[str, Any]) -> None:
+    if scene.effects["wheel_forces"].frame == "body":
+        allowed = "a prescribed pitch makes the frame a matter of the file: use 'inertial'"
+        raise InputError(scene.file, "effects.wheel_forces.frame", "body", allowed)
+    for name in (full for column in columns for full in (column, f"{column}_rate") if full in scene.start):
+        allowed = f"the {name.removesuffix('_rate')} is prescribed, and its file says where it starts: drop this key"
+        raise InputError(scene.file, f"start.{name}", scene.start[name], allowed)

@@ -61,22 +61,17 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
 
 
 def _check_keys(file: str, p: Parameters) -> None:
-    given = [name for name in type(p).model_fields if name not in ("source", "speed") and getattr(p, name) is not None]
-    for name in given:
+    keys = {name: value for name, value in p if name not in ("source", "speed") and value is not None}
+    for name, value in keys.items():
         if name not in OWN[p.source]:
-            own = ", ".join(("speed", *OWN[p.source]))
-            raise InputError(
-                file,
-                f"effects.road.{name}",
-                getattr(p, name),
-                f"has no meaning for source = {p.source!r}, which takes {own}",
-            )
+            taken = ", ".join(("speed", *OWN[p.source]))
+            allowed = f"has no meaning for source = {p.source!r}, which takes {taken}"
+            raise InputError(file, f"effects.road.{name}", value, allowed)
     for name in NEEDED.get(p.source, ()):
-        if name not in given:
+        if name not in keys:
             meaning = str(type(p).model_fields[name].description).partition(": ")[2]
-            raise InputError(
-                file, f"effects.road.{name}", None, f"is missing: source = {p.source!r} needs it ({meaning})"
-            )
+            allowed = f"is missing: source = {p.source!r} needs it ({meaning})"
+            raise InputError(file, f"effects.road.{name}", None, allowed)
 
 
 def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[float, ...]]:
@@ -93,17 +88,12 @@ def _profile(scene: Any, p: Parameters, distance: float) -> tuple[Any, tuple[flo
         from models.road.study import STUDY_GD, hills_road, study_road
 
         profile = hills_road() if p.source == "hills" else study_road(STUDY_GD if p.gd is None else p.gd)
-    return _graded(profile, p.grade)
-
-
-def _graded(profile: Any, grade: float | None) -> tuple[Any, tuple[float, ...]]:
-    """The profile, on a grade where one is named, and the stations (m) at which it is only C2."""
     faded_in = profile.window_length
-    if grade is None:
+    if p.grade is None:
         return profile, (0.0, faded_in)
     from models.road.grade import TRANSITION, Graded
 
-    return Graded(profile, grade, faded_in), (0.0, faded_in, faded_in + TRANSITION)
+    return Graded(profile, p.grade, faded_in), (0.0, faded_in, faded_in + TRANSITION)
 
 
 def _measured(scene: Any, p: Parameters, distance: float) -> Any:
@@ -131,10 +121,8 @@ def _check_length(scene: Any, p: Parameters, raw: Any, distance: float, run_in: 
     if run_in > total:
         raise InputError(scene.file, "effects.road.run_in", run_in, f"the road {p.file} is only {total:g} m long")
     if p.beyond_end == "refused" and distance > total * (1 + 1e-9):
-        raise InputError(
-            scene.file,
-            "effects.road.beyond_end",
-            "refused",
+        allowed = (
             f"the road {p.file} ends at {total:g} m and the run needs {distance:g} m: shorten "
-            "run.duration, lower effects.road.speed or set this to 'mirrored'",
+            "run.duration, lower effects.road.speed or set this to 'mirrored'"
         )
+        raise InputError(scene.file, "effects.road.beyond_end", "refused", allowed)

@@ -11,6 +11,7 @@ from models.core.signals import Interpolation, sampled
 from models.core.strict import Strict
 from models.core.tables import NEWTONS
 from models.engines.assembly import Assembly
+from models.systems.pitch_plane.sampling import check_end
 
 if TYPE_CHECKING:
     from models.core.finding import Finding
@@ -37,20 +38,13 @@ class Parameters(Strict):
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The vehicle without tyres, driven by the two forces."""
-    from models.core.time_series import other_unit, read_time_series
+    from models.core.time_series import read_time_series
 
     scene = assembly.scene
     columns = {"front": NEWTONS, "rear": NEWTONS}
     values, period = read_time_series(scene.path(p.file, "effects.wheel_forces.file"), columns)
     signal = sampled(values, period, p.interpolation)
-    if signal.end < scene.run.duration * (1 - 1e-9):
-        raise InputError(
-            scene.file,
-            "effects.wheel_forces.file",
-            p.file,
-            f"ends at {signal.end:g} s, but the run lasts {scene.run.duration:g} s: shorten run.duration"
-            f"{other_unit(signal.end, scene.run.duration)}",
-        )
+    check_end(scene, "effects.wheel_forces.file", p.file, signal.end)
     turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
     driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
     return replace(driven, doubts=(*driven.doubts, *_judged(driven, p, values, period)))

@@ -1,13 +1,12 @@
-"""Two figures to decide from: what each stabiliser leaves, and what its stiffness or cut-off does on a grade."""
+"""Figures of drift: what each stabiliser leaves, what its stiffness or cut-off does on a grade, how paths scatter."""
 
 import math
 from typing import Any
 
 import numpy as np
 
-from models.drawing.figures import plt
-from models.drift.score import BAND, TUMBLED, Limits
-from models.drift.section_forces import CHANNELS
+from models.drawing.figures import heading, plt
+from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 
 Row = dict[str, Any]
 
@@ -20,6 +19,15 @@ DAMAGE, PITCH, SHARE = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
 TICKS = (0.01, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 100.0)
 SHARP = 0.05
 """Damage ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, logarithmic far from it."""
+
+
+def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
+    """Bands of a pitch error (rad), its 5, 25, 50, 75 and 95 % quantiles (5, times), over times (s)."""
+    low, quarter, middle, three, high = bands
+    axis.fill_between(times, low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
+    axis.fill_between(times, quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
+    axis.semilogy(times, middle, color="C0", label="median")
+    axis.set_title("magnitude of the pitch error [rad]")
 
 
 def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
@@ -45,11 +53,9 @@ def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
     axes[0].set_ylim(len(methods) - 0.5, -0.5)
     _verdicts(axes[3], rows, methods)
     _legend(figure, grade)
-    figure.suptitle(
+    heading(
+        figure,
         f"Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces ({rows[0]['engine']})",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
     )
     return figure
 
@@ -63,24 +69,15 @@ def _marks(axes: Any, row: Row, line: int) -> None:
             place = np.clip(row[f"damage {channel}"], *DAMAGE)
             axes[0].plot(place, y, mark, color=colour, markersize=4.5, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
-        axes[0].text(
-            1.0,
-            y,
-            f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}",
-            color=colour,
-            fontsize=7.5,
-            ha="center",
-            va="center",
-        )
-    axes[1].plot(np.clip(row["pitch error max [rad]"], *PITCH), y, "o", color=colour, markersize=5, clip_on=False)
-    axes[2].plot(np.clip(row["moment share to 15 Hz"], *SHARE), y, "o", color=colour, markersize=5, clip_on=False)
+        told = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
+        axes[0].text(1.0, y, told, color=colour, fontsize=7.5, ha="center", va="center")
+    for axis, name, span in ((axes[1], "pitch error max [rad]", PITCH), (axes[2], "moment share to 15 Hz", SHARE)):
+        axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=5, clip_on=False)
 
 
 def _panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
-    axis.set_xscale("log")
-    axis.set_xlim(*span)
-    axis.axvspan(*good, color="#00795a", alpha=0.16, linewidth=0)
-    axis.set_title(title)
+    axis.set(xscale="log", xlim=span, title=title)
+    axis.axvspan(*good, color=WORDS["accepted"], alpha=0.16, linewidth=0)
     axis.grid(axis="y", alpha=0.25)
 
 
@@ -93,23 +90,16 @@ def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
     for (road, key), x in places.items():
         name = "by damage" if key == "verdict" else "without truth"
         axis.text(x, -0.75, f"{ROADS[road][0]},\n{name}", fontsize=8, va="bottom", color=ROADS[road][1])
-    for row in rows:
-        for key in ("verdict", "without truth"):
-            word = row[key]
-            axis.text(
-                places[row["road"], key],
-                methods.index(row["method"]),
-                word,
-                color=WORDS[word],
-                va="center",
-                fontsize=8.5,
-                fontweight="bold" if word == "accepted" else "normal",
-            )
-    free = next(row["seconds"] for row in rows if row["method"] == "free")
     axis.text(9.5, -0.75, "cost,\nx free", fontsize=8, va="bottom")
+    free = next(row["seconds"] for row in rows if row["method"] == "free")
     for row in rows:
+        line = methods.index(row["method"])
+        for key in ("verdict", "without truth"):
+            bold = "bold" if row[key] == "accepted" else "normal"
+            x, colour = places[row["road"], key], WORDS[row[key]]
+            axis.text(x, line, row[key], color=colour, va="center", fontsize=8.5, fontweight=bold)
         if row["road"] == rows[0]["road"]:
-            axis.text(9.5, methods.index(row["method"]), f"{row['seconds'] / free:.1f}", va="center", fontsize=8.5)
+            axis.text(9.5, line, f"{row['seconds'] / free:.1f}", va="center", fontsize=8.5)
 
 
 def _legend(figure: Any, grade: float | None) -> None:
@@ -143,14 +133,12 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
         tumbled = found[~held, 0]
         axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles, {name}")
     low = limits.pitch_error / 2
-    axes[0].set_ylim(low, 3.0)
     axes[0].axhspan(low, limits.pitch_error, color="#00795a", alpha=0.16, linewidth=0, label="allowed")
     axes[1].axhspan(
         1 - limits.damage_error, 1 + limits.damage_error, color="#00795a", alpha=0.3, linewidth=0, label="allowed"
     )
-    axes[1].set_ylim(top=1.5 * DAMAGE[1])
-    axes[0].set_title("largest pitch error [rad]")
-    axes[1].set_title("damage ratio of the worst section force")
+    axes[0].set(ylim=(low, 3.0), title="largest pitch error [rad]")
+    axes[1].set(ylim=(None, 1.5 * DAMAGE[1]), title="damage ratio of the worst section force")
     for axis in axes:
         axis.axvline(level.holding, color="#555555", linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
@@ -161,12 +149,10 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
         above = axis.secondary_xaxis("top", functions=turning)
         above.set_xlabel("cut-off of the high-pass that is the same thing [Hz]", fontsize=8.5)
         axis.legend(fontsize=8)
-    figure.suptitle(
-        f"Keeping the pitch near zero: no stiffness is right, least of all on a grade of {grade or 0:g} rad"
-        if grade is not None
-        else "Keeping the pitch near zero: what the stiffness does",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
+    why = (
+        "what the stiffness does"
+        if grade is None
+        else f"no stiffness is right, least of all on a grade of {grade:g} rad"
     )
+    heading(figure, f"Keeping the pitch near zero: {why}")
     return figure

@@ -1,6 +1,6 @@
 """A virtual measurement: a run on a road, the files that it leaves, and scenes that follow it on these files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +9,11 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.result import Result
 from models.core.time_series import write_time_series
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings
-from models.systems.pitch_plane.assembly import assemble
-from models.systems.pitch_plane.run import run as simulate
-from models.systems.pitch_plane.run import state_names
-from models.systems.pitch_plane.scene import Scene, build
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import Scene, assemble, build
+from models.vehicles.pitch_plane import STATE_NAMES, Parameters
 
 PAPER = {"k3": 1.05, "k4": 0.95, "d3": 0.95, "d4": 1.05, "I": 0.95}
 """The perturbed model of Appendix B, as factors on the parameters."""
@@ -23,49 +22,46 @@ LEAST = 8
 
 MEASURING = ("road", "lift_off")
 """Effects that the measurement may have; the runs on its files have no tyres."""
+PRESCRIBED = {
+    "prescribed_heave_and_pitch": ("z3", "z3_rate", "pitch", "pitch_rate"),
+    "prescribed_pitch": ("pitch", "pitch_rate"),
+}
+"""States that an effect takes from its own file."""
 
-Follow = Callable[[dict[str, float], dict[str, Any]], Scene]
+Follow = Callable[[Mapping[str, float], Mapping[str, Any]], Scene]
 """Builder of a force-excited scene from overrides of parameters and further effects."""
+
+
+def perturbed(p: Parameters, factors: Mapping[str, float] = PAPER) -> dict[str, float]:
+    """Parameters times their factors, by name."""
+    return {name: getattr(p, name) * factor for name, factor in factors.items()}
 
 
 def measure(scene: Scene) -> Result:
     """The run on the road, in the reference by Runge-Kutta steps."""
-    return simulate(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
+    return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
 
 
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:
     """Refuse a scene that is no virtual measurement, or that cannot be followed through all runs on its files."""
     for name in scene.effects:
         if name not in MEASURING:
-            raise InputError(
-                scene.file,
-                f"effects.{name}",
-                None,
-                "this study measures on a road and names the effects of the other runs itself: drop it",
-            )
+            allowed = "this study measures on a road and names the effects of the other runs itself: drop it"
+            raise InputError(scene.file, f"effects.{name}", None, allowed)
     if "road" not in scene.effects:
         raise InputError(scene.file, "effects.road", None, "is missing: this study measures on a road")
     if scene.run.output_step is not None:
-        raise InputError(
-            scene.file,
-            "run.output_step",
-            scene.run.output_step,
-            "this study makes its table from every step, and chooses the rows that it saves: drop this key",
-        )
+        allowed = "this study makes its table from every step, and chooses the rows that it saves: drop this key"
+        raise InputError(scene.file, "run.output_step", scene.run.output_step, allowed)
     stride(scene, sampling_rate)
     if scene.run.duration * sampling_rate < LEAST:
         allowed = f"must last at least {LEAST} samples, {LEAST / sampling_rate:g} s"
         raise InputError(scene.file, "run.duration", scene.run.duration, allowed)
     for engine in engines:
-        _check_integrator(scene, engine)
-
-
-def _check_integrator(scene: Scene, engine: str) -> None:
-    """The guided runs need an integrator that solves for a prescribed pitch."""
-    given = scene.engines[engine].integrator if engine in scene.engines else None
-    if given is not None and not CATALOGUE[engine][given].constraints:
-        allowed = "some runs prescribe the pitch, which this integrator does not solve for: drop this key"
-        raise InputError(scene.file, f"engines.{engine}.integrator", given, allowed)
+        integrator = scene.engines[engine].integrator if engine in scene.engines else None
+        if integrator is not None and not CATALOGUE[engine][integrator].constraints:
+            allowed = "some runs prescribe the pitch, which this integrator does not solve for: drop this key"
+            raise InputError(scene.file, f"engines.{engine}.integrator", integrator, allowed)
 
 
 def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
@@ -73,13 +69,11 @@ def check_steps(scene: Scene, engines: tuple[str, ...]) -> None:
     for engine in engines:
         step = scene.settings(engine).step
         if step != scene.run.step:
-            raise InputError(
-                scene.file,
-                f"engines.{engine}.step",
-                step,
-                "this study compares runs row by row with the "
-                f"measurement, whose step is run.step = {scene.run.step:g} s: drop this key",
+            allowed = (
+                "this study compares runs row by row with the measurement, whose step is run.step = "
+                f"{scene.run.step:g} s: drop this key"
             )
+            raise InputError(scene.file, f"engines.{engine}.step", step, allowed)
 
 
 def stride(scene: Scene, sampling_rate: float) -> int:
@@ -91,38 +85,35 @@ def stride(scene: Scene, sampling_rate: float) -> int:
     return round(ratio)
 
 
-def write_measurement(measured: Result, sampling_rate: float, every: int, folder: Path) -> float:
-    """``wheel_forces.csv`` and ``pitch.csv`` at ``sampling_rate`` (Hz); returns the largest force (N)."""
-    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
-    period = 1.0 / sampling_rate
+def write_wheel_forces(folder: Path, front: np.ndarray, rear: np.ndarray, period: float) -> None:
+    """``wheel_forces.csv`` of forces (n,) in N, up on the wheels, every ``period`` (s)."""
     write_time_series(folder / "wheel_forces.csv", {"front": ("N", front), "rear": ("N", rear)}, period)
+
+
+def write_measurement(measured: Result, folder: Path, period: float) -> float:
+    """``wheel_forces.csv`` and ``pitch.csv`` every ``period`` (s); returns the largest force (N)."""
+    every = round(period / float(measured.times[1] - measured.times[0]))
+    front, rear, pitch = (measured[name][::every] for name in ("f1", "f2", "pitch"))
+    write_wheel_forces(folder, front, rear, period)
     write_time_series(folder / "pitch.csv", {"pitch": ("rad", pitch)}, period)
     return float(max(np.abs(front).max(), np.abs(rear).max()))
 
 
 def follower(scene: Scene, folder: Path) -> Follow:
     """Builder of scenes on the files in ``folder``; they start where the measurement did."""
-    initial = dict(zip(state_names(), assemble(scene).initial.tolist(), strict=True))
+    initial = dict(zip(STATE_NAMES, assemble(scene).initial.tolist(), strict=True))
     parameters = scene.vehicle_parameters().model_dump()
 
-    def follow(override: dict[str, float], effects: dict[str, Any]) -> Scene:
-        forces = {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}}
-        prescribed = _prescribed(effects)
+    def follow(override: Mapping[str, float], effects: Mapping[str, Any]) -> Scene:
+        prescribed = next((states for effect, states in PRESCRIBED.items() if effect in effects), ())
         table = {
             "title": scene.title,
-            "vehicle": {"geometry": scene.vehicle.geometry, "override": parameters | override},
+            "vehicle": {"geometry": scene.vehicle.geometry, "override": {**parameters, **override}},
             "run": {"duration": scene.run.duration, "step": scene.run.step},
             "start": {name: value for name, value in initial.items() if name not in prescribed},
-            "engines": {name: own.model_dump(exclude_unset=True) for name, own in scene.engines.items()},
-            "effects": forces | effects,
+            "engines": {name: settings.model_dump(exclude_unset=True) for name, settings in scene.engines.items()},
+            "effects": {"wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"}, **effects},
         }
         return build(table, scene.file, folder)
 
     return follow
-
-
-def _prescribed(effects: dict[str, Any]) -> set[str]:
-    """States that an effect takes from its own file."""
-    if "prescribed_heave_and_pitch" in effects:
-        return {"z3", "z3_rate", "pitch", "pitch_rate"}
-    return {"pitch", "pitch_rate"} if "prescribed_pitch" in effects else set()

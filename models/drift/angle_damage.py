@@ -1,0 +1,74 @@
+"""What a wrong pitch does to the damage of a component: paths of a gyro's angle error, and damage over such an error.
+
+A vehicle that is guided by a gyro's pitch stands wrong by its angle error, and a slow angle turns the section forces
+and changes nothing else: the component along the chassis is f3 sin(pitch + error). So the damage of a run, driven again
+and again, is counted once for each of some constant errors, and averaged over the error's path.
+"""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from models.core.errors import InputError
+from models.core.noise import GYRO, normal
+from models.core.result import Result
+from models.drift.score import CHANNELS, section_forces
+from models.fatigue.damage import pseudo_damage
+from models.sensors.inertial_unit import bias
+
+NODES = 41
+"""Constant angle errors at which damage is counted; an odd number, so that one of them is zero."""
+SMALLEST = 1e-3
+"""rad; below it the nodes are evenly spaced, above it their spacing grows with the angle."""
+
+UnitPaths = tuple[np.ndarray, np.ndarray]
+"""Angle errors (samples, seconds + 1) at each second: of a random walk of 1 rad per sqrt(s), of a bias of 1 rad/s."""
+
+
+def unit_paths(samples: int, rate: int, length: int, correlation_time: float, seed: int) -> UnitPaths:
+    """Paths from ``rate`` samples in a second over ``length`` (s), the samples that the effects add to a reading.
+
+    Every grade of gyro is a multiple of the same paths, so that grades are compared without scatter between them.
+    """
+    walks, drifts = list[np.ndarray](), list[np.ndarray]()
+    for path in range(samples):
+        noise = normal(seed, path, rate * length, 1, source=GYRO)[:, 0] / rate**0.5
+        wander = bias(rate * length, 1 / rate, 0.0, 1.0, correlation_time, seed, path) / rate
+        for paths, part in ((walks, noise), (drifts, wander)):
+            paths.append(np.concatenate([[0.0], part.reshape(length, rate).sum(axis=1).cumsum()]))
+    return np.array(walks), np.array(drifts)
+
+
+def damages(result: Result, error: float) -> list[float]:
+    """Pseudo-damage of each section force of a run whose pitch is wrong by a constant error (rad)."""
+    forces = section_forces(result["f3"], result["f4"], result["pitch"] + error)
+    return [pseudo_damage(repeated(forces[name])) for name in CHANNELS]
+
+
+def damage_curve(result: Result, reach: float, file: str = "") -> CubicSpline:
+    """Logarithm of the damage of all section forces by the true ones', over a constant error of the pitch (rad).
+
+    Raises InputError, which names the scene's file, for a run without damage.
+    """
+    widest = np.arcsinh(reach / SMALLEST)
+    angles = SMALLEST * np.sinh(np.linspace(-widest, widest, NODES))
+    damage = np.array([damages(result, angle) for angle in angles])
+    true = damage[NODES // 2]
+    if not (true > 0).all():
+        allowed = "leaves no damage in the section forces to compare with: use a road that moves the vehicle"
+        raise InputError(file, "effects.road", None, allowed)
+    return CubicSpline(angles, np.log(damage / true))
+
+
+def repeated(load: np.ndarray) -> np.ndarray:
+    """The load (n,) from its largest value round to the same: what one of many passes does (ASTM E1049-85, 5.4.5).
+
+    Cut elsewhere, the largest cycle of all would stay open and count one half.
+    """
+    top = int(np.argmax(load))
+    return np.concatenate([load[top:], load[: top + 1]])
+
+
+def damage_errors(curve: CubicSpline, angles: np.ndarray) -> np.ndarray:
+    """Relative error (samples, 4) of the damage of each section force over error paths (samples, n) in rad."""
+    reach = curve.x[-1]
+    return np.expm1(curve(np.clip(angles, -reach, reach))).mean(axis=1)

@@ -1,0 +1,89 @@
+"""The six runs of the paper, Section 4: scenes on the files of a virtual measurement, and what each run shows.
+
+The vehicle is driven by the measured wheel forces: undisturbed, with noise, with a perturbed model, with both; at last
+its pitch is prescribed, and the moment that this takes is the price.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.systems.pitch_plane.scene import Scene
+from models.systems.pitch_plane.trust import Curve
+from models.systems.pitch_plane.virtual_measurement import (
+    PAPER,
+    check_road,
+    follower,
+    measure,
+    perturbed,
+    write_measurement,
+)
+
+DRIFT = 0.05
+"""A run has drifted off when its pitch is this far (rad) from the measured one."""
+
+
+class Options(Strict):
+    """[options] of the study of six runs."""
+
+    sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
+    noise_fraction: float = quantity(
+        "", "standard deviation of the noise by the largest force", default=0.002, zero=True
+    )
+    noise_samples: int = Field(5, ge=1, description="number of noise samples")
+    perturbed_models: int = Field(5, ge=0, description="number of random models beside the paper's")
+    seed: int = Field(1, ge=0, lt=2**63, description="seed of noise and models")
+
+
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+    """The scene's options; refuses, before anything is written, one that cannot be followed through all its runs."""
+    options = read(Options, scene.options, scene.file, "options")
+    check_road(scene, engines, options.sampling_rate)
+    return options
+
+
+def followed(scene: Scene, folder: Path) -> tuple[Result, float, dict[str, Scene]]:
+    """The measurement, the noise's deviation (N), and by name the scenes of runs on the files that it leaves."""
+    options, measured = options_of(scene), measure(scene)
+    deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
+    vehicle, follow = scene.vehicle_parameters(), follower(scene, folder)
+    paper = perturbed(vehicle)
+    noises = [
+        {"force_noise": {"deviation": deviation, "seed": 1000 * options.seed + i}} for i in range(options.noise_samples)
+    ]
+    scenes = {"undisturbed": follow({}, {})}
+    scenes |= {f"noisy {i + 1}": follow({}, noise) for i, noise in enumerate(noises)}
+    scenes["perturbed"] = follow(paper, {})
+    for i in range(options.perturbed_models):  # Fig. 7
+        factors = np.random.Generator(np.random.Philox(key=[options.seed, i])).uniform(0.9, 1.1, 5).tolist()
+        scenes[f"model {i + 1}"] = follow(perturbed(vehicle, dict(zip(PAPER, factors, strict=True))), {})
+    scenes["both"] = follow(paper, noises[0])
+    guide = {"prescribed_pitch": {"file": "pitch.csv"}}
+    guided = {"undisturbed": ({}, {}), "noisy": ({}, noises[0]), "perturbed": (paper, {}), "both": (paper, noises[0])}
+    scenes |= {f"guided, {name}": follow(model, noise | guide) for name, (model, noise) in guided.items()}
+    return measured, deviation, scenes
+
+
+def error(measured: Result, run: Result, channel: str) -> np.ndarray:
+    """Difference to the measurement at the run's own times."""
+    return run[channel] - np.interp(run.times, measured.times, measured[channel])
+
+
+def row(engine: str, name: str, measured: Result, run: Result) -> dict[str, Any]:
+    """Drift-off time (s, None if never), heave error, and for a guided run the enforced moment and the inertia term."""
+    figures: dict[str, Any] = {
+        "engine": engine,
+        "run": name,
+        "drift-off": Curve(run.times, np.abs(error(measured, run, "pitch"))).passes(DRIFT),
+        "heave error": float(np.abs(error(measured, run, "z3")).max()),
+    }
+    if "enforced_moment" in run.data:
+        moment = run["enforced_moment"]
+        figures["moment rms"] = float(np.sqrt(np.mean(moment**2)))
+        figures["moment max"] = float(np.abs(moment).max())
+        figures["inertia max"] = float(np.abs(run["inertia_term"]).max())
+    return figures

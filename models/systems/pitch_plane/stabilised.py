@@ -1,0 +1,268 @@
+"""Stabilisers on the same wrong model and noisy forces of a virtual measurement, scored by damage (models/drift/score).
+
+A perturbed model is driven by the measured forces with noise: free, with its pitch prescribed, held by springs,
+high-pass filtered, drawn to the estimate of a Kalman filter; on the road as it is, and on the same road with a grade.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from models.core.errors import InputError, RunFailed
+from models.core.noise import PITCH_SENSOR, normal
+from models.core.result import Result
+from models.core.strict import Strict, quantity, read
+from models.core.time_series import write_time_series
+from models.drift.growth import holding_stiffness, rigid_pitch
+from models.drift.score import (
+    CHANNELS,
+    COARSEST,
+    LEAST,
+    TUMBLED,
+    Limits,
+    blind_verdict,
+    consistent,
+    errors,
+    own_figures,
+    uncertainty,
+    verdict,
+)
+from models.fatigue.damage import SLOPE
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import Scene, assemble, changed
+from models.systems.pitch_plane.trust import trust
+from models.systems.pitch_plane.virtual_measurement import (
+    PAPER,
+    check_road,
+    check_steps,
+    follower,
+    measure,
+    perturbed,
+    stride,
+    write_measurement,
+)
+from models.vehicles.pitch_plane import Parameters
+
+Progress = Callable[[str, float], None]
+Row = dict[str, Any]
+
+DAMPING = 0.7
+"""Damping ratio of springs and high-pass filters."""
+
+
+class Options(Strict):
+    """[options] of the study of stabilisers."""
+
+    sampling_rate: float = quantity("Hz", "rate at which forces and pitch are measured", default=1000.0)
+    noise_fraction: float = quantity("", "standard deviation of the force noise by the largest force", default=0.002)
+    angle_deviation: float = quantity("rad", "white noise on each measured pitch", default=math.radians(0.1))
+    inertia_deviation: float = quantity("", "share by which the filter lets the inertia be wrong", default=0.05)
+    factors: dict[str, float] = Field(PAPER, description="what the model's parameters are multiplied by")
+    seed: int = Field(1, ge=0, lt=2**63, description="seed of force and pitch noise")
+    bandwidth: float = quantity("Hz", "of the prescribed measured pitch", default=15.0)
+    stiffnesses: list[float] = Field([50.0, 100.0, 300.0, 1e4], min_length=1, description="springs, N m/rad")
+    dead_band: float = quantity("rad", "half width of the dead band of the stiffest spring", default=0.05)
+    cut_offs: list[float] = Field([0.1, 0.5], description="high-pass filters, Hz")
+    sweep: list[float] = Field(
+        np.geomspace(30.0, 3e5, 9).tolist(), min_length=1, description="springs of the second figure, N m/rad"
+    )
+    grade: float | None = Field(
+        None, gt=-0.5, lt=0.5, description="slope angle of the second road", json_schema_extra={"unit": "rad"}
+    )
+    slope: float = quantity("", "Woehler exponent", default=SLOPE)
+    limits: Limits = Limits()
+
+
+def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
+    """The scene's options; refuses, before anything is written, one that cannot be followed through all its runs."""
+    options = read(Options, scene.options, scene.file, "options")
+    check_road(scene, engines, options.sampling_rate)
+    check_steps(scene, engines)
+    if scene.run.step > COARSEST or scene.run.duration < LEAST * scene.run.step:
+        length = f"{scene.run.duration:g} s by {scene.run.step:g} s"
+        allowed = f"the score takes {LEAST} steps or more, of {COARSEST:g} s or less"
+        raise InputError(scene.file, "run", length, allowed)
+    for name, factor in options.factors.items():
+        if name not in Parameters.model_fields:
+            allowed = "not a parameter of the vehicle"
+            raise InputError(scene.file, f"options.factors.{name}", factor, allowed, tuple(Parameters.model_fields))
+    for name in ("stiffnesses", "cut_offs", "sweep"):
+        for value in getattr(options, name):
+            if not 0.0 < value < math.inf:
+                raise InputError(scene.file, f"options.{name}", value, "must be above 0 and finite")
+    for on_road in roads(scene, options).values():
+        assemble(on_road)
+    return options
+
+
+def roads(scene: Scene, options: Options) -> dict[str, Scene]:
+    """The scene's own road, and where a grade is asked for, the same road on it."""
+    if options.grade is None:
+        return {"road": scene}
+    road = scene.table()["effects"]["road"]
+    if "grade" in road:
+        allowed = "this study puts the road on options.grade itself: drop this key"
+        raise InputError(scene.file, "effects.road.grade", road["grade"], allowed)
+    return {"road": scene, "grade": changed(scene, effects={"road": {**road, "grade": options.grade}})}
+
+
+def compare(
+    scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
+) -> tuple["list[Bench]", list[Row], dict[str, str]]:
+    """Benches of all roads, a row per method, and why runs failed, by name.
+
+    The first engine runs all methods, the others, on the scene's own road, those that it accepts.
+    """
+    options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
+    benches = [Bench(on_road, road, options, folder) for road, on_road in roads(scene, options).items()]
+    for i, bench in enumerate(benches):
+
+        def told(text: str, part: float, done: int = i) -> None:
+            progress(text, (done + part) / (len(benches) + 1))
+
+        rows += bench.score(engines[0], () if i else engines[1:], failed, told)
+    return benches, rows, failed
+
+
+class Bench:
+    """One road: what was measured on it, and the perturbed model's runs on these files.
+
+    Known before any run: ``trusted``, until when a free one can be trusted (s); ``holding``, which spring holds (N
+    m/rad).
+    """
+
+    def __init__(self, scene: Scene, road: str, options: Options, folder: Path) -> None:
+        self.road, self.options, self.folder = road, options, folder / road
+        self.folder.mkdir()
+        self.truth, period = measure(scene), 1.0 / options.sampling_rate
+        self.deviation = options.noise_fraction * write_measurement(self.truth, self.folder, period)
+        self._write_sensors(stride(scene, options.sampling_rate), period)
+        self.override = perturbed(scene.vehicle_parameters(), options.factors)
+        self.follow = follower(scene, self.folder)
+        self.parameters = self.follow(self.override, {}).vehicle_parameters()
+        self.methods = self._methods()
+        predicted = trust(assemble(self._scene({})), options.limits.pitch_error)
+        assert predicted is not None  # nothing holds a free run
+        self.trusted = scene.run.duration if predicted.until is None else predicted.until[1]
+        self.holding = holding_stiffness(self.parameters, predicted.rate)
+
+    def _write_sensors(self, every: int, period: float) -> None:
+        """Noisy pitch, and exact heave and pitch, as files."""
+        heave, pitch = self.truth["z3"][::every], self.truth["pitch"][::every]
+        noise = normal(self.options.seed, 0, len(pitch), 1, source=PITCH_SENSOR)[:, 0]
+        noisy = {"pitch": ("rad", pitch + self.options.angle_deviation * noise)}
+        write_time_series(self.folder / "measured_pitch.csv", noisy, period)
+        both = {"z3": ("m", heave), "pitch": ("rad", pitch)}
+        write_time_series(self.folder / "heave_and_pitch.csv", both, period)
+
+    @property
+    def resisting(self) -> float:
+        """I + J in kg m^2: what a moment on the pitch has to turn."""
+        return rigid_pitch(self.parameters).total
+
+    def spring(self, stiffness: float) -> dict[str, float]:
+        """Settings of a spring to the ground with its damper."""
+        return {"stiffness": stiffness, "damping": 2.0 * DAMPING * math.sqrt(stiffness * self.resisting)}
+
+    def _methods(self) -> dict[str, dict[str, Any]]:
+        """Name -> effects beside forces and noise."""
+        own, noisy = self.options, "measured_pitch.csv"
+        sure = {"file": noisy, "pitch_deviation": own.angle_deviation, "force_deviation": self.deviation}
+        filtered = {**sure, "inertia_deviation": own.inertia_deviation}
+        smoothed = {"file": noisy, "bandwidth": own.bandwidth}
+        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring(k)} for k in own.stiffnesses}
+        stiffest = max(own.stiffnesses)
+        banded = {"pitch_spring": {**self.spring(stiffest), "dead_band": own.dead_band}}
+        passes = {f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING}} for f in own.cut_offs}
+        return {
+            "free": {},
+            "exact pitch prescribed": {"prescribed_pitch": {"file": "pitch.csv"}},
+            "exact heave and pitch": {"prescribed_heave_and_pitch": {"file": "heave_and_pitch.csv"}},
+            f"measured pitch to {own.bandwidth:g} Hz": {"prescribed_pitch": smoothed},
+            **springs,
+            f"{stiffest:g} beyond {own.dead_band:g} rad": banded,
+            **passes,
+            "Kalman, sure of the model": {"kalman_filter": sure},
+            "Kalman filter": {"kalman_filter": filtered},
+            "Kalman smoother": {"kalman_filter": {**filtered, "smoother": True}},
+        }
+
+    def score(self, engine: str, others: tuple[str, ...], failed: dict[str, str], progress: Progress) -> list[Row]:
+        """A row per method in one engine, and in the others if it is accepted; ``failed`` takes runs that fail."""
+        rows: list[Row] = []
+        self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
+        for i, (name, effects) in enumerate(self.methods.items()):
+            progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
+            own = self._scored(engine, name, effects, failed)
+            rows += own
+            if own and (name == "free" or own[0]["verdict"] == "accepted"):
+                rows += [row for other in others for row in self._scored(other, name, effects, failed)]
+        return rows
+
+    def _scored(self, engine: str, name: str, effects: dict[str, Any], failed: dict[str, str]) -> list[Row]:
+        """One row, or none for a run that fails."""
+        start = time.perf_counter()
+        try:
+            found = self.simulate(engine, effects)
+        except RunFailed as error:
+            failed[f"{engine}, {self.road}, {name}"] = str(error)
+            return []
+        seconds = time.perf_counter() - start
+        return [{"engine": engine, "road": self.road, **self.row(name, effects, found), "seconds": seconds}]
+
+    def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
+        """A run of the perturbed model under noisy forces."""
+        return run(self._scene(effects), engine)
+
+    def _scene(self, effects: dict[str, Any]) -> Scene:
+        noise = {"force_noise": {"deviation": self.deviation, "seed": self.options.seed}}
+        return self.follow(self.override, noise | effects)
+
+    def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
+        """Figures and verdicts; a tumbled run has no damage that could mislead."""
+        limits = self.options.limits
+        own, wrong = own_figures(result, self.parameters), errors(result, self.truth, self.options.slope)
+        with_truth = verdict(own, wrong, effects, limits)
+        alone = blind_verdict(
+            own, effects, float(result.times[-1]), limits, self.trusted, consistent(result), uncertainty(result)
+        )
+        loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
+        loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
+        return {
+            "method": name,
+            **(dict.fromkeys(loads) if own.pitch_max > TUMBLED else loads),
+            **{f"vertical damage {name}": ratio for name, ratio in wrong.vertical_damage.items()},
+            "pitch error max [rad]": wrong.pitch_max,
+            "pitch error rms [rad]": wrong.pitch_rms,
+            "heave error max [m]": wrong.heave_max,
+            "moment rms [N m]": own.moment_rms,
+            "moment max [N m]": own.moment_max,
+            "moment share": own.moment_share,
+            "moment share to 15 Hz": own.moment_share_band,
+            "force share to 15 Hz": own.force_share_band,
+            "force calls": own.force_calls,
+            "steps": own.steps,
+            "verdict": with_truth.word,
+            "reason": with_truth.reason,
+            "without truth": alone.word,
+            "reason without truth": alone.reason,
+        }
+
+    def sweep(self) -> np.ndarray:
+        """(n, 4): stiffness, largest pitch error of the spring, of the high-pass, worst damage ratio of the spring."""
+        rows = []
+        for stiffness in self.options.sweep:
+            cut_off = math.sqrt(stiffness / self.resisting) / (2.0 * math.pi)
+            high_pass = {"high_pass": {"cut_off": cut_off, "damping_ratio": DAMPING}}
+            sprung, passed = (
+                errors(self.simulate("reference", effects), self.truth, self.options.slope)
+                for effects in ({"pitch_spring": self.spring(stiffness)}, high_pass)
+            )
+            worst = max(sprung.damage.values(), key=lambda ratio: abs(math.log(ratio)))
+            rows.append((stiffness, sprung.pitch_max, passed.pitch_max, worst))
+        return np.array(rows)

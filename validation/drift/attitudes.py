@@ -1,0 +1,50 @@
+"""Attitudes of bodies that turn, measured by a noisy gyro: what cases of the inertial unit share."""
+
+import math
+
+import numpy as np
+
+from models.sensors.inertial_unit import error_rotation, measured_attitude, true_attitude
+from models.sensors.rotations import conjugate, exponential, logarithm, matrix, product
+
+SEED = 30
+CHUNK = 500
+"""Paths that stand side by side in memory."""
+START = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def turning(count: int, period: float) -> np.ndarray:
+    """Local rates (count, 3) in rad/s of a body that turns about all axes by one or two radians in two seconds."""
+    t = period * np.arange(count)
+    return np.column_stack([0.5 + 0.4 * np.sin(2.1 * t), 0.2 - 0.3 * np.cos(1.7 * t), 0.8 + 0.2 * np.cos(1.3 * t)])
+
+
+def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Local rates (n, 3) and attitude (n, 4) of S = Rz(W t) Rx(c) Rz(-W t), W = 2 rad/s, c = 0.3: W (S^T e_z - e_z)."""
+    spin, half = 2.0, 0.3
+    about = exponential(spin * t[:, None] * np.array([0.0, 0.0, 1.0]))
+    tilt = exponential(np.array([half, 0.0, 0.0]))
+    rates = spin * np.column_stack(
+        [-math.sin(half) * np.sin(spin * t), math.sin(half) * np.cos(spin * t), np.full_like(t, math.cos(half) - 1)]
+    )
+    return rates, product(product(about, tilt), conjugate(about))
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest angle (rad) between attitudes (..., 4)."""
+    return float(np.abs(logarithm(product(conjugate(one), other))).max())
+
+
+def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
+    """Error rotations (paths, 4) at the end of noisy paths on one true motion."""
+    true = true_attitude(rates, period, START)[-1]
+    chunks = [range(first, min(first + CHUNK, paths)) for first in range(0, paths, CHUNK)]
+    ends = [measured_attitude(rates, period, deviation, START, chunk, SEED)[-1] for chunk in chunks]
+    return error_rotation(np.concatenate(ends), true)
+
+
+def standard_errors(found: np.ndarray, law: np.ndarray) -> float:
+    """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
+    samples = matrix(found)
+    error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
+    return float((np.abs(samples.mean(axis=0) - law) / error).max())
