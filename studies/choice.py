@@ -14,7 +14,7 @@ from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
 from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from studies.asked import ANY, load_scene, plan_of
+from studies.command.asked import ANY, load_scene, plan_of
 
 SYSTEM = ANY
 Progress = Callable[[str, float], None]

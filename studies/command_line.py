@@ -18,7 +18,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding, lines, queries
 from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
-from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
     add_completion=False,
@@ -139,8 +139,8 @@ def _search(scene: Any) -> list[str]:
     return [] if scene.tolerance is None else [search(scene)]
 
 
-@app.command()
-def run(
+@app.command("run")
+def run_scene(
     scene: SceneName,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
     out: Out = None,
@@ -178,8 +178,8 @@ def _queried(scene: Any) -> Iterator[None]:
 
 def _conformity(engine: str, more: bool, out: Path | None) -> None:
     """Put an engine from outside the tree through the suite."""
+    from models.core.result_folders import new_folder
     from models.engines.outside import register
-    from studies.folders import new_folder
     from validation.conformity import conformity
 
     if more:
@@ -199,7 +199,7 @@ def _sweep(
     as_json: bool,
 ) -> None:
     """Run a scene at every value of a key."""
-    from studies import sweep
+    from studies.command import sweep
 
     key, values = sweep.asked(text)
     job = sweep.Points(scene, tuple(changes or ()), key, values, engine, Path())
@@ -238,8 +238,8 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Compare two results quantity by quantity: largest and rms difference, and where."""
-    from studies.comparison import compare as differences
-    from studies.comparison import report
+    from studies.command.comparison import compare as differences
+    from studies.command.comparison import report
 
     differences(one, two)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
@@ -281,7 +281,7 @@ def _finish(
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
     """
-    from studies.folders import COMMAND, drop_if_empty
+    from models.core.result_folders import COMMAND, drop_if_empty
 
     try:
         with _progress(as_json) as progress:
@@ -304,7 +304,7 @@ def _finish(
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
     """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
-    from studies.folders import new_folder, resumed_folder
+    from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:
         return new_folder(out, name)

@@ -17,7 +17,7 @@ from models.advice.price.effects_text import as_dict, lines
 from models.core.errors import InputError
 from models.core.systems import SYSTEMS
 from studies import choice as study
-from studies.asked import ready
+from studies.command.asked import ready
 from validation.choice.drawn_scenes import drawn
 
 ROAD = {"source": "study", "speed": 20.0}

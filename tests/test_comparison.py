@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.systems.pitch_plane.run import run as simulate
-from studies.comparison import compare
+from studies.command.comparison import compare
 from validation.common.scenes import road_scene
 
 

@@ -19,7 +19,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import settings_of
 from models.systems.pitch_plane.tangent import Path, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from studies.trust import run as run_study
 from validation.common.scenes import VEHICLES, force_scene, road_scene, write_forces
 

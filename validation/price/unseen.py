@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer
-from models.advice.price.pitch_plane import OwnPitchPlane, own
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, recommend
 from models.advice.price.search import Tried
+from models.advice.price.systems.pitch_plane import OwnPitchPlane, own
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
 from models.engines.protocol import Settings

@@ -13,8 +13,7 @@ import numpy as np
 from models.advice.price import Answer, Ladder
 from models.advice.price.meshed import Meshed
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import SYSTEMS as PRICED
-from models.advice.price.recommendation import Recommendation, recommend
+from models.advice.price.recommendation import Recommendation, priced, recommend
 from models.advice.price.truth import Truth
 from models.core.systems import SYSTEMS
 from validation.price.unseen import Drawn, Verdict, slower
@@ -98,7 +97,7 @@ def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
 def judge(one: Drawn) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene."""
     system = one.scene.system
-    scene = import_module(PRICED[system]).own(one.scene, one.quantity, ENGINES[system])
+    scene: Any = priced(one.scene, one.quantity, ENGINES[system])
     found = recommend(scene, one.tolerance)
     errors = {
         setting: _error(scene, found, setting)

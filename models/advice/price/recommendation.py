@@ -19,25 +19,9 @@ from models.advice.price.problem import Setting
 from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
+from models.core.systems import SYSTEMS, modules_of
 from models.machine.timing import interleave, paired_ratio
 
-SYSTEMS = {
-    system: f"models.advice.price.{module}"
-    for system, module in (
-        ("pitch-plane", "pitch_plane"),
-        ("wheelset", "wheelset"),
-        ("handling", "handling"),
-        ("braking", "braking"),
-    )
-}
-"""Systems whose scenes have a price, and the modules that know them."""
-WITHOUT = {
-    "ride": "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`",
-    "hub-forces": 'takes whole parts of its samples for steps, the longest of which a choice, study = "choice", finds',
-    "contact": "has cells in place of steps, which the study contact_price prices",
-    "measured": "takes the samples of its files for steps",
-}
-"""Why others have none, and what there is instead."""
 NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
 FAR = 8.0
@@ -100,12 +84,20 @@ def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str
     """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
-    if scene.system not in SYSTEMS:
-        why = WITHOUT.get(scene.system, "has no steps to choose")
-        raise InputError(
-            scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(SYSTEMS)
-        )
-    return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
+    return recommend(priced(scene, quantity, engines), tolerance)
+
+
+def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnScene:
+    """A scene as its system's file gives it to the search; InputError where there is none."""
+    files = modules_of("models.advice.price.systems")
+    if scene.system in files:
+        own: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
+        return own
+    package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
+    why = getattr(package, "NO_PRICE", "has no steps to choose")
+    raise InputError(
+        scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(files)
+    )
 
 
 def recommend(scene: OwnScene, tolerance: float) -> Recommendation:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
-from models.advice.price.pitch_plane import engine_settings
 from models.advice.price.problem import Setting
+from models.advice.price.systems.pitch_plane import engine_settings
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import Model, Settings, Trajectory, build

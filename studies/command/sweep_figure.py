@@ -8,7 +8,7 @@ import numpy as np
 from models.drawing.figures import COLOURS, LABELS, plt, save
 
 if TYPE_CHECKING:
-    from studies.sweep import Points
+    from studies.command.sweep import Points
 
 ACROSS, DOWN, PAGES = 3, 4, 4
 """Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""

@@ -28,8 +28,8 @@ from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.store import Arrays, code, locked
 from models.ensemble.workers import processes
-from studies.asked import engines_of, load_scene, ready, scene_path
-from studies.summary_numbers import numbers
+from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
+from studies.command.summary_numbers import numbers
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -94,7 +94,7 @@ class Points:
             "engine": self.engine,
             "scene": table,
             "files": named_files([table, self.values, self.engine], path.parent),
-            "code of studies": code(Path(__file__).parent),
+            "code of studies": code(STUDIES),
         }
 
 
@@ -176,7 +176,7 @@ def _writable(value: Any) -> bool:
 
 def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
     """All points that are not finished yet, then table and figures."""
-    from studies.sweep_figure import draw
+    from studies.command.sweep_figure import draw
 
     with locked(job.folder):
         for part in (job.folder / RUNS).glob(".*.part"):
