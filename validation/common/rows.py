@@ -47,6 +47,14 @@ class Row:
         return asdict(self)
 
 
+Saved = dict[str, Any]
+"""What a case saves beside its rows, as JSON keeps it."""
+Judged = tuple[list[Row], Saved]
+"""What a case answers when it is measured."""
+Drawn = list[tuple[str, Any]]
+"""Captions and figures that a case shows."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of the report: a title, a sentence on how to read it, headings and rows of text."""
