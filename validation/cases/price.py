@@ -25,8 +25,6 @@ from validation.price.problems import (
     force_excited,
     free_vehicle,
     inertial_unit,
-    noisy_forces,
-    prescribed_pitch,
     road_excited,
     wheelset,
 )
@@ -44,8 +42,8 @@ PROBLEMS: tuple[Make, ...] = (
     inertial_unit.problem,
 )
 FULL_ONLY: tuple[Make, ...] = (
-    noisy_forces.problem,
-    prescribed_pitch.problem,
+    force_excited.noisy,
+    force_excited.guided,
     free_vehicle.problem,
     partial(wheelset.problem, speed=5.0),
     partial(wheelset.problem, speed=1.0),
