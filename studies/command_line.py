@@ -262,7 +262,7 @@ def validate(
     if engine is not None:
         return _conformity(engine, quick or against is not None or resume is not None, out)
     from validation.common.changes import read
-    from validation.common.kept_cases import KEPT
+    from validation.run import KEPT
     from validation.run import validate as run_all
 
     earlier = None if against is None else read(against)
