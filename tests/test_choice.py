@@ -174,7 +174,7 @@ def test_a_part_of_a_run_has_a_length_that_the_scene_may_have():
 
 
 def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.choice_figure.choice_figure", lambda found, path: None)
+    monkeypatch.setattr("studies.choice.choice_figure", lambda found, path: None)
     scene = hub_forces(run={"duration": 0.04, "step": 1e-3})
     ready(scene, ("exudyn", "mujoco"))
     (found,) = study.run(scene, ("exudyn", "mujoco"), tmp_path, lambda said, share: None)["answer"]
