@@ -15,9 +15,8 @@ from models.advice.choice.variants import Variants
 from models.advice.price.effects import price_list
 from models.advice.price.effects_text import as_dict, lines
 from models.core.errors import InputError
-from models.core.systems import SYSTEMS
 from studies import choice as study
-from studies.command.asked import ready
+from studies.command.asked import KNOWN, ready
 from validation.choice.drawn_scenes import drawn
 
 ROAD = {"source": "study", "speed": 20.0}
@@ -259,7 +258,7 @@ def test_unknown_quantities_and_systems_without_runs_are_refused():
         Chooser(scene, "reference", scene.quantities, scene.tolerance)
     with pytest.raises(InputError, match="pictures"):
         Variants(type("Other", (), {"system": "pictures", "file": "t"}), "reference")
-    assert "pictures" in SYSTEMS
+    assert "pictures" in KNOWN
 
 
 def test_prices_name_costs_and_changes_and_why_there_is_none():

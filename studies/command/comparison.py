@@ -132,7 +132,7 @@ def _pairs(one: Path, two: Path) -> tuple[list[tuple[str, Path, Path]], list[str
     first, second = _files(one), _files(two)
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
-        return [("", *first.values(), *second.values())], []
+        return [("", next(iter(first.values())), next(iter(second.values())))], []
     if not common:
         raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
     return [(name, first[name], second[name]) for name in common], _alone("", (one, first), (two, second))

@@ -84,7 +84,7 @@ def _beside(quick: bool) -> Judged:
     road = assemble(road_excited.scene())
     rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
     rounds, least, duration = 2 * ROUNDS[quick], 2 * LEAST[quick], road_excited.DURATION
-    data = {
+    data: Saved = {
         "ride": found,
         "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, rounds, least) for name in ("RK4", "Euler")},

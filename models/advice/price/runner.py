@@ -228,8 +228,8 @@ class Measured:
 
 def measured(problem: Problem, points: Iterable[Point]) -> Measured:
     """A problem with its points."""
-    *told, _ = fields(Measured)
-    return Measured(*(getattr(problem, each.name) for each in told), list(points))
+    told = {each.name: getattr(problem, each.name) for each in fields(Measured) if each.name != "points"}
+    return Measured(**told, points=list(points))
 
 
 def of_saved(saved: dict[str, Any]) -> Measured:

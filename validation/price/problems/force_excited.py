@@ -129,7 +129,7 @@ class NoisyForces(ForceExcited):
 
     key = "noise"
     note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
-    tolerances = (100.0, 10.0, 1.0, 0.1, 0.01)
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
     what = "driven by noisy wheel forces"
     first = (("suspension force", "N"),)
 
@@ -156,7 +156,7 @@ class PrescribedPitch(ForceExcited):
 
     key, full, quick = "pitch", GUIDED, GUIDED
     note = "The moment of Exudyn is a multiplier, that of the others follows from the reduced model."
-    tolerances = (100.0, 10.0, 1.0, 0.1, 0.01)
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
     what = "driven by its wheel forces, pitch prescribed"
     first = (("enforced moment", "N m"),)
 
