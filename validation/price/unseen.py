@@ -237,7 +237,7 @@ def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
 def _defaults(found: Recommendation) -> list[Tried]:
     """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
     was searched: what is recommended may have forgotten one."""
-    if found.scene.whole > found.scene.first * (1 + 1e-9):
+    if not found.whole:
         return [
             one.refined.tried for one in found.defaults.values() if one.refined is not None and not one.extrapolated
         ]
