@@ -151,7 +151,12 @@ def run_scene(
 ) -> None:
     """Run a scene and save its results and figures."""
     if sweep is not None:
-        return _sweep(sweep, scene, engine, changes, out, resume, as_json)
+        from studies.command.sweep import RECORDS, points
+        from studies.command.sweep import run as run_points
+
+        job = points(sweep, scene, changes or (), engine)
+        folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
+        return _finish(lambda progress: run_points(replace(job, folder=folder), progress), folder, as_json)
     loaded = load_scene(scene, changes)
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
@@ -187,25 +192,6 @@ def _conformity(engine: str, more: bool, out: Path | None) -> None:
     register(engine)
     folder = new_folder(out, "conformity")
     sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
-
-
-def _sweep(
-    text: str,
-    scene: str,
-    engine: str | None,
-    changes: list[str] | None,
-    out: Path | None,
-    resume: Path | None,
-    as_json: bool,
-) -> None:
-    """Run a scene at every value of a key."""
-    from studies.command import sweep
-
-    key, values = sweep.asked(text)
-    job = sweep.Points(scene, tuple(changes or ()), key, values, engine, Path())
-    job.check()
-    folder = _folder(f"{Path(scene).stem}-sweep", sweep.RECORDS, "", out, resume)
-    _finish(lambda progress: sweep.run(replace(job, folder=folder), progress), folder, as_json)
 
 
 @app.command()

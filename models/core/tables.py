@@ -30,7 +30,6 @@ METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 DISTANCES = {"m": 1.0, "km": 1e3}
 SECONDS = {"s": 1.0, "ms": 1e-3}
 NEWTONS = {"N": 1.0, "kN": 1e3}
-PASCALS = {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9}
 PER_METRE = {"1/m": 1.0, "rad/m": 1.0, "1/mm": 1e3, "rad/mm": 1e3}
 SHARES = {"-": 1.0, "%": 1e-2}
 RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}

@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import tomllib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,6 +149,14 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
     if len(set(map(_written, values))) < len(values):
         raise InputError("--sweep", key, rest, "gives a value twice")
     return key, values
+
+
+def points(text: str, scene: str, changes: Sequence[str], engine: str | None) -> Points:
+    """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
+    key, values = asked(text)
+    job = Points(scene, tuple(changes), key, values, engine, Path())
+    job.check()
+    return job
 
 
 def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:

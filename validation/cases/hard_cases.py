@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from validation.common.rows import Judged, Row, Saved, System, Table, at_most, behaves, within
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, within
 from validation.hard_cases import cases_by_family
 from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, Outcome, judge
 from validation.hard_cases.catalogue import COVERED, beyond
@@ -22,7 +22,7 @@ FILES = ("measured_files",)
 EVERY = 24
 
 
-def measure(quick: bool, folder: Path) -> Judged:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in some(known) if quick else known:

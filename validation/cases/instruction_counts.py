@@ -19,7 +19,7 @@ import numpy as np
 from models.drawing.figures import LABELS
 from models.engines.stability import linearised
 from models.systems.pitch_plane.assembly import assemble
-from validation.common.rows import Judged, Saved, System, Table, at_most, not_run
+from validation.common.rows import CaseAnswer, Saved, System, Table, at_most, not_run
 from validation.common.scenes import road_scene
 from validation.price import instructions_run
 from validation.price.tables import named
@@ -48,7 +48,7 @@ PATIENCE = 900
 ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
 
 
-def measure(quick: bool, folder: Path) -> Judged:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Counts of every method in two processes under valgrind, in full alone: they have no quick share."""
     if quick:
         return [], {"instructions": {}}

@@ -15,7 +15,7 @@ from models.advice.price.problem import Problem, Setting
 from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
 from models.systems.pitch_plane.assembly import assemble
-from validation.common.rows import Drawn, Judged, Row, Saved, System, Table, aim, at_most, behaves, not_run, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, not_run, within
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
@@ -70,7 +70,7 @@ ALIKE = {
 ON_SECONDS = "a target about seconds, which are reported and never gated"
 
 
-def measure(quick: bool, folder: Path) -> Judged:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
@@ -79,7 +79,7 @@ def measure(quick: bool, folder: Path) -> Judged:
     return rows + _road_rows(found[0][1]) + beside, {"problems": [saved for _, saved in found], **data}
 
 
-def _beside(quick: bool) -> Judged:
+def _beside(quick: bool) -> CaseAnswer:
     """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
     road = assemble(road_excited.scene())
     rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
@@ -94,14 +94,14 @@ def _beside(quick: bool) -> Judged:
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, make: Make) -> Judged:
+def _priced(quick: bool, make: Make) -> CaseAnswer:
     """One problem: its rows, and what is saved of it."""
     problem = make(quick)
     measured = runner.measure(problem, quick, ROUNDS[quick], LEAST[quick])
     return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _shared() -> tuple[list[Judged], Judged]:
+def _shared() -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems, and what is beside them, by as many processes as there are processors, two at most; the first of
     the problems last, but for the road, which is long."""
     with processes(min(2, os.cpu_count() or 1)) as pool:

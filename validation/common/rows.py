@@ -49,7 +49,7 @@ class Row:
 
 Saved = dict[str, Any]
 """What a case saves beside its rows, as JSON keeps it."""
-Judged = tuple[list[Row], Saved]
+CaseAnswer = tuple[list[Row], Saved]
 """What a case answers when it is measured."""
 Drawn = list[tuple[str, Any]]
 """Captions and figures that a case shows."""
