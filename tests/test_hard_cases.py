@@ -34,7 +34,13 @@ from validation.hard_cases import (
 from validation.hard_cases.case import IMPLEMENTATIONS, Case, judge
 
 ALL = tuple(case for _, case in cases_by_family())
-JUDGED = [pytest.param(case, name, id=f"{case.name}-{name}") for case in ALL for name in case.judged()]
+QUICK = {case.name for _, case in hard_cases.some(cases_by_family())}
+JUDGED = [
+    pytest.param(case, name, id=f"{case.name}-{name}", marks=[] if case.name in QUICK else [pytest.mark.full])
+    for case in ALL
+    for name in case.judged()
+]
+"""All of them are a case of the report: the quick share of that is judged in every run of the tests."""
 
 
 @pytest.mark.parametrize(("case", "implementation"), JUDGED)
