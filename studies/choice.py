@@ -14,9 +14,16 @@ from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
 from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
 from models.core.strict import Strict, read
-from studies.asked import ANY, load_scene, plan_of
+from studies.command.asked import ANY, load_scene, plan_of
 
 SYSTEM = ANY
+ACTIVE, IDLE = 0.1, 1e-3
+"""Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
+LOWEST, HIGHEST = 1e-3, 1e3
+"""Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
+ELEMENTS = 8
+"""Elements whose activity is drawn, the most active first."""
+LEFT, STAYS = "#009e73", "#d55e00"
 Progress = Callable[[str, float], None]
 
 
@@ -48,6 +55,11 @@ class Found:
     further: dict[str, float]
     watts: dict[str, float]
 
+    @property
+    def stay(self) -> list[str]:
+        """Effects that were not left out."""
+        return [name for name in self.choice.candidates if name not in self.choice.left_out]
+
 
 def check(scene: Any, engines: tuple[str, ...]) -> None:
     """Refuse scenes without runs in time, and scenes beside that make no choice."""
@@ -67,8 +79,6 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
 
 def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choices of scenes, the first by one of these engines, saved and drawn."""
-    from studies.choice_figure import choice_figure
-
     scene, found = scenes[0], list[Found]()
     for i, own in enumerate(scenes):
         progress(own.title, i / len(scenes))
@@ -171,20 +181,15 @@ def _linear(scene: Any) -> Found:
 def _answer(one: Found) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
     choice = one.choice
-    errors = zip(
-        one.scene.quantities,
-        *(part.tolist() for part in (choice.predicted, choice.confirmed, choice.chance)),
-        strict=True,
-    )
     return {
         "system": one.scene.system,
         "implementation": one.engine,
         "left out": list(choice.left_out),
-        "stay": [name for name in choice.candidates if name not in choice.left_out],
+        "stay": one.stay,
         "step times": choice.times,
         "errors": {
-            name: {"predicted": predicted, "confirmed": found, "chance": chance}
-            for name, predicted, found, chance in errors
+            name: {part: float(getattr(choice, part)[i]) for part in ("predicted", "confirmed", "chance")}
+            for i, name in enumerate(one.scene.quantities)
         },
         "kept": choice.kept,
         "calls": list(choice.calls),
@@ -224,10 +229,11 @@ def _stays(change: float, one: Found) -> str:
 def lines(one: Found, named: bool) -> list[str]:
     """The choice in words."""
     choice, scene = one.choice, one.scene
-    rows = [f"  {scene.title} ({scene.system}, {one.engine})"] if named else [f"  by {one.engine}"]
-    rows.append(f"    left out: {', '.join(choice.left_out) or 'nothing'}")
-    stay = [name for name in choice.candidates if name not in choice.left_out]
-    rows.append(f"    stay: {', '.join(stay) or 'nothing'}")
+    rows = [
+        f"  {scene.title} ({scene.system}, {one.engine})" if named else f"  by {one.engine}",
+        f"    left out: {', '.join(choice.left_out) or 'nothing'}",
+        f"    stay: {', '.join(one.stay) or 'nothing'}",
+    ]
     for i, name in enumerate(scene.quantities):
         kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
         rows.append(
@@ -257,10 +263,6 @@ def lines(one: Found, named: bool) -> list[str]:
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
 
 
-ACTIVE, IDLE = 0.1, 1e-3
-"""Share of the energy activity from which an element counts as active; change below which a quantity is blind to it."""
-
-
 def misled(one: Found) -> list[str]:
     """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
     total, rows = sum(value for value in one.watts.values() if np.isfinite(value)), []
@@ -273,6 +275,73 @@ def misled(one: Found) -> list[str]:
                     f"it {name} changes by {percent(change)}"
                 )
     return rows
+
+
+def choice_figure(found: list[Found], path: Path) -> None:
+    """A panel per scene; one more for the activity of those that have it."""
+    from models.drawing.figures import plt, save
+
+    panels = [(one, False) for one in found] + [(one, True) for one in found if one.watts]
+    columns = min(2, len(panels))
+    rows = -(-len(panels) // columns)
+    longest = max(max(len(one.alone) for one in found), 4)
+    figure, axes = plt.subplots(rows, columns, figsize=(6.2 * columns, rows * (1.5 + 0.21 * longest)), squeeze=False)
+    for axis, (one, active) in zip(axes.flat, panels, strict=False):
+        _activity(axis, one) if active else _changes(axis, one)
+    for axis in axes.flat[len(panels) :]:
+        axis.set_visible(False)
+    gap = " " if columns > 1 else "\n"
+    figure.suptitle(
+        f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
+    save(figure, path)
+
+
+def _changes(axis: Any, one: Found) -> None:
+    """Changes of every quantity by leaving out each effect alone; the row's colour tells whether it went."""
+    shown = sorted(one.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
+    y = np.arange(len(shown))
+    for i, name in enumerate(one.scene.quantities):
+        values = np.array([effect.changes[i] for effect in shown])
+        axis.plot(
+            np.clip(np.nan_to_num(100 * values, posinf=HIGHEST), LOWEST, HIGHEST),
+            y,
+            "os^Dv"[i % 5],
+            color=f"C{i}",
+            ms=5,
+            label=name.partition(" [")[0],
+        )
+    axis.axvline(100 * one.scene.tolerance, color="#222222", ls="--", lw=1, label="tolerance")
+    axis.set(
+        xscale="log",
+        xlim=(LOWEST / 1.5, HIGHEST * 1.5),
+        yticks=y,
+        yticklabels=[effect.effect.replace("_", " ") for effect in shown],
+        xlabel="change [%] (at the ends: beyond)",
+    )
+    for label, effect in zip(axis.get_yticklabels(), shown, strict=True):
+        label.set_color(LEFT if effect.effect in one.choice.left_out else STAYS)
+    before, _, after = one.choice.calls
+    axis.set_title(
+        f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %\n"
+        "green: left out; orange: stays, as it matters or costs nothing",
+        fontsize=9.5,
+    )
+    axis.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _activity(axis: Any, one: Found) -> None:
+    finite = {name: value for name, value in one.watts.items() if np.isfinite(value)}
+    total = sum(finite.values())
+    shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
+    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
+    axis.set(
+        title=f"{one.scene.system}: energy activity,\nwhich knows neither the question nor pairs",
+        xlabel="share of the mean power [%]",
+    )
 
 
 if __name__ == "__main__":

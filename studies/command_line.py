@@ -18,7 +18,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding, lines, queries
 from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
-from studies.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
     add_completion=False,
@@ -139,8 +139,8 @@ def _search(scene: Any) -> list[str]:
     return [] if scene.tolerance is None else [search(scene)]
 
 
-@app.command()
-def run(
+@app.command("run")
+def run_scene(
     scene: SceneName,
     engine: Annotated[str | None, typer.Option(help="exudyn, mujoco, reference or all (which is the default)")] = None,
     out: Out = None,
@@ -151,7 +151,12 @@ def run(
 ) -> None:
     """Run a scene and save its results and figures."""
     if sweep is not None:
-        return _sweep(sweep, scene, engine, changes, out, resume, as_json)
+        from studies.command.sweep import RECORDS, points
+        from studies.command.sweep import run as run_points
+
+        job = points(sweep, scene, changes or (), engine)
+        folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
+        return _finish(lambda progress: run_points(replace(job, folder=folder), progress), folder, as_json)
     loaded = load_scene(scene, changes)
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
@@ -178,8 +183,8 @@ def _queried(scene: Any) -> Iterator[None]:
 
 def _conformity(engine: str, more: bool, out: Path | None) -> None:
     """Put an engine from outside the tree through the suite."""
+    from models.core.result_folders import new_folder
     from models.engines.outside import register
-    from studies.folders import new_folder
     from validation.conformity import conformity
 
     if more:
@@ -187,25 +192,6 @@ def _conformity(engine: str, more: bool, out: Path | None) -> None:
     register(engine)
     folder = new_folder(out, "conformity")
     sys.exit(1 if conformity(engine, folder, " ".join(["twinrig", *sys.argv[1:]])) else 0)
-
-
-def _sweep(
-    text: str,
-    scene: str,
-    engine: str | None,
-    changes: list[str] | None,
-    out: Path | None,
-    resume: Path | None,
-    as_json: bool,
-) -> None:
-    """Run a scene at every value of a key."""
-    from studies import sweep
-
-    key, values = sweep.asked(text)
-    job = sweep.Points(scene, tuple(changes or ()), key, values, engine, Path())
-    job.check()
-    folder = _folder(f"{Path(scene).stem}-sweep", sweep.RECORDS, "", out, resume)
-    _finish(lambda progress: sweep.run(replace(job, folder=folder), progress), folder, as_json)
 
 
 @app.command()
@@ -238,8 +224,8 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Compare two results quantity by quantity: largest and rms difference, and where."""
-    from studies.comparison import compare as differences
-    from studies.comparison import report
+    from studies.command.comparison import compare as differences
+    from studies.command.comparison import report
 
     differences(one, two)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
@@ -262,7 +248,7 @@ def validate(
     if engine is not None:
         return _conformity(engine, quick or against is not None or resume is not None, out)
     from validation.common.changes import read
-    from validation.common.kept_cases import KEPT
+    from validation.run import KEPT
     from validation.run import validate as run_all
 
     earlier = None if against is None else read(against)
@@ -281,7 +267,7 @@ def _finish(
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
     """
-    from studies.folders import COMMAND, drop_if_empty
+    from models.core.result_folders import COMMAND, drop_if_empty
 
     try:
         with _progress(as_json) as progress:
@@ -304,7 +290,7 @@ def _finish(
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:
     """Where the results go: a new folder, or that of a killed run which keeps finished work in ``blocks``."""
-    from studies.folders import new_folder, resumed_folder
+    from models.core.result_folders import new_folder, resumed_folder
 
     if resume is None:
         return new_folder(out, name)

@@ -21,7 +21,7 @@ from models.core.systems import DEFAULT, SYSTEMS, load
 from models.systems.braking.effects import TABLE
 from models.systems.braking.scene import build
 from models.systems.pitch_plane.scene import build as build_half_car
-from studies.asked import SCENES, plan_of
+from studies.command.asked import SCENES, plan_of
 from validation.absence import of_systems
 from validation.absence.of_systems import FILES, added, bare, controlled, declared, file_of, seen
 

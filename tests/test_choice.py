@@ -15,9 +15,8 @@ from models.advice.choice.variants import Variants
 from models.advice.price.effects import price_list
 from models.advice.price.effects_text import as_dict, lines
 from models.core.errors import InputError
-from models.core.systems import SYSTEMS
 from studies import choice as study
-from studies.asked import ready
+from studies.command.asked import KNOWN, ready
 from validation.choice.drawn_scenes import drawn
 
 ROAD = {"source": "study", "speed": 20.0}
@@ -174,7 +173,7 @@ def test_a_part_of_a_run_has_a_length_that_the_scene_may_have():
 
 
 def test_the_study_chooses_where_a_plan_must_know_the_engine(tmp_path, monkeypatch):
-    monkeypatch.setattr("studies.choice_figure.choice_figure", lambda found, path: None)
+    monkeypatch.setattr("studies.choice.choice_figure", lambda found, path: None)
     scene = hub_forces(run={"duration": 0.04, "step": 1e-3})
     ready(scene, ("exudyn", "mujoco"))
     (found,) = study.run(scene, ("exudyn", "mujoco"), tmp_path, lambda said, share: None)["answer"]
@@ -259,7 +258,7 @@ def test_unknown_quantities_and_systems_without_runs_are_refused():
         Chooser(scene, "reference", scene.quantities, scene.tolerance)
     with pytest.raises(InputError, match="pictures"):
         Variants(type("Other", (), {"system": "pictures", "file": "t"}), "reference")
-    assert "pictures" in SYSTEMS
+    assert "pictures" in KNOWN
 
 
 def test_prices_name_costs_and_changes_and_why_there_is_none():

@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.systems.pitch_plane.run import run as simulate
-from studies.comparison import compare
+from studies.command.comparison import compare
 from validation.common.scenes import road_scene
 
 
@@ -100,6 +100,20 @@ def test_channels_over_more_than_time_are_compared_by_what_their_places_are_call
     assert len(found) == 1 and "load, mujoco" in notes[0]
     with pytest.raises(InputError, match="at other places"):
         compare(tmp_path / "a.nc", tmp_path / "faster.nc")
+
+
+def test_of_a_netcdf_and_the_same_table_the_table_is_compared(run, tmp_path):
+    """A netCDF of several axes says more than a table beside it, and is compared itself."""
+    for name, kick in (("a", 0.0), ("b", 0.5)):
+        (tmp_path / name).mkdir()
+        data = saved(run, tmp_path / name / "run.nc", pitch=lambda values, kick=kick: values + kick)
+        (tmp_path / name / "run.csv").write_text(f"t [s],x [m]\n0,1\n1,{2 + kick}\n")
+    found, _ = compare(tmp_path / "a", tmp_path / "b")
+    assert [(one.name, one.largest) for one in found] == [("x", 0.5)]
+    wide = type(run)(run.data[["pitch"]].expand_dims(engine=["mujoco"]))
+    for name in ("a", "b"):
+        wide.save(tmp_path / name / data.name)
+    assert [one.name for one in compare(tmp_path / "a", tmp_path / "b")[0]] == ["pitch, mujoco"]
 
 
 def test_what_is_no_pair_of_results_is_refused(run, tmp_path, twinrig, capsys):

@@ -14,8 +14,7 @@ from models.contact.fastsim import fastsim
 from models.contact.fields import fastsim_fields
 from models.contact.material import Pair
 from models.core.errors import InputError
-from models.core.table_stream import blocks
-from models.core.tables import NEWTONS, SHARES, read_table
+from models.core.tables import NEWTONS, SHARES, blocks, read_table
 from models.systems.contact import cases_table
 from models.systems.contact.cases_table import BY_AXES, HEADER, answer
 from models.systems.contact.run import Built, contact

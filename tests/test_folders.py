@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
+from models.core.result_folders import COMMAND, drop_if_empty, new_folder, resumed_folder
 from models.core.whole_files import PART
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
-from studies.folders import COMMAND, drop_if_empty, new_folder, resumed_folder
 from studies.single_run import difference
 
 

@@ -4,8 +4,8 @@ import errno
 
 import pytest
 
+from models.core.result_folders import COMMAND
 from models.core.whole_files import reason_of, whole_file, write_whole
-from studies.folders import COMMAND
 from validation.common import full_disk
 from validation.common.full_disk import files_of_at_most
 

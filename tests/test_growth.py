@@ -18,7 +18,7 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.tangent import Path, covariance, path_of, swing, tilted
 from models.systems.pitch_plane.trust import growth, interpolation, model, noise, trust
 from models.systems.pitch_plane.virtual_measurement import write_measurement
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from studies.trust import run as run_study
 from validation.common.scenes import VEHICLES, force_scene, road_scene
 

@@ -13,7 +13,7 @@ from models.systems.hub_forces.comparison import planned_runs
 from models.systems.hub_forces.measurement import recorded
 from models.systems.hub_forces.run import measure
 from models.systems.hub_forces.scene import build
-from studies.asked import plan_of
+from studies.command.asked import plan_of
 
 NOISES = ("angle_noise", "force_noise")
 ON_ROAD = {

@@ -15,7 +15,7 @@ from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build
 from studies import inertial_unit as study
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 
 SHORT = ["run.duration=10.0", "options.samples=100", "options.durations=[1.0, 5.0]", "options.sampling_rate=10"]
 

@@ -18,7 +18,7 @@ from models.vehicles.parameters import asymmetric_twin, itwm_drift
 from models.vehicles.plausible import plausible
 from models.vehicles.plausible_plane import plausible_plane
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle, shipped
-from studies.asked import findings_of, load_scene
+from studies.command.asked import findings_of, load_scene
 from validation.common.scenes import road_scene
 
 TWIN, DURATION, PERIOD = asymmetric_twin.PARAMETERS, 20.0, 1e-3

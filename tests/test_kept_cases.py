@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from models.core.errors import InputError
-from validation.common.kept_cases import Cases, measured
 from validation.common.rows import within
+from validation.run import Cases, measured
 
 NAMES = ("a_case", "bad_case", "one_more")
 

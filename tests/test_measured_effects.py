@@ -15,7 +15,7 @@ from models.core.systems import load
 from models.measured.columns import Columns
 from models.systems import run
 from models.systems.measured.scene import build
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from validation.absence.measured import FAULTS, write
 from validation.absence.of_systems import bare
 

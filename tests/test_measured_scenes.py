@@ -20,8 +20,8 @@ from models.systems.measured.clock import record
 from models.systems.measured.listing import describe, guess
 from models.systems.measured.plan import check
 from models.systems.measured.scene import build
+from studies.command.summary_numbers import numbers
 from studies.recording import run
-from studies.summary_numbers import numbers
 
 HUBS = ("fl", "fr")
 PLACES = Places(HUBS, ("body",), ("front left",), ("dash",))

@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.systems import load
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from studies.motion import run
 
 SHORT = [

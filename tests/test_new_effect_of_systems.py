@@ -29,7 +29,7 @@ from models.systems.ride.reduced_scene import without as without_effects
 from models.systems.ride.scene import build as build_ride
 from models.vehicles.spatial_linear import wheels
 from models.vehicles.vehicle_file import load_vehicle
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from validation.absence.contact import BARE as CONTACT
 from validation.absence.of_systems import added, bare, declared, seen
 

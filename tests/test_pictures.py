@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from models.core.errors import InputError
 from models.rail.wheelset import CHOSEN
 from studies import animation
-from studies.asked import load_scene
+from studies.command.asked import load_scene
 from studies.pictures import video
 from studies.pictures.camera import Camera, picture
 from studies.pictures.drawing import lines, pose

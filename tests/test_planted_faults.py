@@ -38,16 +38,19 @@ def test_there_are_enough_and_each_has_a_name_of_its_own():
     assert len({fault.name for fault in FAULTS}) == len(FAULTS)
 
 
+@pytest.mark.full
 def test_all_rows_pass(measured):
     assert [row.reason for row in case.rows(measured) if row.status in ("failed", "not run")] == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("own", planted_faults.CAMPAIGNS, ids=lambda own: own.id)
 def test_every_fault_of_a_campaign_is_caught_and_nothing_else(own, campaigns):
     assert [row.reason for row in own.rows(campaigns[own.id]) if row.status in ("failed", "not run")] == []
     assert len({(fault.place, fault.name) for fault in own.faults}) == len(own.faults) >= 6
 
 
+@pytest.mark.full
 def test_one_table_has_the_faults_of_all_systems(measured, campaigns):
     whole, *_ = planted_faults.tables({"pitch-plane": measured, **campaigns})
     assert len(whole.rows) >= 120 and len({line[0] for line in whole.rows}) >= 6
@@ -63,14 +66,17 @@ def test_the_quick_share_plants_in_every_system_and_says_of_how_many(tmp_path):
     assert "2 of 47 were planted" in next(row.why for row in rows if row.id == "planted.caught")
 
 
+@pytest.mark.full
 def test_every_fault_is_caught_in_every_engine_that_has_it(found):
     assert [name for name, record in found.items() if not case.caught(record)] == []
 
 
+@pytest.mark.full
 def test_the_symmetric_vehicle_hides_exactly_what_symmetry_says(found):
     assert {name for name, record in found.items() if not case.caught(record, case.SYMMETRIC)} == set(case.HIDDEN)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "blind"),
     [
@@ -133,6 +139,7 @@ def test_a_run_that_fails_is_infinitely_far():
     assert size(CHECKS["audit"], bench, "exudyn", refuses) == float("inf")
 
 
+@pytest.mark.full
 def test_tables_name_every_fault_and_every_check(measured):
     checks_table, faults_table = case.tables(measured)
     assert [line[0] for line in checks_table.rows] == list(CHECKS)
@@ -140,6 +147,7 @@ def test_tables_name_every_fault_and_every_check(measured):
     assert all(line[2] for line in faults_table.rows), "each is caught by something"
 
 
+@pytest.mark.full
 def test_figure_draws_from_saved_data(measured):
     ((caption, figure),) = case.draw(measured)
     assert "5 faults" in caption

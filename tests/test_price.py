@@ -1,7 +1,8 @@
 """Work-precision runner: its analysis on curves whose answer is known, and planted solvers that lie."""
 
+import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
@@ -69,8 +70,13 @@ class PlantedProblem:
         return {"force": solution.error}
 
 
-def points_of(problem):
+def measured_of(problem):
     return cost.measure(problem, False, 3, 0.0)
+
+
+def with_points(points):
+    """The planted problem with these points."""
+    return cost.measured(PlantedProblem(), points)
 
 
 def test_order_of_synthetic_curves():
@@ -156,7 +162,7 @@ def test_status(vice, status):
 def test_a_lying_solver_fails_its_row(vice, row):
     for planted, expected in (("none", "passed"), (vice, "failed")):
         problem = PlantedProblem(planted)
-        rows = {one.id: one for one in rows_of(problem, points_of(problem), quick=False)}
+        rows = {one.id: one for one in rows_of(problem, measured_of(problem), quick=False)}
         assert rows[f"price.planted.{row}"].status == expected
     assert "exudyn fourth 1 ms" in rows[f"price.planted.{row}"].quantity, "the row names the offender"
 
@@ -177,7 +183,7 @@ def test_a_run_that_counts_otherwise_when_repeated_fails_its_row():
             return planted
 
     for problem, expected in ((PlantedProblem(), "passed"), (Restless(), "failed")):
-        rows = {one.id: one for one in rows_of(problem, points_of(problem), quick=True)}
+        rows = {one.id: one for one in rows_of(problem, measured_of(problem), quick=True)}
         assert rows["price.planted.counts.repeat"].status == expected
     assert "exudyn first 0.25 ms" in rows["price.planted.counts.repeat"].quantity
 
@@ -205,16 +211,16 @@ def test_a_wrong_order_fails_its_row():
         p
         if p.setting.method == "first"
         else cost.Point(p.setting, p.status, "", {"force": p.setting.value**3}, p.counts, p.seconds)
-        for p in points_of(problem)
+        for p in measured_of(problem).points
     ]
-    rows = {one.id: one for one in rows_of(problem, points, quick=True)}
+    rows = {one.id: one for one in rows_of(problem, with_points(points), quick=True)}
     assert rows["price.planted.order.force.exudyn-fourth"].status == "failed"
     assert rows["price.planted.order.force.exudyn-first"].status == "passed"
 
 
 def test_what_a_default_loses():
     """1e-3 N: first order needs 1000 times 125 calls, fourth order 1000^(1/4) times 500: 44.5 times."""
-    found = cost.loss(points_of(PlantedProblem()), "force", 1e-3, "force calls", "exudyn first")
+    found = measured_of(PlantedProblem()).loss(1e-3, "force calls", "exudyn first")
     assert found.how == "extrapolated"
     assert found.factor == pytest.approx(125_000 / (500 * 1000**0.25), rel=1e-9)
     assert found.low == found.high == found.factor, "counts have no interval"
@@ -222,11 +228,11 @@ def test_what_a_default_loses():
 
 def test_an_interval_needs_rounds():
     """One round has a factor, but nothing to tell how sure it is: its interval would be of width 0, as if exact."""
-    points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in points_of(PlantedProblem())]
-    one = cost.loss(points, "force", 1e-3, "seconds", "exudyn first")
+    points = [replace(p, seconds=(p.counts["force calls"] * 1e-6,)) for p in measured_of(PlantedProblem()).points]
+    one = with_points(points).loss(1e-3, "seconds", "exudyn first")
     assert one.factor > 1 and math.isnan(one.low) and math.isnan(one.high)
     five = [replace(p, seconds=p.seconds * cost.FEWEST) for p in points]
-    assert cost.loss(five, "force", 1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
+    assert with_points(five).loss(1e-3, "seconds", "exudyn first").low == pytest.approx(one.factor)
 
 
 def timed(factor=1.0, once=()):
@@ -245,21 +251,21 @@ def test_a_slowed_setting_is_noticed():
     """1 N takes 125 calls of first order and 500 of fourth: slowed fourfold they take the same seconds, sixfold half as
     many again, by the interval of 15 rounds of 5 % noise, which is 4 % each way."""
     for factor, slower in ((4.0, False), (6.0, True)):
-        found = cost.loss(timed(factor), "force", 1.0, "seconds", "exudyn first")
+        found = with_points(timed(factor)).loss(1.0, "seconds", "exudyn first")
         assert found.factor == pytest.approx(factor / 4, rel=0.1)
         assert (found.low > 1.05) == slower, "slower beyond doubt, or not"
 
 
 def test_rounds_are_for_settings_that_decide_something():
     """A method with ten times the seconds of the fourth-order one wins nothing; with 1.2 times it may."""
-    problem, points = PlantedProblem(), timed()
+    points = timed()
     fourth = [p for p in points if p.setting.method == "fourth"]
     for longer, expected in ((10.0, False), (1.2, True)):
         third = [
             replace(p, setting=replace(p.setting, method="third"), seconds=(longer * p.cost("seconds"),))
             for p in fourth
         ]
-        chosen = {p.setting.curve for p in cost.racing(problem, points + third)}
+        chosen = {p.setting.curve for p in with_points(points + third).racing()}
         assert {"exudyn fourth", "exudyn first"} <= chosen
         assert ("exudyn third" in chosen) == expected
 
@@ -267,14 +273,14 @@ def test_rounds_are_for_settings_that_decide_something():
 def test_a_slow_run_is_not_repeated_in_few_rounds(monkeypatch):
     """Three rounds, of which a slow setting is in the first: that is the run that has been."""
     monkeypatch.setattr(cost, "SLOW", 0.0)
-    points = cost.measure(PlantedProblem(), True, cost.FEWEST - 2, 0.0)
+    points = cost.measure(PlantedProblem(), True, cost.FEWEST - 2, 0.0).points
     assert {(len(p.seconds), p.changed) for p in points} == {(1, None)}
-    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST - 1, 0.0)
+    points = cost.measure(PlantedProblem(), False, 2 * cost.FEWEST - 1, 0.0).points
     assert {len(p.seconds) for p in points if p.changed is False} == {cost.FEWEST}
 
 
 def test_no_interval_from_one_run():
-    found = cost.loss(timed(once=STEPS[-1:]), "force", 1e-3, "seconds", "exudyn first")
+    found = with_points(timed(once=STEPS[-1:])).loss(1e-3, "seconds", "exudyn first")
     assert found.factor > 10 and math.isnan(found.low), "its finest step has one run alone"
 
 
@@ -300,8 +306,8 @@ def test_rounds_are_told():
 
 def test_tables_come_from_saved_points():
     problem = PlantedProblem("raises")
-    points = [cost.point(p.as_dict()) for p in points_of(problem)]
-    found = {table.title: table for table in tables(cost.describe(problem, points), points)}
+    saved = json.loads(json.dumps(asdict(measured_of(problem))))
+    found = {table.title: table for table in tables(cost.of_saved(saved))}
     cheapest = found["Cheapest setting that meets the tolerance"].rows[0]
     assert cheapest[0] == "0.1"
     assert cheapest[1].startswith("Exudyn fourth, 4.5 ms"), "0.1^(1/4) 8 ms = 4.499 ms"
@@ -375,7 +381,8 @@ def test_defaults_are_those_of_the_installed_engines():
     import exudyn
     import mujoco
 
-    from validation.price.problems.road_excited import DEFAULTS, RADII
+    from models.advice.price.systems.pitch_plane import RADII
+    from validation.price.problems.road_excited import DEFAULTS
 
     ti, option = exudyn.SimulationSettings().timeIntegration, mujoco.MjOption()
     assert DEFAULTS["exudyn", "GeneralizedAlpha 0.9", ti.endTime / ti.numberOfSteps] == "Exudyn"

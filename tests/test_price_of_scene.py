@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from models.advice.price import Answer, Ladder
-from models.advice.price.pitch_plane import own
 from models.advice.price.problem import Setting
 from models.advice.price.recommendation import price, recommend
+from models.advice.price.systems.pitch_plane import own
 from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import at
 from models.core.errors import InputError, RunFailed

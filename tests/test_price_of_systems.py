@@ -7,12 +7,11 @@ import pytest
 
 from models.advice.price.meshed import Meshed, first_part
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import SYSTEMS as PRICED
-from models.advice.price.recommendation import price, recommend
+from models.advice.price.recommendation import price, priced, recommend
 from models.advice.price.text import lines
 from models.core.errors import InputError, RunFailed
 from models.core.systems import SYSTEMS, load
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 
 STOP = {
     "title": "a stop",
@@ -37,7 +36,7 @@ def scene_of(table):
 
 
 def own(table, quantity=None, engines=("reference",)):
-    return import_module(PRICED[table["system"]]).own(scene_of(table), quantity, engines)
+    return priced(scene_of(table), quantity, engines)
 
 
 @pytest.mark.full

@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
 from validation.price import sheets
-from validation.price.problems import noisy_forces
+from validation.price.problems import force_excited
 from validation.price.sheets import inertial_unit, pitch_plane, ride
 
 
@@ -23,7 +23,7 @@ def values(folder, writer):
 
 @pytest.mark.full
 def test_the_sheet_of_noisy_forces_is_solved_by_scipy_alone(tmp_path):
-    rows = values(tmp_path, lambda folder: pitch_plane.by_forces(noisy_forces.problem(False), folder))
+    rows = values(tmp_path, lambda folder: pitch_plane.by_forces(force_excited.noisy(False), folder))
     k, d, m, inertia, g = 1e5, 1e4, (15.0, 15.0, 750.0), 500.0, 9.81
     t, front, rear = np.loadtxt(tmp_path / "noise.csv", delimiter=",", skiprows=1).T
 

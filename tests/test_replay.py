@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from validation.replay import __main__ as replay
-from validation.replay.answers import Answer, answer
-from validation.replay.differences import difference
+from validation.replay.answers import Answer, answer, difference, load, save
 from validation.replay.jobs import Job, jobs
-from validation.replay.kept import load, save
 
 COMMAND = """#!{python}
 import json, sys

@@ -22,7 +22,7 @@ from models.systems.ride.reduced_scene import ReducedScene, illegal, without
 from models.systems.ride.scene import build
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from validation.choice.judged import measured_step, worst_nearby
 from validation.choice.sampled import Sampled
 from validation.ride.drawn_rides import drawn

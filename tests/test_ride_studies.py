@@ -16,7 +16,7 @@ from models.systems.ride.of_scene import excitation_of, placed_wheels, road_of, 
 from models.systems.ride.scene import build
 from models.vehicles.spatial import Curve
 from models.vehicles.spatial_linear import wheels
-from studies.asked import load_scene
+from studies.command.asked import load_scene
 
 pytestmark = pytest.mark.usefixtures("empty_folder")
 TABLE = {"title": "a ride", "system": "ride", "vehicle": {"file": "seven_freedoms"}, "speeds": {"values": [10.0, 20.0]}}

@@ -18,7 +18,7 @@ from models.core.errors import RunFailed
 from models.ensemble import runner
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
-from studies.sweep import Points
+from studies.command.sweep import Points
 
 
 class Suicide:
@@ -69,7 +69,8 @@ def run(scene, engines, folder, progress):
 SWEEP = """
 import sys, types
 from models.ensemble import store
-from studies import sweep, command_line
+from studies import command_line
+from studies.command import sweep
 store._code = sweep.code = lambda *root: "the sources may be edited while a test runs"
 study = types.ModuleType("studies.contact")
 exec(open({study!r}).read(), study.__dict__)

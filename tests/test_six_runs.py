@@ -4,7 +4,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.core.systems import load
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from studies.six_runs import run
 
 SHORT = ["run.duration=14.0", "options.noise_samples=2", "options.perturbed_models=1"]

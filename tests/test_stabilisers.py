@@ -8,7 +8,7 @@ import pytest
 from models.core.errors import InputError
 from models.core.systems import load
 from models.systems.pitch_plane.stabilised import Bench, Options
-from studies.asked import SCENES
+from studies.command.asked import SCENES
 from studies.stabilisers import run
 
 SHORT = ["run.duration=5.0", "options.stiffnesses=[300.0]", "options.cut_offs=[0.1]", "options.sweep=[50.0, 3e3]"]

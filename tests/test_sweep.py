@@ -5,8 +5,8 @@ import pytest
 from models.core.errors import InputError
 from models.core.scene_file import changed
 from models.ensemble.store import named_files
-from studies.summary_numbers import numbers
-from studies.sweep import asked
+from studies.command.summary_numbers import numbers
+from studies.command.sweep import asked
 
 CONTACT = """
 title = "A contact"

@@ -1,4 +1,9 @@
-"""Measure the cases and save what they found; the report is then written from the saved files alone."""
+"""Measure the cases and save what they found; the report is then written from the saved files alone.
+
+Cases are an ensemble (``models.ensemble.runner``) of which path i is case i: each is kept as it ends, so that a report
+that was killed goes on with the others. The blocks lie in ``cases`` of the report's folder until the report is written,
+and beyond.
+"""
 
 import csv
 import json
@@ -8,19 +13,23 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+
+import numpy as np
 
 from models.core.result import provenance
 from models.core.whole_files import whole_file, write_whole
-from models.ensemble.store import locked
+from models.ensemble.runner import AHEAD, run_paths
+from models.ensemble.store import Arrays, code, locked
 from models.ensemble.workers import processes
 from validation.cases import CASES
 from validation.common.changes import against, lines
-from validation.common.kept_cases import Cases, Outcomes, measured
-from validation.common.rows import STATUSES, Row
+from validation.common.rows import STATUSES, Row, Saved
 from validation.common.scenes import data_folder
 from validation.report.shares import full
 
@@ -43,9 +52,81 @@ WORKERS = 2
 """Processes that measure the other cases."""
 
 
-def validate(
-    folder: Path, quick: bool, command: str, earlier: dict[str, Any] | None = None, resumed: bool = False
-) -> int:
+KEPT = "cases"
+"""Folder of finished cases."""
+
+Outcomes = dict[str, tuple[list[Row], float]]
+"""Rows and seconds of cases by their names."""
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Job (see ``models.ensemble.runner``): path i is the case ``names[i]``, whose data go into ``folder``."""
+
+    names: tuple[str, ...]
+    quick: bool
+    folder: Path
+
+    def __call__(self, paths: range) -> Arrays:
+        """``record`` (n,): rows and seconds of each case as JSON."""
+        return _array([self.record(self.names[i]) for i in paths])
+
+    def record(self, name: str) -> Saved:
+        """Measure one case; raises what the case raises."""
+        start = time.perf_counter()
+        case = import_module(f"validation.cases.{name}")
+        with TemporaryDirectory(ignore_cleanup_errors=True) as own:  # what cases write to run is no part of the report
+            rows, data = case.measure(self.quick, Path(own))
+        write_whole(self.folder / "data" / f"{name}.json", json.dumps(data).encode())
+        return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
+
+    def facts(self) -> Saved:
+        """The share, the code, and which measured files there are, without which rows are not run."""
+        root, own = data_folder(), Path(__file__).parent
+        sizes = (
+            {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
+            if root
+            else {}
+        )
+        return {
+            "cases": list(self.names),
+            "quick": self.quick,
+            "measured files": sizes,
+            "code of validation": code(own),
+            "code of studies": code(own.parent / "studies"),
+        }
+
+
+def _array(records: list[Saved]) -> Arrays:
+    return {"record": np.array([json.dumps(record) for record in records])}
+
+
+def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone: bool = False) -> Outcomes:
+    """Rows and seconds of all cases; those that an earlier go has finished are taken from there.
+
+    alone : one after the other; progress : told how many are done. A case that breaks, or whose process dies
+    again and again, is a failed row and is measured again by the next go. Raises InputError for a folder of another
+    version or share, RunFailed for a full disk.
+    """
+
+    def lost(cases: range, reason: str) -> Arrays:
+        return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
+
+    store, ahead = job.folder / KEPT / ("alone" if alone else "together"), 1 if alone else AHEAD
+    found = run_paths(job, len(job.names), store, pool, 1, lambda done: progress(done.done), lost, ahead)["record"]
+    records = (json.loads(str(one)) for one in found)
+    return {
+        name: ([Row(**row) for row in record["rows"]], record["seconds"])
+        for name, record in zip(job.names, records, strict=True)
+    }
+
+
+def _broken(name: str, reason: str) -> Row:
+    """The failed row of a case that gave none."""
+    return Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
+
+
+def validate(folder: Path, quick: bool, command: str, earlier: Saved | None = None, resumed: bool = False) -> int:
     """Measure all cases into ``folder``; returns the number of failed rows. earlier : ``changes.read`` of a report.
 
     resumed : the folder may hold cases that have ended; the time of them all together is then not known.
@@ -122,10 +203,10 @@ def seeds() -> dict[str, int]:
     return {name: module.SEED for name, module in drawn.items() if hasattr(module, "SEED")}
 
 
-def save(folder: Path, rows: list[Row], source: dict[str, Any], earlier: dict[str, Any] | None = None) -> None:
+def save(folder: Path, rows: list[Row], source: Saved, earlier: Saved | None = None) -> None:
     """results.json and results.csv; what changed since an earlier report is printed first."""
     table = [row.as_dict() for row in rows]
-    content: dict[str, Any] = {"provenance": source, "rows": table}
+    content: Saved = {"provenance": source, "rows": table}
     if earlier is not None:
         content["against"] = against(earlier, table, source)
         print("\n".join(lines(content["against"])))

@@ -1,4 +1,5 @@
-"""Where the numbers of a CSV file begin and what stands above them: titles, groups, headings, units.
+"""Where the numbers of a CSV file begin and what stands above them: titles, groups, headings, units; and tables as
+spreadsheets and loggers write them, turned line by line into the plain form of ``models.core.tables``.
 
 The line of headings is the first one with a heading that the caller knows (a clock, say) above a row of numbers with as
 many cells. Whatever exporters write above it is kept: title rows, a row of groups; beneath it a row of units.
@@ -6,7 +7,7 @@ many cells. Whatever exporters write above it is kept: title rows, a row of grou
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -62,8 +63,7 @@ class Head:
 
     def cells(self, line: Line) -> tuple[str, ...]:
         """Cells of a line, as many as there are headings."""
-        found = split(line.text, self.separator)
-        return tuple((*found, *[""] * len(self.names))[: len(self.names)])
+        return tuple((split(line.text, self.separator) + [""] * len(self.names))[: len(self.names)])
 
     def groups(self) -> tuple[str, ...]:
         """Group of every heading from the row above them, where it has as many cells; a cell that is empty carries on
@@ -79,9 +79,9 @@ class Head:
 
 def heading(text: str) -> tuple[str, str]:
     """Name and unit of one heading; the unit is the last pair of brackets, empty where there is none."""
-    found = _HEADING.fullmatch(text)
-    name, unit = found.groups() if found else (text, "")
-    return name.strip(), (unit or "").strip()
+    match = _HEADING.fullmatch(text)
+    name, unit = match.groups("") if match else (text, "")
+    return name.strip(), unit.strip()
 
 
 def split(text: str, separator: str) -> list[str]:
@@ -106,23 +106,19 @@ def separator_line(text: str) -> str:
 
 def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[str]) -> str:
     """Decimal sign of cells, the first of which are in ``line``; InputError where commas have two meanings."""
-    commas = [cell for cell in cells if "," in cell]
-    if commas and any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
-        raise InputError(
-            path,
-            f"line {line} and after",
-            commas[0],
+    commas, why = [cell for cell in cells if "," in cell], ""
+    if not commas:
+        return "."
+    if any("." in cell for cell in cells if is_number(cell.replace(",", ""))):
+        why = (
             "the numbers hold points and commas: write them "
-            "with one decimal sign and nothing else, without separators of thousands",
+            "with one decimal sign and nothing else, without separators of thousands"
         )
-    if commas and separator == "," and all(_THOUSANDS.fullmatch(cell) for cell in commas):
-        raise InputError(
-            path,
-            f"line {line} and after",
-            commas[0],
-            "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else",
-        )
-    return "," if commas else "."
+    elif separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
+        why = "the comma can be a decimal sign or one of thousands: write numbers with a decimal point and nothing else"
+    if why:
+        raise InputError(path, f"line {line} and after", commas[0], why)
+    return ","
 
 
 def is_number(cell: str) -> bool:
@@ -133,11 +129,8 @@ def is_number(cell: str) -> bool:
 def find_head(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
     """Headings above numbers by every separator that makes sense of the first line that has such; none where no line
     has."""
-    for i in range(len(lines)):
-        heads = [head for sign in separators if (head := _head(lines, i, known, sign)) is not None]
-        if heads:
-            return heads
-    return []
+    found = ([head for sign in separators if (head := _head(lines, i, known, sign))] for i in range(len(lines)))
+    return next(filter(None, found), [])
 
 
 def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
@@ -166,16 +159,53 @@ def _head(lines: Sequence[Line], i: int, known: Callable[[str], bool], separator
         if not (len(cells) >= len(names) >= len(trimmed(cells))):
             return None
         if is_number(cells[place]) or TIMED.fullmatch(cells[place]):
-            return Head(
-                lines[i],
-                separator,
-                tuple(names),
-                len(cells),
-                tuple(lines[:i]),
-                tuple(lines[i + 1 : j]),
-                lines[j].begin,
-                lines[j].number - 1,
-            )
+            above, between = tuple(lines[:i]), tuple(lines[i + 1 : j])
+            first = lines[j]
+            return Head(lines[i], separator, tuple(names), len(cells), above, between, first.begin, first.number - 1)
         if any(is_number(cell) or known(cell) for cell in cells):
             return None
     return None
+
+
+def plain_text(path: str | Path, text: str, wanted: Collection[str]) -> str:
+    """The same table with commas between columns, decimal points and units in the headings, each line in its place.
+
+    ``wanted`` are names of columns, by which the headings are known. Titles become comments; a separator that ends the
+    lines, quotes and a row of units go. What has two meanings, or is no such table, comes back as it was, for the
+    reader to refuse; InputError where a comma can be a decimal sign or one of thousands.
+    """
+    lines = [Line(i, line, i, i) for i, line in enumerate(text.split("\n"), start=1)]
+    asked = separator_line(lines[0].text)
+    used = [line for line in lines[bool(asked) :] if line.text.strip() and not line.text.startswith("#")]
+    heads = find_head(used, lambda cell: heading(cell)[0] in wanted, (asked,) if asked else tuple(SEPARATORS))
+    if len(heads) != 1 or not heads[0].separator or asked not in ("", *SEPARATORS):
+        return text
+    return _rewritten(path, lines, heads[0])
+
+
+def _rewritten(path: str | Path, lines: list[Line], head: Head) -> str:
+    """Text with the head and the rows in the plain form."""
+    rows = {line.number: split(line.text, head.separator) for line in lines[head.line :]}
+    cells = [cell for row in rows.values() for cell in row]
+    sign = decimal_sign(path, head.line + 1, head.separator, cells)
+    new = {line.number: f"# {line.text}" if line.text.strip() else "" for line in lines[: head.line]}
+    new[head.header.number] = ",".join(_headings(head))
+    for number, row in rows.items():
+        kept = row[: len(head.names)] if len(row) == head.width and not any(row[len(head.names) :]) else row
+        new[number] = ",".join(_plain(cell, sign) for cell in kept)
+    return "\n".join(new[line.number] for line in lines)
+
+
+def _headings(head: Head) -> list[str]:
+    """Headings with the units of the row beneath them, where there is one."""
+    if len(head.between) != 1:
+        return list(head.names)
+    units = [cell.strip("[]() ") for cell in head.cells(head.between[0])]
+    return [name if heading(name)[1] else f"{name} [{unit}]" for name, unit in zip(head.names, units, strict=True)]
+
+
+def _plain(cell: str, sign: str) -> str:
+    """A number with a decimal point; a mark for nothing measured as ``nan``; anything else as it is, less commas."""
+    if is_number(cell) and sign == ",":
+        return cell.replace(",", ".")
+    return "nan" if cell and MARKS.fullmatch(cell) else cell.replace(",", ";")

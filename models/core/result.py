@@ -7,7 +7,7 @@ import platform
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -88,8 +88,8 @@ class Result:
         data = self.data.drop_attrs(deep=False).assign_attrs(kept)
         checked = {
             name: {"fletcher32": True}
-            for name, own in data.variables.items()
-            if own.size and own.ndim and own.dtype.kind in "fiu"
+            for name, variable in data.variables.items()
+            if variable.size and variable.ndim and variable.dtype.kind in "fiu"
         }
         write_whole(path, data.to_netcdf(engine="h5netcdf", encoding=checked))  # HDF5 itself crashes on a full disk
 
@@ -149,11 +149,11 @@ def joined(results: Mapping[str, Result], axis: str) -> Result:
     """
     import xarray as xr
 
-    every = list(results.values())
-    data = xr.concat([one.data for one in every], xr.Variable(axis, list(results)), combine_attrs="override")
-    data.attrs["engine"] = ", ".join(one.data.attrs["engine"] for one in every)
-    data.attrs["counts"] = json.dumps({name: one.counts() for name, one in results.items()})
-    data.attrs["seconds"] = sum(one.seconds for one in every)
+    parts = [result.data for result in results.values()]
+    data = xr.concat(parts, xr.Variable(axis, list(results)), combine_attrs="override")
+    data.attrs["engine"] = ", ".join(part.attrs["engine"] for part in parts)
+    data.attrs["counts"] = json.dumps({name: result.counts() for name, result in results.items()})
+    data.attrs["seconds"] = sum(result.seconds for result in results.values())
     return Result(data)
 
 
@@ -199,17 +199,14 @@ def provenance(command: str = "") -> dict[str, Any]:
 @cache
 def _commit() -> str:
     """Commit of the checkout that runs, with a mark if it was changed since."""
-
-    def ask(*arguments: str) -> str:
-        here = Path(__file__).parent
-        done = subprocess.run(["git", *arguments], cwd=here, capture_output=True, text=True, timeout=10, check=False)
-        return done.stdout.strip() if done.returncode == 0 else ""
-
+    asked = partial(subprocess.run, cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True)
     try:
-        commit = ask("rev-parse", "--short=12", "HEAD")
-        return f"{commit}, changed since" if commit and ask("status", "--porcelain") else commit or "not a checkout"
-    except OSError:
+        commit, changes = (
+            asked(["git", *words]).stdout.strip() for words in (("rev-parse", "--short=12", "HEAD"), ("status", "-s"))
+        )
+    except (OSError, subprocess.CalledProcessError):
         return "not a checkout"
+    return f"{commit}, changed since" if changes else commit
 
 
 @cache

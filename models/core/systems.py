@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 from models.core.errors import InputError
@@ -59,6 +60,12 @@ def listed(folder: Path, package: str) -> dict[str, System]:
 
 
 SYSTEMS = listed(Path(__file__).parents[1] / "systems", "models.systems")
+
+
+def modules_of(package: str) -> dict[str, str]:
+    """Modules of a package by the names of systems that they bear; none is imported."""
+    names = [module.name for module in iter_modules(import_module(package).__path__)]
+    return {name.replace("_", "-"): f"{package}.{name}" for name in names}
 
 
 def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] = SYSTEMS) -> Any:

@@ -6,17 +6,20 @@ line holds one finite number per column (or none, or ``nan``, where the reader a
 columns, point as decimal sign. A last line without a line end is taken as it is if its last number goes on
 from those before it, and ``ended`` says so; one that was cut off in a number is refused. What spreadsheets
 and loggers make of such a table (semicolons and decimal commas, tabs, quotes, titles above, units in a row
-beneath the headings, a line ``sep=``) is turned into that form first, by ``models.core.csv_plain``, where it has
-one meaning.
+beneath the headings, a line ``sep=``) is turned into that form first, by ``models.core.csv_header``, where it has
+one meaning. Long tables of the plain form are read block by block: what is wrong with the header is the user's to
+repair before anything is computed; what is wrong with a row is told beside that row, and all others go on.
 """
 
 import io
 import itertools
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -27,7 +30,6 @@ METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 DISTANCES = {"m": 1.0, "km": 1e3}
 SECONDS = {"s": 1.0, "ms": 1e-3}
 NEWTONS = {"N": 1.0, "kN": 1e3}
-PASCALS = {"Pa": 1.0, "MPa": 1e6, "GPa": 1e9}
 PER_METRE = {"1/m": 1.0, "rad/m": 1.0, "1/mm": 1e3, "rad/mm": 1e3}
 SHARES = {"-": 1.0, "%": 1e-2}
 RADIANS = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -48,6 +50,9 @@ NUMBER = re.compile(r"[-+]?(?=\.?\d)(\d*)\.?(\d*)(?:[eE][-+]?(\d+))?")
 """A number, its digits before the point, after it and in its exponent."""
 RUN, LEAP = 8, 3.0
 """Rows before a last one without a line end, and how much further than they it may go on."""
+
+BLOCK = 20_000
+"""Rows of a block of a long table."""
 
 Columns = Mapping[str, Mapping[str, float]]
 Lines = list[tuple[int, str]]
@@ -79,7 +84,7 @@ def read_table(
     """
     text = whole_text(path)
     if not _is_plain(text, columns):
-        from models.core.csv_plain import plain_text
+        from models.core.csv_header import plain_text
 
         text = plain_text(path, text, tuple(columns))
     header, rows = _header_and_rows(path, text)
@@ -166,15 +171,14 @@ def _cut_off(lines: list[str]) -> bool:
 def headings(path: str | Path, header: tuple[int, str], columns: Columns) -> tuple[list[str], list[float]]:
     """Column names and factors to SI, in the order of the file."""
     place = f"line {header[0]} (header)"
-    found = [_heading(path, place, cell, columns) for cell in header[1].split(",")]
-    names = [name for name, _ in found]
+    names, factors = zip(*(_heading(path, place, cell, columns) for cell in header[1].split(",")), strict=True)
     for name in names:
         if names.count(name) > 1:
             raise InputError(path, place, name, "this column appears twice")
-    missing = [name for name in columns if name not in names]
-    if missing:
-        raise InputError(path, place, header[1], f"column {missing[0]!r} is missing; wanted: {_wanted(columns)}")
-    return names, [factor for _, factor in found]
+    for name in columns:
+        if name not in names:
+            raise InputError(path, place, header[1], f"column {name!r} is missing; wanted: {_wanted(columns)}")
+    return list(names), list(factors)
 
 
 def _heading(path: str | Path, place: str, cell: str, columns: Columns) -> tuple[str, float]:
@@ -204,13 +208,19 @@ def _numbers(path: str | Path, text: str, free: tuple[bool, ...]) -> np.ndarray:
     headings = header[1].split(",")
     values = np.empty((len(rows), len(headings)))
     for i, (line, row) in enumerate(rows):
-        cells = row.split(",")
-        if len(cells) != len(headings):
-            raise InputError(path, f"line {line}", row, f"{len(headings)} values are needed, found {len(cells)}")
-        for j, cell in enumerate(cells):
-            gap = free[j] and cell.strip().lower() in GAPS
-            values[i, j] = math.nan if gap else number(path, line, headings[j], cell)
+        values[i] = _row(path, line, row, headings, free)
     return values
+
+
+def _row(path: str | Path, line: int, row: str, headings: list[str], free: tuple[bool, ...]) -> list[float]:
+    """The numbers of one row; raises InputError that names its line."""
+    cells = row.split(",")
+    if len(cells) != len(headings):
+        raise InputError(path, f"line {line}", row.strip(), f"{len(headings)} values are needed, found {len(cells)}")
+    return [
+        math.nan if gap and cell.strip().lower() in GAPS else number(path, line, title, cell)
+        for title, cell, gap in zip(headings, cells, free, strict=True)
+    ]
 
 
 def number(path: str | Path, line: int, heading: str, cell: str) -> float:
@@ -232,3 +242,71 @@ def _check_increasing(path: str | Path, rows: Lines, name: str, values: np.ndarr
         i = int(wrong[0]) + 1
         place = f"line {rows[i][0]}, column {name!r}"
         raise InputError(path, place, float(values[i]), f"must be greater than {values[i - 1]:g} in the row before it")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Successive rows of a table.
+
+    lines : (rows,) line of the file, counted from 1. values : name -> (rows,) in SI, NaN throughout a wrong row.
+    wrong : row of the block -> what is wrong with it.
+    """
+
+    lines: list[int]
+    values: dict[str, np.ndarray]
+    wrong: dict[int, str]
+
+
+def blocks(path: Path, columns: tuple[Columns, ...], rows: int = BLOCK) -> Iterator[Block]:
+    """Blocks of at most ``rows`` rows of a CSV table.
+
+    columns : the accepted sets of columns, of which the header must name one in full, each with its accepted units
+    and their factors to SI. Raises InputError for a file or a header that cannot be used.
+    """
+    with _opened(path) as file:
+        lines = ((i, line) for i, line in enumerate(file, start=1) if line.strip() and not line.startswith("#"))
+        header = next(lines, None)
+        if header is None:
+            raise InputError(path, "", None, "the file is empty: a header line and rows of numbers are needed")
+        names, factors = headings(path, (header[0], header[1].strip()), _nearest(header[1], columns))
+        while part := list(itertools.islice(lines, rows)):
+            yield _block(path, part, names, np.array(factors), header[1].split(","))
+
+
+def _opened(path: Path) -> TextIO:
+    try:
+        return path.open(encoding="utf-8-sig", errors="replace")  # a byte that is no text spoils its row alone
+    except OSError as error:
+        raise InputError(path, "", None, f"the file cannot be read: {error.strerror}") from None
+
+
+def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
+    """The set of columns that shares most names with the header."""
+    found = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
+    return max(columns, key=lambda wanted: len(found & set(wanted)))
+
+
+def _block(path: Path, part: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:
+    lines, wrong = [line for line, _ in part], {}
+    values = _all(part, len(names))
+    if values is None:
+        values = np.full((len(part), len(names)), np.nan)
+        for i, (line, text) in enumerate(part):
+            try:
+                values[i] = _row(path, line, text, titles, (False,) * len(titles))
+            except InputError as error:
+                wrong[i] = str(error).partition(f"line {line}")[2].lstrip(":, ")
+    values = values * factors
+    return Block(lines, {name: values[:, j] for j, name in enumerate(names)}, wrong)
+
+
+def _all(part: list[tuple[int, str]], width: int) -> np.ndarray | None:
+    """All rows at once, where none of them needs a closer look."""
+    rows = [text for _, text in part]
+    if not (all(map(str.isascii, rows)) and rows[-1].endswith("\n")) or any("_" in text for text in rows):
+        return None
+    try:
+        values = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return values if values.shape == (len(part), width) and np.isfinite(values).all() else None

@@ -28,8 +28,8 @@ from models.brake.sprung_step import (
 )
 from models.brake.surfaces import under_wheels
 from models.core.errors import RunFailed
+from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
-from models.engines.protocol import Settings
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise, mass

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
+from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
-from models.engines.protocol import Settings, guard
+from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
 from models.multibody.cut_table import Drive, table

@@ -7,7 +7,7 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 
 exu.config.printToConsole = False
 KINDS = exu.OutputVariableType

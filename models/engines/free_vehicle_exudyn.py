@@ -8,10 +8,10 @@ import exudyn as exu
 import numpy as np
 
 from models.core.errors import RunFailed
+from models.engines.assembly import Settings
 from models.engines.exudyn_system import items, mass_and_force, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.protocol import Settings
 from models.vehicles.spatial_linear import Preloads
 
 

@@ -5,9 +5,9 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from models.engines.assembly import Settings
 from models.engines.exudyn import counted
 from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, start
-from models.engines.protocol import Settings
 from models.engines.spatial_exudyn_build import RoadTable, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,

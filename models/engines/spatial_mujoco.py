@@ -9,12 +9,13 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
+from models.engines.assembly import Settings
 from models.engines.mujoco import CHUNK, INTEGRATORS
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import check
 from models.engines.mujoco_quiet import quiet
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
-from models.engines.protocol import Settings, guard
+from models.engines.protocol import guard
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
 from models.engines.spatial_protocol import (
     EngineKinematics,

@@ -15,8 +15,9 @@ import numpy as np
 
 from models.core.errors import InputError, Refused, RunFailed
 from models.core.steps import divides, fitting
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.protocol import Settings, guard
+from models.engines.protocol import guard
 from models.engines.stability import GROWTH, growth, limit
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector

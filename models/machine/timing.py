@@ -24,7 +24,6 @@ def interleave(
     jobs: Sequence[Callable[[], Any]],
     rounds: int,
     least: float = 0.02,
-    seed: int = SEED,
     lasted: Sequence[float] | np.ndarray | None = None,
     every: Sequence[int] | None = None,
     clock: Clock = time.perf_counter,
@@ -32,13 +31,13 @@ def interleave(
     """Seconds of every job in every round, shape (jobs, rounds), NaN in those that it is not in; single thread, warmed
     up.
 
-    least : a job is repeated within its turn until it lasts about this long (s); seed : of the order;
+    least : a job is repeated within its turn until it lasts about this long (s);
     lasted : seconds of a run of each job that has been, 0 where there was none; every : a job is in one of so many
     rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
     repeats = [1 if one > LONG * least else _repeats(job, least, clock) for job, one in zip(jobs, known, strict=True)]
-    order = np.random.default_rng(seed)
+    order = np.random.default_rng(SEED)
     seconds = np.full((len(jobs), rounds), np.nan)
     for i in range(rounds):
         for j in order.permutation(len(jobs)):
@@ -77,9 +76,9 @@ def interval(samples: np.ndarray) -> tuple[float, float, float]:
     return float(middle), float(low), float(high)
 
 
-def resamples(rounds: int, count: int = RESAMPLES, seed: int = SEED) -> np.ndarray:
+def resamples(rounds: int, count: int = RESAMPLES) -> np.ndarray:
     """Rounds drawn with replacement, shape (count, rounds): one set for all jobs keeps the pairs together."""
-    return np.random.default_rng(seed).integers(rounds, size=(count, rounds))
+    return np.random.default_rng(SEED).integers(rounds, size=(count, rounds))
 
 
 def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
@@ -89,9 +88,9 @@ def median(samples: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
     return float(np.median(values)), low, high
 
 
-def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0, form: str = ".3g") -> str:
+def spelled(samples: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
     """A median with its interval as tables have it: "12.3 (11.9 to 12.8)"."""
-    middle, low, high = (f"{scale * value:{form}}" for value in median(samples))
+    middle, low, high = (f"{scale * value:.3g}" for value in median(samples))
     return f"{middle} ({low} to {high})"
 
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError
-from models.core.table_stream import Block, blocks
-from models.core.tables import NEWTONS, RADIANS, SHARES, Columns
+from models.core.tables import NEWTONS, RADIANS, SHARES, Block, Columns, blocks
 from models.tyre.magic_formula import factors
 from models.tyre.tyre_table import LARGEST_FRICTION, TyreTable
 

@@ -19,21 +19,14 @@ from unittest import mock
 
 from models.core.errors import Refused
 from models.core.scene_effects import beside, module_of, names_of
-from models.core.systems import SYSTEMS
+from models.core.systems import SYSTEMS, modules_of
 from validation.absence.probes import registered
 from validation.common.rows import Row, System, at_most, behaves
 
 SYSTEM: System = "effects"
-FILES = {
-    "braking": "braking",
-    "contact": "contact",
-    "wheelset": "wheelset",
-    "handling": "handling",
-    "ride": "ride",
-    "hub-forces": "hub_forces",
-    "measured": "measured",
-}
-"""System -> the file beside this one that has its bare scene and counts what a run of a scene is made of."""
+FILES = {system: file for system, file in modules_of("validation.absence").items() if system in SYSTEMS}
+"""System -> the file beside this one, of its name, that has its bare scene and counts what a run of a scene is made
+of; found by listing."""
 Counts = dict[str, dict[str, int]]
 """By engine; "all" where every engine agrees."""
 
@@ -44,7 +37,7 @@ def file_of(system: str) -> Any:
     If its scenes read files there is also write(folder), and BY_HAND for effects without usual values: what the bare
     scene has in place of its own tables without such an effect, and with it.
     """
-    return import_module(f"validation.absence.{FILES[system]}")
+    return import_module(FILES[system])
 
 
 def bare(system: str, **instead: Any) -> Any:

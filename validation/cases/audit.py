@@ -6,7 +6,7 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common import checks
 from validation.common.checks import acceleration_gap
-from validation.common.rows import Measured, System, at_most
+from validation.common.rows import CaseAnswer, System, at_most
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"
@@ -31,7 +31,7 @@ def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
     return acceleration_gap(checks.engine(engine), assemble(own), settings_of(own, engine), STATES)
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per engine, vehicle and geometry, the same in quick."""
     rows = [
         at_most(

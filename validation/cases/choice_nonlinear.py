@@ -1,7 +1,6 @@
 """Effects of scenes that are run in time, chosen within a tolerance: is the choice right, and what does it save?"""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from models.advice.ride_choice.in_time import FEWEST
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import drawn
 from validation.choice.judged import JudgedByRuns, judged_of
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, finding, within
 from validation.ride.drawn_rides import COPIES, Bent, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
@@ -63,7 +62,7 @@ def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
     return float(np.quantile(changes, UNSURE))
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
     found = [judged(system, seed) for system, own in seeds.items() for seed in own]
@@ -172,7 +171,7 @@ def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
     ]
 
 
-def _shown(one: JudgedByRuns) -> dict[str, Any]:
+def _shown(one: JudgedByRuns) -> Saved:
     choice = one.choice
     return {
         "system": one.system,
@@ -189,7 +188,7 @@ def _shown(one: JudgedByRuns) -> dict[str, Any]:
     }
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Savings by system, and which effects went how often."""
     rows = []
     for system in data["systems"]:
@@ -214,7 +213,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("What choosing effects and steps saves", note, heads, tuple(rows))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Saved) -> Drawn:
     """Predicted against confirmed changes, and savings over tolerance."""
     from models.drawing.figures import plt
 

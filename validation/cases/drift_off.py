@@ -21,7 +21,7 @@ from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import ANGLE, Curve, interpolation, model, noise
 from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
 from models.vehicles.pitch_plane import Parameters
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, within
 from validation.common.scenes import drive, force_scene
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
@@ -42,7 +42,7 @@ class Combination:
 
     name: str
     source: str
-    road: Data
+    road: Saved
     rate: float
     duration: float
     size: float = 0.0
@@ -69,13 +69,13 @@ COMBINATIONS = (
 )
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per combination; quick: the first one, by few paths."""
     found = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
     return [_row(figures) for figures in found], {"combinations": found}
 
 
-def _combination(one: Combination, folder: Path, quick: bool) -> Data:
+def _combination(one: Combination, folder: Path, quick: bool) -> Saved:
     """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
     members = {"noise": _noise, "interpolation": _between, "model": _models}[one.source]
     predicted, measured = members(one, folder, QUICK_PATHS if quick else PATHS)
@@ -143,7 +143,7 @@ def _drift_off(assembly: Assembly, true: Result) -> float:
     return np.inf if time is None else time
 
 
-def _row(found: Data) -> Row:
+def _row(found: Saved) -> Row:
     key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
     scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
     what = (
@@ -154,7 +154,7 @@ def _row(found: Data) -> Row:
     return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
@@ -185,7 +185,7 @@ def tables(data: Data) -> list[Table]:
     return [Table("Drift-off, predicted and measured", note, heads, rows)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Measured over predicted."""
     from models.drawing.figures import plt
 

@@ -9,7 +9,7 @@ from models.core.systems import load
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import followed, row
-from validation.common.rows import Data, Measured, System, Table, finding, within
+from validation.common.rows import CaseAnswer, Saved, System, Table, finding, within
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
@@ -81,7 +81,7 @@ FIGURES = (
 """Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
@@ -126,7 +126,7 @@ def measure(quick: bool, folder: Path) -> Measured:
     }
 
 
-def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Data]:
+def _run(scene: Scene, names: Collection[str] = ()) -> dict[str, Saved]:
     """Figures of the study's runs in the reference by name: of some, or of all."""
     with TemporaryDirectory() as folder:
         measured, _, scenes = followed(scene, Path(folder))
@@ -140,7 +140,7 @@ def _at_rate(rate: float) -> dict[str, float]:
     return {"drift-off": rows["undisturbed"]["drift-off"], "moment max": rows["guided, undisturbed"]["moment max"]}
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """All runs of the reference, and what the sampling rate does to the undisturbed ones."""
     rows = tuple(
         (

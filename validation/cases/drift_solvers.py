@@ -22,7 +22,7 @@ from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import Curve
 from models.vehicles.pitch_plane_equations import suspension_loads
-from validation.common.rows import Data, Measured, Row, System, Table, finding, within
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, finding, within
 from validation.common.scenes import drive, force_scene
 
 TITLE = "What drift depends on: samples and noise, not solvers"
@@ -70,7 +70,7 @@ SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)
     rows = _solver_rows(solvers)
@@ -80,7 +80,7 @@ def measure(quick: bool, folder: Path) -> Measured:
     return rows + _smoothing_rows(smoothing), {"solvers": solvers, "smoothing": smoothing}
 
 
-def _solvers(folder: Path, solvers: Any) -> list[Data]:
+def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     """Drift-off (s) by solver: undisturbed with linear and with smooth samples, and noisy with linear ones.
 
     Every solver takes the undisturbed linear samples; the others are left to the tighter half of them, and noise to
@@ -91,7 +91,7 @@ def _solvers(folder: Path, solvers: Any) -> list[Data]:
     found = []
     tight = solvers[1::2]
     fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
-    inputs: tuple[tuple[str, str, Data, Any], ...] = (
+    inputs: tuple[tuple[str, str, Saved, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
         ("noisy", "linear", noise, fixed),
@@ -116,7 +116,7 @@ def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Res
     return {"drift-off": DURATION if time is None else time, "error": float(error[-1])}
 
 
-def _smoothing(folder: Path) -> list[Data]:
+def _smoothing(folder: Path) -> list[Saved]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
     true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
@@ -132,7 +132,7 @@ def _smoothing(folder: Path) -> list[Data]:
 
 def _treated(
     name: str, true: Result, quiet: Assembly, cutoff: float | None, engine: str, method: str, step: float
-) -> Data:
+) -> Saved:
     forces = quiet.input
     assert isinstance(forces, Sampled)
     settings = Settings(method, step, NOISY)
@@ -185,7 +185,7 @@ def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
     return np.sqrt(pitch_variance(np.array(WINDOW), rates[at], rigid_pitch(p).intensity(NOISE, period)))
 
 
-def _solver_rows(solvers: list[Data]) -> list[Row]:
+def _solver_rows(solvers: list[Saved]) -> list[Row]:
     """Who drifts off when."""
     rows = []
     for name in ("linear", "noisy"):
@@ -225,7 +225,7 @@ def _solver_rows(solvers: list[Data]) -> list[Row]:
     ]
 
 
-def _smoothing_rows(smoothing: list[Data]) -> list[Row]:
+def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
     """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
     rows = []
     for one in smoothing:
@@ -252,7 +252,7 @@ def _smoothing_rows(smoothing: list[Data]) -> list[Row]:
     return rows
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
         (one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
@@ -285,5 +285,5 @@ def tables(data: Data) -> list[Table]:
     return found
 
 
-def _when(one: Data) -> str:
+def _when(one: Saved) -> str:
     return "never" if one["drift-off"] >= DURATION else f"{one['drift-off']:.2f}"

@@ -18,7 +18,7 @@ from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
-from validation.common.rows import Row, System, Table, aim, at_most
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, aim, at_most
 
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"
@@ -42,7 +42,7 @@ SHORT = 500
 """Steps of the runs whose seconds tell what an effect adds."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 4 s, a tenth of
     the rounds, and each effect in one of the three engines, in turn.
     """
@@ -69,7 +69,7 @@ def hand_built(engine: str, own: Scene) -> Any:
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
 
-def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> dict[str, Any]:
+def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
     """Seconds of the machinery without effects against the hand-built model, and whether they agree.
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
@@ -86,7 +86,7 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> dict[str, Any]
     }
 
 
-def _machinery(engine: str, found: dict[str, Any], steps: int) -> list[Row]:
+def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
     why = (
         f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
@@ -258,7 +258,7 @@ def _contact(quick: bool) -> list[Row]:
     ]
 
 
-def _price(effect: str, engine: str, folder: Path, rounds: int) -> dict[str, Any]:
+def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
     """One line of the price list."""
     seconds = interleave([_job(own, engine) for own in pair(effect, SHORT, folder)], rounds, 5e-3)
     added = (seconds[1] - seconds[0]) / SHORT * 1e6
@@ -279,7 +279,7 @@ def _job(own: Scene, engine: str) -> Any:
     return lambda: outputs(assembly, built.run(), built)
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """The price list of effects."""
     note = (
         "Each effect is added to the scene without it: wheel_forces, road, pitch_spring and the sensors to the "
@@ -293,7 +293,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Price list of effects", note, headings, tuple(_line(entry) for entry in data["price"]))]
 
 
-def _line(entry: dict[str, Any]) -> tuple[str, ...]:
+def _line(entry: Saved) -> tuple[str, ...]:
     value, low, high = entry["ratio"]
     return (
         entry["effect"],

@@ -15,7 +15,7 @@ from models.systems.pitch_plane.scene import Scene, assemble, parameter_set
 from models.systems.pitch_plane.virtual_measurement import perturbed, write_wheel_forces
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import equilibrium
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding
 from validation.common.scenes import VEHICLES, drive, force_scene
 
 TITLE = "Enforced moment of a prescribed pitch"
@@ -70,7 +70,7 @@ def relative(found: np.ndarray, true: np.ndarray) -> float:
     return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for both engines and vehicles, start-up ringing, and the study road; quick: one vehicle, no road."""
     with TemporaryDirectory() as name:
         work = Path(name)
@@ -121,13 +121,13 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
     )
 
 
-def _ringing(folder: Path) -> Measured:
+def _ringing(folder: Path) -> CaseAnswer:
     """An abrupt start: error of the multiplier over the first 0.1 s with and without consistent accelerations."""
     manoeuvre(folder, "itwm_drift", abrupt=True)
     scene = force_scene(folder, step=STEP, duration=START, interpolation="smooth", effects=GUIDE)
     true = truth(scene)
     first = slice(1, 101)
-    paths: Data = {"time": (STEP * np.arange(1, 101)).tolist()}
+    paths: Saved = {"time": (STEP * np.arange(1, 101)).tolist()}
     for radius in (0.6, 0.9):
         settings = Settings("GeneralizedAlpha", STEP, START, spectral_radius=radius)
         paths[f"inconsistent start, spectral radius {radius}"] = (_inconsistent(scene, settings) - true)[first].tolist()
@@ -198,7 +198,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
     return rows, table
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Error by step on the study road, where it was driven."""
     if not data["table"]:
         return []
@@ -211,7 +211,7 @@ def tables(data: Data) -> list[Table]:
     return [Table(title, note, ("engine", "integrator", "step [ms]", "relative error"), rows)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Start-up ringing of the multiplier."""
     from models.drawing.figures import plt
 

@@ -17,7 +17,7 @@ from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, aim, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, finding, within
 from validation.common.scenes import drive, force_scene
 
 TITLE = "Noise paths by the thousand"
@@ -39,7 +39,7 @@ TIMES = (1.0, 2.0, 5.0, 10.0, 15.0)
 SAME = "the same bits"
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Equality of bits by path, workers and interruption, agreement of engines; in full also scale and price."""
     with TemporaryDirectory() as name:
         forces, duration = Path(name), 1.0 if quick else LONG
@@ -158,7 +158,7 @@ def _alone(function: Callable[..., Any], *args: Any) -> Any:
         return pool.submit(function, *args).result()
 
 
-def _large(job: NoisePaths, many: int, blocks: Path) -> Data:
+def _large(job: NoisePaths, many: int, blocks: Path) -> Saved:
     """The large ensemble with everything that belongs to it: seconds, and bytes of this process and its workers."""
     import resource
 
@@ -181,7 +181,7 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> Data:
     }
 
 
-def _scale_rows(large: Data) -> list[Row]:
+def _scale_rows(large: Saved) -> list[Row]:
     what = f"{MANY:,} paths of {LONG:g} s at 1 kHz in the reference, 2 processes"
     share = f"{50.0 * large['busy'] / large['seconds']:.0f} % of two cores"
     counted = (
@@ -301,7 +301,7 @@ def _half_step_row(forces: Path) -> Row:
     )
 
 
-def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Data, prices: dict[str, float]) -> Data:
+def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
     """What the tables and the figure show."""
     errors = found["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
@@ -320,7 +320,7 @@ def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Data, pric
     }
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Spreads, drift-off times and prices; none in the quick report."""
     if not data:
         return []
@@ -358,7 +358,7 @@ def tables(data: Data) -> list[Table]:
     ]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Fan of the pitch error and histogram of the drift-off times."""
     if not data:
         return []

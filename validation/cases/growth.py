@@ -30,7 +30,7 @@ from models.systems.pitch_plane.tangent import covariance, measured_growth, path
 from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, within
 from validation.common.scenes import drive, force_scene, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
@@ -53,7 +53,7 @@ ROADS = {
 LAW = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
     true = drive(folder, LENGTH)
     spread = _spread(true, folder, quick)
@@ -71,7 +71,7 @@ def _noisy(folder: Path, duration: float, step: float = 1e-3, path: int = 0) -> 
     return force_scene(folder, step=step, duration=duration, effects=noise)
 
 
-def _spread(true: Result, folder: Path, quick: bool) -> Data:
+def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     """Standard deviations at 1 to 10 s: Monte Carlo (in the full run), covariance along the path, and the laws."""
     times, assembly = np.arange(1, LENGTH + 1), assemble(_noisy(folder, LENGTH))
     at = np.rint(times * RATE).astype(int)
@@ -109,7 +109,7 @@ def _path(assembly: Assembly, start: np.ndarray, first: int, samples: int) -> Er
     return ErrorPath(replace(assembly, initial=start, input=forces), forces, 1, samples)
 
 
-def _growth(folder: Path, road: Data, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Data:
+def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str = "itwm_drift") -> Saved:
     """Growth rates of one road: from the run, from the forces, by cut-off, and measured in windows in both frames."""
     true = drive(folder, WINDOW * windows, parameters=parameters, road=road)
     assembly = assemble(force_scene(folder, parameters, 1e-3, WINDOW * windows))
@@ -136,7 +136,7 @@ def _growth(folder: Path, road: Data, windows: int = WINDOWS, parameters: str = 
     }
 
 
-def _spread_rows(spread: Data) -> list[Row]:
+def _spread_rows(spread: Saved) -> list[Row]:
     """The spread of noise against its laws, second by second."""
     seen = "pitch" if "pitch" in spread else "covariance"
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
@@ -200,7 +200,7 @@ def _spread_rows(spread: Data) -> list[Row]:
     ]
 
 
-def _growth_rows(roads: Data) -> list[Row]:
+def _growth_rows(roads: Saved) -> list[Row]:
     rows = list[Row]()
     for name, road in roads.items():
         key = name.replace(" ", "-").replace(",", "")
@@ -255,7 +255,7 @@ def _growth_rows(roads: Data) -> list[Row]:
     ]
 
 
-def _body_row(key: str, what: str, road: Data) -> Row:
+def _body_row(key: str, what: str, road: Saved) -> Row:
     """No growth for a vehicle that does not couple heave to pitch; one that does is told, not judged.
 
     Its wheels weigh c g cos(pitch) about the common centre of mass, against forces that do not turn away: on a hill
@@ -340,7 +340,7 @@ def _linear_row(folder: Path) -> Row:
     return at_most("growth.linear", SYSTEM, what, off, "rad", 0.05, why, "none")
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Spread over time, and growth rates by road."""
     spread = data["spread"]
     known = ("pitch", "covariance", "law, run", "law, forces", "t^1.5", "heave", "heave law")
@@ -367,7 +367,7 @@ def tables(data: Data) -> list[Table]:
     return [Table("Spread of the noise", note, heads, rows), Table("Growth of a tilt error", about, columns, rates)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
     from models.drawing.figures import plt
 

@@ -12,7 +12,7 @@ from models.core.errors import InputError, RunFailed
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, MISSING
 from validation.common import full_disk, wrong_engines
-from validation.common.rows import Data, Measured, Row, System, Table, at_most, behaves
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
@@ -111,10 +111,10 @@ def _all(found: dict[str, str], word: str) -> str:
     return "; ".join(other) or word
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows per engine; all of them in both modes, over fewer unstable steps and durations in quick."""
     rows: list[Row] = []
-    endings: Data = {}
+    endings: Saved = {}
     for engine in CATALOGUE:
         rows += _unstable_rows(engine, endings, quick)
         rows += _input_rows(engine)
@@ -174,7 +174,7 @@ def _disk_row(folder: Path) -> Row:
     )
 
 
-def _unstable_rows(engine: str, endings: Data, quick: bool) -> list[Row]:
+def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
     """No silent answer with the check; past it, long runs are caught by the guard after the run."""
     checked = unstable(engine, setups.run, quick)
     past = unstable(engine, setups.unchecked, quick)
@@ -258,7 +258,7 @@ def _reduced_row(engine: str) -> Row:
     )
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """How the runs at unstable and stable steps end, with the check and past it."""
     words = ("right", "refused", "raised", "SILENT")
     rows = tuple(

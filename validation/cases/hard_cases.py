@@ -5,11 +5,11 @@ In full every case is run; the quick share runs the last of each family and ever
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, within
 from validation.hard_cases import cases_by_family
 from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, Outcome, judge
 from validation.hard_cases.catalogue import COVERED, beyond
@@ -22,27 +22,26 @@ FILES = ("measured_files",)
 EVERY = 24
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
-    rows: list[Row] = []
-    data: list[dict[str, Any]] = []
-    known = cases_by_family()
+    known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in some(known) if quick else known:
         with TemporaryDirectory() as own:
             outcomes = {name: judge(case, name, Path(own)) for name in case.judged()}
             naive = case.naive(Path(own)) if case.naive else ""
         rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
-        data.append({"family": family, **_record(case, outcomes, naive)})
-    silent = sum(outcome["word"] == "SILENT" for entry in data for outcome in entry["outcomes"].values())
+        told = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
+        said = {name: asdict(outcome) for name, outcome in outcomes.items()}
+        data.append({"family": family, **told, "outcomes": said, "naive": naive})
+    words = [[outcome["word"] for outcome in entry["outcomes"].values()] for entry in data]
     counted = sum(family not in FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
-    good = sum(all(o["word"] != "SILENT" for o in entry["outcomes"].values()) for entry in data)
     rows += [
         at_most(
             "hard.silent",
             SYSTEM,
-            f"silent wrong answers in {share} cases, {_judged(data)} outcomes",
-            silent,
+            f"silent wrong answers in {share} cases, {sum(map(len, words))} outcomes",
+            sum(own.count("SILENT") for own in words),
             "",
             0.0,
             "a finite wrong answer without a word is never accepted",
@@ -52,7 +51,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "hard.passed",
             SYSTEM,
             "hard cases that every implementation answers right, refuses or says it failed",
-            good,
+            sum("SILENT" not in own for own in words),
             "cases",
             len(data),
             0,
@@ -79,10 +78,6 @@ def some(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
     return [pair for name in families for pair in [own for own in known if own[0] == name][::-EVERY]]
 
 
-def _judged(data: list[dict[str, Any]]) -> int:
-    return sum(len(entry["outcomes"]) for entry in data)
-
-
 def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
     """The error where an answer is wanted and given, the behaviour otherwise."""
     id = f"hard.{case.name.replace(',', '').replace(' ', '-')}.{'any' if case.once else implementation}"
@@ -93,25 +88,12 @@ def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
     return behaves(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 
-def _record(case: Case, outcomes: dict[str, Outcome], naive: str) -> dict[str, Any]:
-    found = {name: {"word": o.word, "error": o.error, "message": o.message} for name, o in outcomes.items()}
-    return {
-        "name": case.name,
-        "hard": case.hard,
-        "check": case.check,
-        "unit": case.unit,
-        "tolerance": case.tolerance,
-        "outcomes": found,
-        "naive": naive,
-    }
-
-
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """The catalogue, counts by family, and the one table of hard cases."""
     return [_catalogue(data), _counts(data), _all(data["cases"])]
 
 
-def _catalogue(data: dict[str, Any]) -> Table:
+def _catalogue(data: Saved) -> Table:
     """Which cases stand for each number of the catalogue."""
     words = {name: ["in full"] for _, name in data["known"]}
     words |= {entry["name"]: sorted({o["word"] for o in entry["outcomes"].values()}) for entry in data["cases"]}
@@ -129,14 +111,17 @@ def _catalogue(data: dict[str, Any]) -> Table:
     )
 
 
-def _counts(data: dict[str, Any]) -> Table:
+def _counts(data: Saved) -> Table:
     """Cases, those that were run and their outcomes, of every family and of all of them."""
     known = Counter(family for family, _ in data["known"])
     groups = {name: [entry for entry in data["cases"] if entry["family"] == name] for name in known}
     groups["all"] = data["cases"]
     known["all"] = len(data["known"])
+    ended = {
+        name: Counter(o["word"] for entry in own for o in entry["outcomes"].values()) for name, own in groups.items()
+    }
     rows = tuple(
-        (name.replace("_", " "), f"{len(own)} of {known[name]}", *(str(_count(own, word)) for word in WORDS))
+        (name.replace("_", " "), f"{len(own)} of {known[name]}", *(str(ended[name][word]) for word in WORDS))
         for name, own in groups.items()
     )
     return Table(
@@ -147,11 +132,7 @@ def _counts(data: dict[str, Any]) -> Table:
     )
 
 
-def _count(entries: list[dict[str, Any]], word: str) -> int:
-    return sum(outcome["word"] == word for entry in entries for outcome in entry["outcomes"].values())
-
-
-def _all(entries: list[dict[str, Any]]) -> Table:
+def _all(entries: list[Saved]) -> Table:
     """Every case: what is hard, what it is checked against, and what each implementation makes of it."""
     rows = tuple(
         (
@@ -171,9 +152,9 @@ def _all(entries: list[dict[str, Any]]) -> Table:
     return Table(TITLE, note, ("case", "what is hard", "checked against", *IMPLEMENTATIONS, "without the guard"), rows)
 
 
-def _allowed(entry: dict[str, Any]) -> str:
+def _allowed(entry: Saved) -> str:
     return f" (allowed {entry['tolerance']:.0e} {entry['unit']})" if entry["unit"] else ""
 
 
-def _cell(outcome: dict[str, Any]) -> str:
+def _cell(outcome: Saved) -> str:
     return outcome["word"] if outcome["error"] is None else f"{outcome['word']}, {outcome['error']:.1e}"

@@ -23,7 +23,7 @@ from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import growth
 from models.systems.pitch_plane.virtual_measurement import perturbed
 from models.vehicles.parameters.itwm_drift import PARAMETERS
-from validation.common.rows import Data, Measured, Row, System, Table, behaves, finding, within
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, behaves, finding, within
 from validation.common.scenes import drive, force_scene
 
 TITLE = "The smallest spring that holds a force-excited run"
@@ -61,7 +61,7 @@ class FreeRuns:
     law: float
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
@@ -129,7 +129,7 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
     return within(key, SYSTEM, what, law / stiffness, "", 1.0, 0.3, "30 % is asked", "closed form")
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Stiffness found in each setting."""
     rows = tuple(
         (name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")

@@ -15,7 +15,7 @@ from models.engines.reference import derivative_of
 from models.systems.pitch_plane.scene import Scene, assemble
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
-from validation.common.rows import Data, Figures, Measured, Row, System, at_most, behaves, finding, not_run
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, at_most, behaves, finding, not_run
 from validation.common.scenes import drive, force_scene
 from validation.hard_cases.prescribed_pitch import AsItComes
 
@@ -30,7 +30,7 @@ SEED, FORCE_NOISE, WALK = 31, 31.0, np.deg2rad(0.2)
 """Seed of the noise; N per sample of each force; rad per sqrt(s) of the integrated rate of a cheap gyro."""
 SMOOTH = 5.0
 """Bandwidth (Hz) of the pitch that such a gyro gives."""
-HAND: dict[str, Data] = {
+HAND: dict[str, Saved] = {
     "index 1": {},
     "index 1, Baumgarte": {"alpha": ALPHA},
     "index 1, projection": {"projected": True},
@@ -72,7 +72,7 @@ class Files:
         return assemble(self.scene(prescribed_pitch={"file": file, **values}))
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Gaps from a start off the constraint by formulation, then both drifts by noise; quick: over short runs."""
     with TemporaryDirectory() as name:
         files = _drive(Path(name), 0.2 if quick else 4.0)
@@ -274,7 +274,7 @@ def _id(name: str) -> str:
     return name.replace(", ", ".").replace(" ", "_")
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
     from models.drawing.figures import plt
 

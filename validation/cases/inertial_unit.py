@@ -29,7 +29,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, finding, not_run, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, not_run, within
 from validation.common.scenes import road_scene
 from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
 from validation.measured import recording
@@ -47,7 +47,7 @@ TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 """s, Hz, rad/s per sample: the paper's own example."""
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000
     rows = [*_clean(), *_one_axis(paths), *_three_axes(paths), *_norms(paths), *_bias(paths)]
@@ -214,7 +214,7 @@ def _norms(paths: int) -> list[Row]:
     return rows
 
 
-def _ten_minutes(paths: int) -> Measured:
+def _ten_minutes(paths: int) -> CaseAnswer:
     """The paper's example: 600 s at 1 kHz, 0.1 rad/s white on each sample, on a car's motion."""
     walk = random_walk(DEVIATION, RATE)
     axis = math.degrees(walk * TEN_MINUTES**0.5)
@@ -320,7 +320,7 @@ def _section_forces() -> list[Row]:
     ]
 
 
-def _recording(paths: int) -> Measured:
+def _recording(paths: int) -> CaseAnswer:
     """A minute in a real car: gyro against camera, and the noise law on its motion."""
     path = recording.find()
     if path is None:
@@ -358,7 +358,7 @@ def _recording(paths: int) -> Measured:
     ], {"off": off[::20].tolist()}
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """The ten minutes over time."""
     if not data["ten minutes"]:
         return []
@@ -368,7 +368,7 @@ def tables(data: Data) -> list[Table]:
     return [Table("The ten-minute example", note, ("time [s]", "rms angle per axis [deg]", "s sqrt(t) [deg]"), rows)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
     from models.drawing.figures import heading, plt
 

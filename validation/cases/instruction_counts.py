@@ -1,21 +1,129 @@
-"""What a step costs in instructions, which do not wander as seconds do, and how well their count repeats."""
+"""What a step costs in instructions, which do not wander as seconds do, and how well their count repeats.
 
+Every method with fixed steps is counted by valgrind. Two processes march the same, copies of one that has loaded
+everything without being counted; within each, two numbers of steps are differenced, so that the start of a run drops
+out. Counts compare the same code over time and between settings: valgrind offers the program another processor than
+this one, and its instructions are no time.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
-from validation.common.rows import Row, System, Table
-from validation.price import instructions
+import numpy as np
+
+from models.drawing.figures import LABELS
+from models.engines.stability import linearised
+from models.systems.pitch_plane.scene import assemble
+from validation.common.rows import CaseAnswer, Saved, System, Table, at_most, not_run
+from validation.common.scenes import road_scene
+from validation.price import instructions_run
+from validation.price.tables import named
 
 TITLE = "Instructions per step"
 SYSTEM: System = "cost"
+METHODS = {
+    "exudyn": (
+        "GeneralizedAlpha",
+        "TrapezoidalIndex2",
+        "RK44",
+        "RK67",
+        "RK33",
+        "ExplicitMidpoint",
+        "ExplicitEuler",
+        "VelocityVerlet",
+    ),
+    "mujoco": ("Euler", "implicit", "implicitfast", "discrete", "RK4"),
+}
+CURVES = tuple(f"{engine} {method}" for engine, methods in METHODS.items() for method in methods)
+STEPS = (40, 120)
+"""Steps of the runs that are differenced."""
+BOUND = 1e-6
+PATIENCE = 900
+"""Seconds until a process is given up."""
+ID, WHAT = "instruction_counts", f"instructions of {len(CURVES)} methods counted in two processes"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Counts of every method in two processes under valgrind, in full alone: they have no quick share."""
-    rows, data = ([], {}) if quick else instructions.measure(folder)
-    return rows, {"instructions": data}
+    if quick:
+        return [], {"instructions": {}}
+    if shutil.which("valgrind") is None:
+        return [not_run(ID, SYSTEM, WHAT, "valgrind is not installed")], {"instructions": {}}
+    try:
+        first, again = _counted(folder / "instructions")
+    except (subprocess.SubprocessError, OSError) as error:
+        reason = f"valgrind failed: {str(error).splitlines()[0][:120]}"
+        return [not_run(ID, SYSTEM, WHAT, reason)], {"instructions": {}}
+    off = np.abs(again / first - 1.0).max(axis=1)
+    rows = [
+        at_most(
+            f"{ID}.{engine}",
+            SYSTEM,
+            f"{WHAT}: largest difference of a run in {LABELS[engine]}",
+            float(largest.max()),
+            "relative",
+            BOUND,
+            "the same instructions in the same order: seed of hashes and "
+            "number of threads are set, and no clock's reading is printed while they are counted",
+            "none",
+        )
+        for engine, largest in zip(METHODS, np.split(off, [len(METHODS["exudyn"])]), strict=True)
+    ]
+    per_step = np.diff(first, axis=1)[:, 0] / (STEPS[1] - STEPS[0])
+    return rows, {"instructions": dict(zip(CURVES, per_step.tolist(), strict=True))}
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def _counted(folder: Path) -> np.ndarray:
+    """Instructions (2 processes, methods, 2 numbers of steps), by the marks between the marches."""
+    folder.mkdir()
+    mass, damping, stiffness, *_ = linearised(assemble(road_scene()).vehicle)
+    march = {
+        "masses": np.diag(mass).tolist(),
+        "damping": damping.tolist(),
+        "stiffness": stiffness.tolist(),
+        "methods": METHODS,
+        "steps": STEPS,
+    }
+    settled = {**os.environ, "PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        "--instr-atstart=no",
+        f"--dump-before={instructions_run.MARK}",
+        f"--callgrind-out-file={folder}/count.%p",
+        sys.executable,
+        instructions_run.__file__,
+        json.dumps(march),
+    ]
+    subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PATIENCE)
+    marches = len(CURVES) * len(STEPS)
+    found = [
+        [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
+        for path in folder.glob("count.*")
+        if path.with_name(f"{path.name}.{marches + 1}").exists()
+    ]
+    shutil.rmtree(folder)
+    return np.array(found, float).reshape(2, -1, len(STEPS))
+
+
+def _total(dump: Path) -> int:
+    """Instructions of one dump."""
+    found = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
+    assert found is not None
+    return int(found[1])
+
+
+def tables(data: Saved) -> list[Table]:
     """Instructions per step, where they were counted."""
-    return [instructions.table(data["instructions"])] if data["instructions"] else []
+    rows = tuple((named(curve), f"{count / 1e3:,.1f}") for curve, count in data["instructions"].items())
+    note = (
+        f"Linear pitch-plane vehicle, steps of {1e3 * instructions_run.STEP:g} ms, all forces from one Python "
+        "function, which they include: the engine, the way into Python and a law there. The start of a run is "
+        "differenced out."
+    )
+    return [Table(TITLE, note, ("method", "thousand instructions a step"), rows)] if rows else []

@@ -11,7 +11,7 @@ from models.drift.innovations import LEVEL as ALARMS
 from models.drift.innovations import consistency
 from models.drift.score import CHANNELS
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE
-from validation.common.rows import Data, Measured, Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, finding, within
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
     COARSE,
@@ -41,7 +41,7 @@ FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
     place = folder / "kalman"
     place.mkdir(exist_ok=True)
@@ -301,7 +301,7 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
     ]
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Damage and moments per implementation, and the deviations of the linear closed loop."""
     if not data["damage"]:
         return []

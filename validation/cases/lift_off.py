@@ -26,7 +26,7 @@ from models.vehicles.vehicle_file import load_vehicle
 from validation.common import checks
 from validation.common.bounces import Bounces, energy
 from validation.common.checks import acceleration_gap
-from validation.common.rows import Measured, Row, System, at_most, finding, within
+from validation.common.rows import CaseAnswer, Row, System, at_most, finding, within
 from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 
 TITLE = "Tyres that only push"
@@ -41,7 +41,7 @@ ROUNDING = "the same tableau and laws; sums are taken in another order"
 UNDAMPED = dict.fromkeys(("d1", "d2", "d3", "d4"), 0.0)
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All rows; quick: one vehicle, half a second of bounces, short paths, no hub forces."""
     vehicles = VEHICLES[-1:] if quick else VEHICLES
     rows = [row for name in vehicles for row in (*_accelerations(name), *_paths(name, 1.5 if quick else 20.0))]

@@ -25,7 +25,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.bands import mean_square
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, within
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.spatial.spatial_motion import ARRAYS, PATH, tilted
 from validation.spatial.spatial_motion import readings as readings_on_path
@@ -49,7 +49,7 @@ RIGID = {
 BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
     rows += [_plain(), _order(), _tilt()]
@@ -293,7 +293,7 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     return [row], {name: curve[::25].tolist() for name, curve in curves.items()}
 
 
-def _held(curves: Data, quick: bool) -> list[Row]:
+def _held(curves: Saved, quick: bool) -> list[Row]:
     """The symmetric part as a measurement: the error stays where it is."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
@@ -334,7 +334,7 @@ def _held(curves: Data, quick: bool) -> list[Row]:
     return [*rows, within("motion.held.growth", SYSTEM, what, late / early, "", 1.0, 0.2, why, "closed form")]
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """What a flat arrangement costs."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
@@ -349,7 +349,7 @@ def tables(data: Data) -> list[Table]:
     return [Table("What sensors in nearly one plane cost", note, heads, rows)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
     from models.drawing.figures import plt
 

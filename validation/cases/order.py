@@ -6,7 +6,7 @@ import numpy as np
 
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import Data, Measured, System, Table, within
+from validation.common.rows import CaseAnswer, Saved, System, Table, within
 from validation.common.scenes import road_scene
 
 TITLE = "Observed order of the largest state error on the study road"
@@ -60,7 +60,7 @@ def fitted(steps: tuple[float, ...], found: list[float]) -> float:
     return float(np.polyfit(np.log(steps), np.log(found), 1)[0])
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per family; the truth is DOP853 at a tolerance of 1e-13; quick: one halving over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)
     truth = simulate(
@@ -87,7 +87,7 @@ def measure(quick: bool, folder: Path) -> Measured:
     return rows, {"table": table, "steps": steps, "duration": duration}
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
     rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])

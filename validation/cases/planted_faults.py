@@ -5,9 +5,8 @@ other systems, beside all runs without a fault that these need.
 """
 
 from pathlib import Path
-from typing import Any
 
-from validation.common.rows import Row, Table, at_most
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, Table, at_most
 from validation.faults import advice, braking, choosing, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
@@ -29,15 +28,15 @@ EVERY, LEAST = 16, 40
 """Quick share of the campaigns; faults that there must be in all."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows by system and, in full, of the whole; quick: every sixteenth fault of each system."""
     plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
-    data: dict[str, Any] = {"pitch-plane": plane, **{own.id: own.measure(EVERY if quick else 1) for own in CAMPAIGNS}}
+    data: Saved = {"pitch-plane": plane, **{own.id: own.measure(EVERY if quick else 1) for own in CAMPAIGNS}}
     rows = [*pitch_plane.rows(plane), *(row for own in CAMPAIGNS for row in own.rows(data[own.id]))]
     return [*rows, *([] if quick else [_enough(data)])], data
 
 
-def _enough(data: dict[str, Any]) -> Row:
+def _enough(data: Saved) -> Row:
     caught = sum(line[3] != "none" for line in _lines(data))
     return at_most(
         "planted.count",
@@ -51,12 +50,12 @@ def _enough(data: dict[str, Any]) -> Row:
     )
 
 
-def _lines(data: dict[str, Any]) -> list[tuple[str, ...]]:
+def _lines(data: Saved) -> list[tuple[str, ...]]:
     """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
     return [*pitch_plane.lines(data["pitch-plane"]), *(line for own in CAMPAIGNS for line in own.lines(data[own.id]))]
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """All faults in one table, then each system's with sizes and what its checks are."""
     lines = _lines(data)
     systems = len({line[0] for line in lines})
@@ -69,6 +68,6 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [whole, *pitch_plane.tables(data["pitch-plane"]), *(own.table(data[own.id]) for own in CAMPAIGNS)]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Saved) -> Drawn:
     """How far above its tolerance each check of the pitch plane stands, fault by fault."""
     return pitch_plane.draw(data["pitch-plane"])

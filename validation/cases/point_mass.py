@@ -8,7 +8,7 @@ import numpy as np
 
 from models.drift.point_mass import continuous, discrete, paths
 from validation.common.bands import mean_square
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, within
 
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
@@ -29,7 +29,7 @@ WHY = (
 )
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for both covariances against many digits, for their difference, and for Monte Carlo; quick: 2000 paths."""
     exact = {
         "continuous": [_continuous_error(x) for x in DAMPED],
@@ -174,7 +174,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     ]
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Relative errors of both covariances."""
     rows = tuple((name, *(f"{error:.1e}" for error in errors)) for name, errors in data["errors"].items())
     note = (
@@ -184,7 +184,7 @@ def tables(data: Data) -> list[Table]:
     return [Table("Relative error of the covariances", note, ("", *(f"{x:g}" for x in DAMPED)), rows)]
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
     from models.drawing.figures import heading, plt
 

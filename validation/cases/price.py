@@ -6,16 +6,16 @@ which does not, has routes of its own beside them.
 
 import os
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from models.advice.price import runner as cost
+from models.advice.price import runner
 from models.advice.price.problem import Problem, Setting
 from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
 from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, not_run, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, not_run, within
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
@@ -25,8 +25,6 @@ from validation.price.problems import (
     force_excited,
     free_vehicle,
     inertial_unit,
-    noisy_forces,
-    prescribed_pitch,
     road_excited,
     wheelset,
 )
@@ -35,16 +33,17 @@ from validation.price.tables import tables as cost_tables
 
 TITLE = "What accuracy costs"
 SYSTEM: System = "cost"
-PROBLEMS: tuple[Callable[[bool], Problem], ...] = (
+Make = Callable[[bool], Problem]
+PROBLEMS: tuple[Make, ...] = (
     road_excited.problem,
     force_excited.problem,
     partial(wheelset.problem, speed=20.0),
     braking_stop.problem,
     inertial_unit.problem,
 )
-FULL_ONLY: tuple[Callable[[bool], Problem], ...] = (
-    noisy_forces.problem,
-    prescribed_pitch.problem,
+FULL_ONLY: tuple[Make, ...] = (
+    force_excited.noisy,
+    force_excited.guided,
     free_vehicle.problem,
     partial(wheelset.problem, speed=5.0),
     partial(wheelset.problem, speed=1.0),
@@ -63,42 +62,46 @@ CALLBACKS = {
 """Ratios of seconds and what they compare."""
 COUNTED = 0.2
 """Length (s) of the runs whose force calls are counted from outside."""
+ALIKE = {
+    "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
+    "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
+}
+"""Curves that must coincide on the road, and why."""
+ON_SECONDS = "a target about seconds, which are reported and never gated"
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
     found, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _shared()
-    rows = [row for _, own in found for row in own]
-    return rows + _road_rows(found[0][0]) + beside, {"problems": [own for own, _ in found], **data}
+    rows = [row for own, _ in found for row in own]
+    return rows + _road_rows(found[0][1]) + beside, {"problems": [saved for _, saved in found], **data}
 
 
-Priced = tuple[dict[str, Any], list[Row]]
-
-
-def _beside(quick: bool) -> tuple[list[Row], dict[str, Any]]:
+def _beside(quick: bool) -> CaseAnswer:
     """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
     road = assemble(road_excited.scene())
     rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
-    data = {
+    rounds, least, duration = 2 * ROUNDS[quick], 2 * LEAST[quick], road_excited.DURATION
+    data: Saved = {
         "ride": found,
         "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
-        **_speeds(road, 2 * ROUNDS[quick], 2 * LEAST[quick]),
+        "callback": {name: speed.callback_cost(road, duration, name, rounds, least) for name in ("RK4", "Euler")},
+        "real time": speed.real_time(road, duration, rounds, least),
     }
     settings = dict.fromkeys(_at_1_ms(one) for one in road_excited.settings(quick) if one.method != "DVERK6")
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
-def _priced(quick: bool, make: Callable[[bool], Problem]) -> Priced:
-    """One problem: what is saved of it, and its rows."""
+def _priced(quick: bool, make: Make) -> CaseAnswer:
+    """One problem: its rows, and what is saved of it."""
     problem = make(quick)
-    points = cost.measure(problem, quick, ROUNDS[quick], LEAST[quick])
-    saved = {"problem": cost.describe(problem, points), "points": [p.as_dict() for p in points]}
-    return saved, rows_of(problem, points, quick)
+    measured = runner.measure(problem, quick, ROUNDS[quick], LEAST[quick])
+    return rows_of(problem, measured, quick), asdict(measured)
 
 
-def _shared() -> tuple[list[Priced], tuple[list[Row], dict[str, Any]]]:
+def _shared() -> tuple[list[CaseAnswer], CaseAnswer]:
     """All problems, and what is beside them, by as many processes as there are processors, two at most; the first of
     the problems last, but for the road, which is long."""
     with processes(min(2, os.cpu_count() or 1)) as pool:
@@ -108,36 +111,22 @@ def _shared() -> tuple[list[Priced], tuple[list[Row], dict[str, Any]]]:
         return [road.result(), *found], beside.result()
 
 
-def _speeds(assembly: Assembly, rounds: int, least: float) -> dict[str, Any]:
-    duration = road_excited.DURATION
-    return {
-        "callback": {name: speed.callback_cost(assembly, duration, name, rounds, least) for name in ("RK4", "Euler")},
-        "real time": speed.real_time(assembly, duration, rounds, least),
-    }
-
-
-def _road_rows(saved: dict[str, Any]) -> list[Row]:
+def _road_rows(saved: Saved) -> list[Row]:
     """What must coincide on the road, and what Exudyn names without having it."""
-    points = [cost.point(one) for one in saved["points"]]
-    quantity, limits = "wheel force", saved["problem"]["uncertainty"]
-    found = [" = ".join(sorted(group)) for group in cost.same(points, quantity, limits[quantity])]
-    expected = {
-        "rk4": ("exudyn RK44 = mujoco RK4 = reference RK4", "the same tableau at the same step"),
-        "implicit": ("mujoco implicit = mujoco implicitfast", "they differ in Coriolis terms, which are absent here"),
-    }
+    road = runner.of_saved(saved)
+    found = [" = ".join(sorted(group)) for group in road.same()]
     rows = [
         behaves(
             f"price.road.coincide.{name}",
             SYSTEM,
             "curves that agree to 1 % at every common setting",
-            next((one for one in found if one == group), "; ".join(found)),
+            group if group in found else "; ".join(found),
             group,
             why,
             "native",
         )
-        for name, (group, why) in expected.items()
+        for name, (group, why) in ALIKE.items()
     ]
-    missing = [p for p in points if p.setting.method == "DVERK6"]
     return rows + [
         behaves(
             "price.road.status.DVERK6",
@@ -147,7 +136,8 @@ def _road_rows(saved: dict[str, Any]) -> list[Row]:
             "refused",
             "Exudyn names the method but has not implemented it",
         )
-        for p in missing
+        for p in road.points
+        if p.setting.method == "DVERK6"
     ]
 
 
@@ -165,14 +155,13 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
             for one in settings
             if one.engine == engine
         ]
-        worst = max(abs(outside - said) for outside, said in pairs)
         what = f"force calls counted from outside ({how}) against those reported, {len(pairs)} runs, largest difference"
         rows.append(
             within(
                 f"price.road.counts.{engine}",
                 SYSTEM,
                 what,
-                worst,
+                max(abs(outside - said) for outside, said in pairs),
                 "calls",
                 0,
                 0,
@@ -183,17 +172,14 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     return rows
 
 
-def _speed_rows(data: dict[str, Any]) -> list[Row]:
+def _speed_rows(data: Saved) -> list[Row]:
     """Targets about seconds: reported with their intervals, never judged."""
-    why = "a target about seconds, which are reported and never gated"
-    gap = data["callback"]["RK4"]["gap"]
-    what = "MuJoCo RK4: every force in one compiled callback against native springs"
     rows = [
         at_most(
             "price.callback.gap",
             SYSTEM,
-            what,
-            gap,
+            "MuJoCo RK4: every force in one compiled callback against native springs",
+            data["callback"]["RK4"]["gap"],
             "m, rad, m/s, rad/s",
             1e-12,
             "the same forces at the same stages, written twice",
@@ -203,64 +189,41 @@ def _speed_rows(data: dict[str, Any]) -> list[Row]:
     for integrator, found in data["callback"].items():
         for key, words in CALLBACKS.items():
             ratio, low, high = found[key]
-            rows.append(
-                aim(
-                    f"price.callback.{integrator}.{key.replace(' ', '-')}",
-                    SYSTEM,
-                    f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}",
-                    ratio,
-                    "times",
-                    1.2,
-                    why,
-                )
-            )
-    return rows + [_real_time(key, data["real time"][key], why) for key in ("with table", "without table")]
+            name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
+            what = f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}"
+            rows.append(aim(name, SYSTEM, what, ratio, "times", 1.2, ON_SECONDS))
+    return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
 
 
-def _real_time(key: str, found: tuple[float, float, float] | None, why: str) -> Row:
-    name, what = f"price.real-time.{key.replace(' ', '-')}", key.replace("table", "making its road table")
+def _real_time(key: str, found: tuple[float, float, float] | None) -> Row:
+    name = f"price.real-time.{key.replace(' ', '-')}"
+    what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
     if found is None:
-        return not_run(name, SYSTEM, f"reference RK4 at 1 ms, {what}", "other work of the machine hid the difference")
+        return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
     factor, low, high = found
-    return aim(
-        name,
-        SYSTEM,
-        f"reference RK4 at 1 ms, {what}, 95 % interval {low:,.0f} to {high:,.0f}",
-        factor,
-        "times real time",
-        1000.0,
-        why,
-        "at least",
-    )
+    told = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
+    return aim(name, SYSTEM, told, factor, "times real time", 1000.0, ON_SECONDS, "at least")
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
     found = [
         table
-        for one in data["problems"]
-        for table in (
-            *cost_tables(one["problem"], [cost.point(saved) for saved in one["points"]]),
-            *split.table(data["split"], one["problem"]["key"]),
-        )
+        for saved in data["problems"]
+        for table in (*cost_tables(runner.of_saved(saved)), *split.table(data["split"], saved["key"]))
     ]
     return [*found, ride.table(data["ride"])]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Saved) -> Drawn:
     """A work-precision figure per problem, and one of the routes of ride."""
-    return [
-        *(
-            (_caption(one["problem"]), draw_figure(one["problem"], [cost.point(saved) for saved in one["points"]]))
-            for one in data["problems"]
-        ),
-        ride.draw(data["ride"]),
-    ]
+    problems = map(runner.of_saved, data["problems"])
+    return [*((_caption(measured), draw_figure(measured)) for measured in problems), ride.draw(data["ride"])]
 
 
-def _caption(problem: dict[str, Any]) -> str:
+def _caption(measured: runner.Measured) -> str:
     return (
-        f"{problem['title']}: error over work and over seconds. Reference: {problem['reference']}. "
+        f"{measured.title}: error over work and over seconds. Reference: {measured.reference}. "
         "Colour is the engine, marker the method, line its order (solid from 4 up, dashed 2, dotted 1). "
-        f"{problem['note']}"
+        f"{measured.note}"
     )

@@ -5,12 +5,11 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from validation.common.rows import Row, System, Table, aim, at_most, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, finding, within
 from validation.price import unseen_systems
 from validation.price.unseen import ENGINES, Verdict, drawn, judge
 
@@ -32,7 +31,7 @@ MET, FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting holds its tolerance; bound of predicted by true error."""
 
 
-def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
     both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
     found, refused = [own for own, _ in both], [why for _, own in both for why in own]
@@ -144,7 +143,7 @@ def _slower(every: list[Verdict], kind: str) -> int:
     return sum(one.slower for one in every if one.kind == kind)
 
 
-def tables(data: dict[str, Any]) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Every scene with what was recommended over all engines."""
     rows = []
     for own in data["verdicts"]:
@@ -169,7 +168,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [Table("Recommendations for scenes drawn at random", note, heads, tuple(rows))]
 
 
-def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
+def draw(data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
     from models.drawing.figures import COLOURS, plt
 

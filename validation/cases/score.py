@@ -12,7 +12,7 @@ from models.drift.score import CHANNELS, errors
 from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
-from validation.common.rows import Data, Figures, Measured, Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, finding, within
 from validation.common.scenes import drive, force_scene
 from validation.hard_cases.case import IMPLEMENTATIONS
 
@@ -47,7 +47,7 @@ PROTOTYPE = {
 """Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
 
 
-def measure(quick: bool, folder: Path) -> Measured:
+def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
     rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]
     with TemporaryDirectory() as name:
@@ -174,7 +174,7 @@ def _graded(folder: Path, engines: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def _study(folder: Path) -> list[Data]:
+def _study(folder: Path) -> list[Saved]:
     """All rows of the study with its defaults, in all engines."""
     (folder / "study").mkdir()
     _, rows, failed = compare(load(SCENE), IMPLEMENTATIONS, folder / "study", lambda text, part: None)
@@ -182,7 +182,7 @@ def _study(folder: Path) -> list[Data]:
     return rows
 
 
-def _verdicts(found: list[Data]) -> list[Row]:
+def _verdicts(found: list[Saved]) -> list[Row]:
     """Known-good and known-bad runs get their words; the blind one is judged where it can know."""
     rows = []
     for row in found:
@@ -210,11 +210,11 @@ def _slug(name: str) -> str:
     return name.replace(" ", "-").replace("/", "-")
 
 
-def _id(row: Data) -> str:
+def _id(row: Saved) -> str:
     return ".".join((_slug(row["method"]), row["road"], row["engine"]))
 
 
-def _blind(found: list[Data]) -> list[Row]:
+def _blind(found: list[Saved]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
     return [
         within(
@@ -235,7 +235,7 @@ def _blind(found: list[Data]) -> list[Row]:
     ]
 
 
-def _long(folder: Path) -> list[Data]:
+def _long(folder: Path) -> list[Saved]:
     """The prototype's methods over 60 s at 1 kHz on the road, in the reference."""
     scene = load(SCENE, LONG)
     (folder / "long").mkdir()
@@ -243,12 +243,12 @@ def _long(folder: Path) -> list[Data]:
     return [_scored(bench, name) for name in PROTOTYPE]
 
 
-def _scored(bench: Bench, name: str, engine: str = "reference") -> Data:
+def _scored(bench: Bench, name: str, engine: str = "reference") -> Saved:
     effects = bench.methods[name]
     return bench.row(name, effects, bench.simulate(engine, effects))
 
 
-def _beside(long: list[Data]) -> list[Row]:
+def _beside(long: list[Saved]) -> list[Row]:
     """Pitch errors of 60 s beside the prototype's; a tumbled run has no damage to show."""
     rows = []
     for row in long:
@@ -277,7 +277,7 @@ def _beside(long: list[Data]) -> list[Row]:
     return rows
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """Every stabiliser on both roads, and the same over 60 s beside the prototype."""
     found = []
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
@@ -306,7 +306,7 @@ HEADINGS = (
 )
 
 
-def _cells(row: Data) -> tuple[str, ...]:
+def _cells(row: Saved) -> tuple[str, ...]:
     ratios = (row[f"damage {channel}"] for channel in CHANNELS)
     return (
         row.get("engine", "reference"),
@@ -322,7 +322,7 @@ def _cells(row: Data) -> tuple[str, ...]:
     )
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """The study's figure to decide from."""
     if not data["study"]:
         return []

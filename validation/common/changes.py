@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from models.core.errors import InputError
-from validation.common.rows import STATUSES, Row, of_saved
+from validation.common.rows import STATUSES, Row, Saved, of_saved
 
 ROUNDING = 1e-9
 """Relative change that rounding explains."""
@@ -15,10 +15,10 @@ NEGLIGIBLE = 1e-3
 KINDS = ("status", "gone", "new", "expected", "value")
 """In the order in which they are told: what passes or fails now, then what is judged otherwise, then values."""
 
-Change = dict[str, Any]
+Change = Saved
 
 
-def read(path: Path) -> dict[str, Any]:
+def read(path: Path) -> Saved:
     """Rows by id and provenance of an earlier ``results.json``, or of the folder that holds it; else InputError."""
     file = path / "results.json" if path.is_dir() else path
     try:
@@ -33,7 +33,7 @@ def read(path: Path) -> dict[str, Any]:
         raise InputError("--against", "", str(file), allowed) from None
 
 
-def _rows(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def _rows(content: Saved) -> dict[str, Saved]:
     """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
     rows = {row["id"]: of_saved({name: row[name] for name in Row.__dataclass_fields__}) for row in content["rows"]}
     if len(rows) < len(content["rows"]):
@@ -41,13 +41,13 @@ def _rows(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return rows
 
 
-def _provenance(content: dict[str, Any]) -> dict[str, Any]:
+def _provenance(content: Saved) -> Saved:
     """Where the rows are from, its tables as tables."""
     found = dict(content["provenance"])
     return found | {name: dict(found.get(name) or {}) for name in ("versions", "seeds")}
 
 
-def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[str, Any]) -> dict[str, Any]:
+def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
     """What ``results.json`` keeps of the comparison: with what, notes, all changes.
 
     source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
@@ -64,7 +64,7 @@ def against(earlier: dict[str, Any], rows: list[dict[str, Any]], source: dict[st
     }
 
 
-def _other(was: dict[str, Any], source: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+def _other(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
     """Versions, seeds, Python, machine and system that are not the same, in the order of the earlier report."""
     for name in ("versions", "seeds"):
         old, new = was.get(name) or {}, source.get(name) or {}
@@ -80,7 +80,7 @@ def _other(was: dict[str, Any], source: dict[str, Any]) -> Iterator[tuple[str, A
     )
 
 
-def changes(before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]) -> list[Change]:
+def changes(before: dict[str, Saved], after: dict[str, Saved]) -> list[Change]:
     """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
     found = [
         change
@@ -95,7 +95,7 @@ def _rank(status: Any) -> int:
     return STATUSES.index(status) if status in STATUSES else 0
 
 
-def _of(id: str, old: dict[str, Any] | None, new: dict[str, Any] | None) -> Iterator[Change]:
+def _of(id: str, old: Saved | None, new: Saved | None) -> Iterator[Change]:
     row = new or old or {}
 
     def change(kind: str, before: Any, after: Any, size: float = 0.0) -> Change:
@@ -134,7 +134,7 @@ def _differ(old: Any, new: Any) -> bool:
     return not (both_none or old == new or abs(new - old) <= ROUNDING * max(abs(old), abs(new)))
 
 
-def _size(old: dict[str, Any], new: dict[str, Any]) -> float:
+def _size(old: Saved, new: Saved) -> float:
     """Change of the value as a share of the tolerance, or of the value where there is none; 0 if only rounding."""
     was, now, tolerance = old["value"], new["value"], new["tolerance"]
     if not _differ(was, now):
@@ -147,7 +147,7 @@ def _size(old: dict[str, Any], new: dict[str, Any]) -> float:
     return abs(now - was) / max(abs(was), abs(now))
 
 
-def lines(found: dict[str, Any]) -> list[str]:
+def lines(found: Saved) -> list[str]:
     """The comparison as text, changed rows first."""
     own = found["changes"]
     names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)

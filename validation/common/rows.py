@@ -47,12 +47,12 @@ class Row:
         return asdict(self)
 
 
-Data = dict[str, Any]
-"""What a case keeps for its tables and figures, by name."""
-Measured = tuple[list[Row], Data]
-"""What a case gives: rows and data."""
-Figures = list[tuple[str, Any]]
-"""Captions and figures of a case."""
+Saved = dict[str, Any]
+"""What a case saves beside its rows, as JSON keeps it."""
+CaseAnswer = tuple[list[Row], Saved]
+"""What a case answers when it is measured."""
+Drawn = list[tuple[str, Any]]
+"""Captions and figures that a case shows."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from validation.common.rows import Data, Figures, Row, Table, finding, within
+from validation.common.rows import Drawn, Row, Saved, Table, finding, within
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
@@ -23,13 +23,13 @@ HIDDEN = (
 
 def measure(
     faults: Sequence[Fault] = FAULTS, clean: Sequence[Fault] = CLEAN, vehicles: Sequence[str] = (TWIN, SYMMETRIC)
-) -> Data:
+) -> Saved:
     """Records of engines without a fault and with each of some, on some vehicles, under every check."""
     benches = [Bench(name, DURATION) for name in vehicles]
     return {name: [_record(fault, benches) for fault in own] for name, own in (("clean", clean), ("faults", faults))}
 
 
-def _record(fault: Fault, benches: list[Bench]) -> Data:
+def _record(fault: Fault, benches: list[Bench]) -> Saved:
     """Size over tolerance of every check, by vehicle and engine; None stands for a refused or failed run."""
     ratios = {
         bench.parameters: {
@@ -50,27 +50,27 @@ def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
 PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
 
 
-def seen(record: Data, check: str, vehicle: str = TWIN) -> bool:
+def seen(record: Saved, check: str, vehicle: str = TWIN) -> bool:
     """Whether a check sees the fault in every engine that it was planted in."""
     return all(ratio is None or ratio > 1 for ratio in _of(record, check, vehicle))
 
 
-def least(record: Data, check: str, vehicle: str) -> float:
+def least(record: Saved, check: str, vehicle: str) -> float:
     """Smallest size over tolerance among the engines; infinite for refused runs."""
     return min(math.inf if ratio is None else ratio for ratio in _of(record, check, vehicle))
 
 
-def _of(record: Data, check: str, vehicle: str) -> list[float | None]:
+def _of(record: Saved, check: str, vehicle: str) -> list[float | None]:
     return [ratios[check] for ratios in record["ratios"][vehicle].values()]
 
 
-def caught(record: Data, vehicle: str = TWIN) -> bool:
+def caught(record: Saved, vehicle: str = TWIN) -> bool:
     """Whether in every engine at least one check sees the fault."""
     engines = record["ratios"][vehicle].values()
     return all(any(ratio is None or ratio > 1 for ratio in ratios.values()) for ratios in engines)
 
 
-def rows(data: Data) -> list[Row]:
+def rows(data: Saved) -> list[Row]:
     """Caught, false alarms, hidden by symmetry where both vehicles ran, and what one check alone catches."""
     clean, found = data["clean"], data["faults"]
     alarms = sum(
@@ -119,12 +119,12 @@ def rows(data: Data) -> list[Row]:
     ]
 
 
-def _both(data: Data) -> bool:
+def _both(data: Saved) -> bool:
     """Whether the symmetric vehicle ran, too."""
     return all(SYMMETRIC in record["ratios"] for record in data["faults"])
 
 
-def _hidden(found: list[Data]) -> Row:
+def _hidden(found: list[Saved]) -> Row:
     missed = [record for record in found if not caught(record, SYMMETRIC)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
     return within(
@@ -140,7 +140,7 @@ def _hidden(found: list[Data]) -> Row:
     )
 
 
-def lines(data: Data) -> list[tuple[str, ...]]:
+def lines(data: Saved) -> list[tuple[str, ...]]:
     """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
     return [
         (
@@ -154,12 +154,12 @@ def lines(data: Data) -> list[tuple[str, ...]]:
     ]
 
 
-def tables(data: Data) -> list[Table]:
+def tables(data: Saved) -> list[Table]:
     """The checks with their tolerances, and every fault with what sees it."""
     return [_check_table(data), _fault_table(data)]
 
 
-def _check_table(data: Data) -> Table:
+def _check_table(data: Saved) -> Table:
     lines = []
     for name, check in CHECKS.items():
         worst = max(
@@ -186,7 +186,7 @@ def _check_table(data: Data) -> Table:
     return Table("The checks", note, headings, tuple(lines))
 
 
-def _fault_table(data: Data) -> Table:
+def _fault_table(data: Saved) -> Table:
     lines = tuple(
         (
             record["fault"],
@@ -209,7 +209,7 @@ def _fault_table(data: Data) -> Table:
     )
 
 
-def _size(record: Data, name: str) -> str:
+def _size(record: Saved, name: str) -> str:
     """The smaller size among the engines, from its ratio to the tolerance."""
     sizes = [
         math.inf if ratios[name] is None else ratios[name] * CHECKS[name].tolerance(engine)
@@ -219,7 +219,7 @@ def _size(record: Data, name: str) -> str:
     return "refused" if least == math.inf else f"{least:.0e}" if least < 0.01 else f"{least:.2g}"
 
 
-def draw(data: Data) -> Figures:
+def draw(data: Saved) -> Drawn:
     """How far above its tolerance each check stands, fault by fault, on both vehicles where both ran."""
     if not _both(data):
         return []

@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from models.advice.price import curves
-from models.advice.price import runner as cost
-from models.advice.price.runner import Point, by_curve
+from models.advice.price.runner import Measured, Point
 from models.drawing.figures import COLOURS, plt
-from validation.price.tables import groups_of, named, quantity_of
+from validation.price.tables import named
 
+Style = dict[str, Any]
 SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 """Markers of methods that several engines have."""
 MARKERS = "s^v<>PXhp*d"
@@ -29,39 +28,42 @@ SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 """Coinciding curves show as rings within each other."""
 ONCE = 0.5
 """Size of a marker whose seconds are those of one run, by that of the others."""
+FRONT: Style = {"color": "#f0c808", "linewidth": 9, "alpha": 0.45}
+LABEL = np.array([0.27, 0.09])
+"""Width and height of a default's name, in fractions of the panel."""
+CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.linspace(0.2, 0.92, 17)])
+"""Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
-def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
+def draw(measured: Measured) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
     figure, axes = plt.subplots(1, 2, figsize=(12.5, 8.4), sharey=True)
-    styles = _styles(points)
-    top = _top(problem, points)
-    for ax, kind in zip(axes, cost.costs(points), strict=True):
-        _floor(ax, problem)
-        _front(ax, problem, points, kind)
-        for curve, own in by_curve(points).items():
-            _curve(ax, problem, own, kind, styles[curve])
+    styles = _styles(measured)
+    top = 6 * max(measured.error(p) for p in measured.points if p.status == "ok")
+    rounds = max(len(p.seconds) for p in measured.points)
+    several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
+    for ax, kind in zip(axes, measured.costs, strict=True):
+        _floor(ax, measured)
+        _front(ax, measured, kind)
+        for curve, points in measured.curves().items():
+            _curve(ax, measured, points, kind, styles[curve])
         timed = kind == "seconds"
         label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        rounds = max(len(p.seconds) for p in points)
-        several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
         ax.set_title(f"by {kind}, {several if timed else 'exact'}")
-    _failures(axes[0], points, top)
-    quantity = quantity_of(problem)
-    axes[0].set_ylabel(f"error of the {quantity} [{problem['units'][quantity]}]")
-    axes[0].set_ylim(0.3 * problem["uncertainty"][quantity], 12 * top)
-    for ax, kind in zip(axes, cost.costs(points), strict=True):
-        _defaults(ax, problem, points, kind)
-    alike = "; ".join(named(group[0], [group]) for group in groups_of(problem, points))
-    title = fill(f"What accuracy costs. {problem['title']}", 120)
+    _failures(axes[0], measured, top)
+    axes[0].set_ylabel(f"error of the {measured.quantity} [{measured.unit}]")
+    axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 12 * top)
+    for ax, kind in zip(axes, measured.costs, strict=True):
+        _defaults(ax, measured, kind)
+    alike = "; ".join(named(group[0], [group]) for group in measured.same())
+    title = fill(f"What accuracy costs. {measured.title}", 120)
     same = fill(f"Same error at the same setting: {alike}.", 165) if alike else ""
     figure.suptitle(title + "\n" * (1 + same.count("\n")), x=0.01, ha="left", fontsize=12)
     figure.text(0.011, 0.98 - 0.026 * (1 + title.count("\n")), same, va="top", fontsize=9, color="#333333")
-    handles = _legend(points, styles)
-    longest = max(len(str(handle.get_label())) for handle in handles[: len(styles)])
+    longest = max(map(len, map(named, styles)))
     figure.legend(
-        handles=handles,
+        handles=_legend(measured, styles),
         loc="outside lower center",
         ncols=5 if longest <= LONGEST else 4,
         fontsize=8.5,
@@ -70,93 +72,63 @@ def draw(problem: dict[str, Any], points: list[Point]) -> Figure:
     return figure
 
 
-def _styles(points: list[Point]) -> dict[str, dict[str, Any]]:
+def _styles(measured: Measured) -> dict[str, Style]:
     """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
-    found: dict[str, dict[str, Any]] = {}
-    for own in by_curve(points).values():
-        one = own[0].setting
-        colour = _colour(one.engine, points)
+    found: dict[str, Style] = {}
+    for curve, (first, *_) in measured.curves().items():
+        setting, colour = first.setting, _colour(first, measured)
         used = {style["marker"] for style in found.values() if style["color"] == colour}
-        marker = SHARED.get(one.method) or next((m for m in MARKERS if m not in used), ".")
-        found[one.curve] = {
-            "color": colour,
-            "marker": marker,
-            "linestyle": STYLES.get(one.order, "-"),
-            "markersize": SIZES.get(one.engine, 5),
-        }
+        marker = SHARED.get(setting.method) or next((m for m in MARKERS if m not in used), ".")
+        line, size = STYLES.get(setting.order, "-"), SIZES.get(setting.engine, 5)
+        found[curve] = {"color": colour, "marker": marker, "linestyle": line, "markersize": size}
     return found
 
 
-def _colour(engine: str, points: list[Point]) -> str:
-    """That of an implementation, or else the next of MORE."""
-    others = [one for one in dict.fromkeys(p.setting.engine for p in points) if one not in COLOURS]
+def _colour(point: Point, measured: Measured) -> str:
+    """That of its implementation, or else the next of MORE."""
+    engine = point.setting.engine
+    others = [name for name in dict.fromkeys(p.setting.engine for p in measured.points) if name not in COLOURS]
     return COLOURS[engine] if engine in COLOURS else MORE[others.index(engine) % len(MORE)]
 
 
-def _top(problem: dict[str, Any], points: list[Point]) -> float:
-    """Height at which failures are drawn: above every error."""
-    return 6 * max(p.errors[quantity_of(problem)] for p in points if p.status == "ok")
-
-
-def _curve(ax: Axes, problem: dict[str, Any], own: list[Point], kind: str, style: dict[str, Any]) -> None:
+def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: Style) -> None:
     """One curve; points that the reference cannot judge are hollow."""
-    quantity = quantity_of(problem)
-    costs, errors = [p.cost(kind) for p in own], [p.errors[quantity] for p in own]
-    floor = curves.HOLLOW * problem["uncertainty"][quantity]
-    ax.plot(costs, errors, **{**style, "marker": "none"}, alpha=0.75)
+    places = [(p.cost(kind), measured.error(p)) for p in points]
+    ax.plot(*zip(*places, strict=True), **{**style, "marker": "none"}, alpha=0.75)
     alike = defaultdict(list)
-    for p, place in zip(own, zip(costs, errors, strict=True), strict=True):
-        alike[place[1] < floor, kind == "seconds" and p.changed is None].append(place)
+    for p, place in zip(points, places, strict=True):
+        alike[place[1] < measured.floor(), kind == "seconds" and p.changed is None].append(place)
     for (hollow, once), some in alike.items():
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (ONCE if once else 1.0)}
-        ax.plot(
-            *zip(*some, strict=True), **look, markerfacecolor="white" if hollow else style["color"], markeredgewidth=0.9
-        )
+        face = "white" if hollow else style["color"]
+        ax.plot(*zip(*some, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
 
 
-def _floor(ax: Axes, problem: dict[str, Any]) -> None:
+def _floor(ax: Axes, measured: Measured) -> None:
     """The band in which the reference itself is not certain."""
-    own = problem["uncertainty"][quantity_of(problem)]
-    unit = problem["units"][quantity_of(problem)]
-    ax.axhspan(1e-30, own, color="#bbbbbb", alpha=0.6, zorder=0, linewidth=0)
-    ax.axhspan(own, curves.HOLLOW * own, color="#bbbbbb", alpha=0.25, zorder=0, linewidth=0)
-    ax.text(
-        0.015,
-        0.012,
-        f"reference known to {own:.1g} {unit} (dark);\nbelow ten times that: hollow",
-        transform=ax.transAxes,
-        ha="left",
-        va="bottom",
-        fontsize=8,
-        color="#555555",
-    )
+    own = measured.uncertainty[measured.quantity]
+    for low, high, alpha in ((1e-30, own, 0.6), (own, measured.floor(), 0.25)):
+        ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
+    told = f"reference known to {own:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
+    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=8, color="#555555")
 
 
-def _front(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
+def _front(ax: Axes, measured: Measured, kind: str) -> None:
     """The settings that no other one beats, as a broad pale line behind the curves."""
-    quantity = quantity_of(problem)
-    front = cost.front(points, quantity, problem["uncertainty"][quantity], kind)
-    ax.plot(
-        [p.cost(kind) for p in front],
-        [p.errors[quantity] for p in front],
-        color="#f0c808",
-        linewidth=9,
-        alpha=0.45,
-        solid_capstyle="round",
-        zorder=1,
-    )
+    front = measured.front(kind)
+    costs = [p.cost(kind) for p in front]
+    ax.plot(costs, list(map(measured.error, front)), **FRONT, solid_capstyle="round", zorder=1)
 
 
-def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str) -> None:
+def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
     """Ring and name each engine's default setting, where the panel is emptiest."""
-    quantity = quantity_of(problem)
-    found = [(owner, p) for owner, p in cost.defaults(points).items() if p.status == "ok"]
     taken = _drawn(ax)
-    for owner, p in found:
-        place = (p.cost(kind), p.errors[quantity])
-        ax.plot(
-            *place, "o", markersize=15, markerfacecolor="none", markeredgecolor="#111111", markeredgewidth=1.4, zorder=5
-        )
+    ring: Style = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "#111111", "markeredgewidth": 1.4}
+    for owner, p in measured.defaults.items():
+        if p.status != "ok":
+            continue
+        place = (p.cost(kind), measured.error(p))
+        ax.plot(*place, "o", **ring, zorder=5)
         corner = _emptiest(taken, _within(ax, [place])[0])
         taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])])
         ax.annotate(
@@ -172,12 +144,6 @@ def _defaults(ax: Axes, problem: dict[str, Any], points: list[Point], kind: str)
         )
 
 
-LABEL = np.array([0.27, 0.09])
-"""Width and height of a default's name, in fractions of the panel."""
-CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.linspace(0.2, 0.92, 17)])
-"""Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
-
-
 def _within(ax: Axes, places: Any) -> np.ndarray:
     """Fractions of the panel (n, 2) of places in its units (n, 2)."""
     return np.asarray((ax.transData - ax.transAxes).transform(np.asarray(places, float)))
@@ -188,7 +154,7 @@ def _drawn(ax: Axes) -> np.ndarray:
     found = [np.empty((0, 2))]
     for line in ax.get_lines():
         ends = _within(ax, line.get_xydata())
-        found += [one + (two - one) * np.linspace(0.0, 1.0, 9)[:, None] for one, two in pairwise(ends)] + [ends]
+        found += [a + (b - a) * np.linspace(0.0, 1.0, 9)[:, None] for a, b in pairwise(ends)] + [ends]
     return np.vstack(found)
 
 
@@ -201,52 +167,49 @@ def _emptiest(taken: np.ndarray, own: np.ndarray) -> np.ndarray:
     return np.asarray(CORNERS[np.argmax(clear - 0.3 * far)])
 
 
-def _failures(ax: Axes, points: list[Point], top: float) -> None:
+def _failures(ax: Axes, measured: Measured, top: float) -> None:
     """A cross where each failed setting would have stood: stages times steps on the cost axis."""
-    failed = [p for p in points if p.status != "ok"]
+    failed = [p for p in measured.points if p.status != "ok"]
     for p in failed:
-        calls = _expected(p, points)
-        if calls:
+        if calls := _expected(p, measured):
             size = 1.4 * SIZES.get(p.setting.engine, 5)
-            ax.plot(calls, top, "x", color=_colour(p.setting.engine, points), markersize=size, markeredgewidth=1.6)
+            ax.plot(calls, top, "x", color=_colour(p, measured), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
         ax.annotate(text, (0.995, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=8)
 
 
-def _expected(p: Point, points: list[Point]) -> float:
+def _expected(p: Point, measured: Measured) -> float:
     """What a failed setting cost, or one with fixed steps would have, from its neighbours on the curve."""
-    own = by_curve(points).get(p.setting.curve)
+    work = measured.costs[0]
     if p.counts:
-        return p.cost(cost.costs(points)[0])
-    if not own or p.setting.adaptive:
-        return 0.0
-    return own[0].cost(cost.costs(points)[0]) * own[0].setting.value / p.setting.value
+        return p.cost(work)
+    first = next(iter(measured.curves().get(p.setting.curve, ())), None)
+    return 0.0 if first is None or p.setting.adaptive else first.cost(work) * first.setting.value / p.setting.value
 
 
 def _who(failed: list[Point], status: str) -> str:
     """Methods without an answer, those with none at all named."""
-    own = [p for p in failed if p.status == status]
+    alike = [p for p in failed if p.status == status]
     if status == "flagged":
-        return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in own))
-    unstable = [p for p in own if not p.setting.adaptive]
+        return ", ".join(dict.fromkeys(f"{p.setting.curve} (cross, see table)" for p in alike))
+    unstable = sum(not p.setting.adaptive for p in alike)
     what = "beyond stability, steps" if status == "refused" else "settings"
-    parts = [f"{what}: {len(unstable)} (crosses)"] if unstable else []
+    parts = [f"{what}: {unstable} (crosses)"] if unstable else []
     parts += [
         f"{p.setting.method} ({'not implemented' if 'not implemented' in p.reason else 'see table'})"
-        for p in own
+        for p in alike
         if p.setting.adaptive
     ]
     return ", ".join(parts)
 
 
-def _legend(points: list[Point], styles: dict[str, dict[str, Any]]) -> list[Line2D]:
+def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
     """A handle per curve, then what is not a curve."""
-    handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in by_curve(points)]
-    handles.sort(key=lambda handle: str(handle.get_label()))
-    front = "no other setting is better (Pareto)"
-    handles.append(Line2D([], [], color="#f0c808", linewidth=9, alpha=0.45, label=front))
-    if any(p.status != "ok" for p in points):
+    names = sorted(styles, key=named)
+    handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
+    handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
+    if any(p.status != "ok" for p in measured.points):
         failed = "no answer to rely on"
         handles.append(Line2D([], [], color="#777777", marker="x", linestyle="none", label=failed))
     return handles

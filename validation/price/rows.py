@@ -1,9 +1,8 @@
 """Rows that every work-precision problem answers for."""
 
-from models.advice.price import runner as cost
 from models.advice.price.curves import Reach
 from models.advice.price.problem import Problem, Setting
-from models.advice.price.runner import Point
+from models.advice.price.runner import Measured, Point, attempt, cheapest
 from validation.common.rows import Row, System, at_most, finding, within
 from validation.price.tables import named
 
@@ -19,34 +18,55 @@ PROMISE = 1.25
 """Allowed error at an interpolated cheapest setting, by its tolerance: curves bend between two settings."""
 
 
-def rows_of(problem: Problem, points: list[Point], quick: bool) -> list[Row]:
+def rows_of(problem: Problem, measured: Measured, quick: bool) -> list[Row]:
     """All rows of one problem; the width of the sweep is asked of the full run only."""
-    rows = [
-        _reference(problem),
-        *_orders(problem, points),
-        _silent(problem, points),
-        _counts(problem, points),
-        _repeat(problem, points),
+    points, repeated = measured.points, [p for p in measured.points if p.changed is not None]
+    return [
+        _reference(problem, measured),
+        *_orders(measured),
+        _none_of(
+            f"price.{problem.key}.silent",
+            f"wrong answers without a word, of {len(points)} settings",
+            [_label(p) for p in points if p.status == "SILENT"],
+            f"an error that is not finite, or beyond {problem.bound:.3g} {measured.unit}, must come with an exception",
+        ),
+        _none_of(
+            f"price.{problem.key}.counts.said",
+            "settings whose force calls are not stages times steps",
+            measured.miscounted(),
+            "exact: stages from the methods' tableaux",
+        ),
+        _none_of(
+            f"price.{problem.key}.counts.repeat",
+            f"settings that count or err otherwise in the last round, of {len(repeated)} that have rounds",
+            [_label(p) for p in repeated if p.changed],
+            "exact: all counts, and errors to the last digit",
+        ),
+        _promises(problem, measured),
+        *([] if quick else [_sweep(measured)]),
+        *_losses(measured),
     ]
-    rows += [_promises(problem, points)] if quick else [_promises(problem, points), _sweep(problem, points)]
-    return rows + _losses(problem, points)
 
 
-def _quantity(problem: Problem) -> tuple[str, str]:
-    """Name and unit of what tolerances are set on."""
-    return next(iter(problem.units.items()))
+def _label(p: Point) -> str:
+    return f"{p.setting.curve} {p.setting.label()}"
 
 
-def _reference(problem: Problem) -> Row:
+def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
+    """Row that passes if a list of offenders is empty, and names them if it is not."""
+    offenders = f": {', '.join(found)}" if found else ""
+    return within(name, SYSTEM, what + offenders, len(found), "settings", 0, 0, why, "closed form")
+
+
+def _reference(problem: Problem, measured: Measured) -> Row:
     """The reference must know more than the finest tolerance asks."""
-    quantity, unit = _quantity(problem)
-    share = getattr(problem, "sure", SURE)
+    quantity, share = measured.quantity, getattr(problem, "sure", SURE)
     return at_most(
         f"price.{problem.key}.reference",
         SYSTEM,
         f"uncertainty of the reference ({problem.reference}), {quantity}",
         problem.uncertainty[quantity],
-        unit,
+        measured.unit,
         share * min(problem.tolerances),
         "what the reference states of itself or solvers of different "
         f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
@@ -54,87 +74,40 @@ def _reference(problem: Problem) -> Row:
     )
 
 
-def _orders(problem: Problem, points: list[Point]) -> list[Row]:
+def _orders(measured: Measured) -> list[Row]:
     """Observed order of every fixed-step method that declares one, for every quantity."""
-    rows = []
-    for quantity in problem.units:
-        for curve, found in cost.orders(points, quantity, problem.uncertainty[quantity]).items():
-            setting = cost.by_curve(points)[curve][0].setting
-            if setting.adaptive or not setting.order:
-                continue
-            name = f"price.{problem.key}.order.{quantity}.{curve}".replace(" ", "-")
-            what = f"observed order of the largest {quantity} error, {named(curve)}"
-            rows.append(
-                within(
-                    name,
-                    SYSTEM,
-                    what,
-                    found,
-                    "",
-                    setting.order,
-                    BANDS[setting.order],
-                    "slope on the three finest steps that stand clear of the reference; the next power of "
-                    "the step still shows in it",
-                    "closed form",
-                )
-            )
-    return rows
+    settings = {p.setting.curve: p.setting for p in measured.points}
+    return [
+        within(
+            f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
+            SYSTEM,
+            f"observed order of the largest {quantity} error, {named(curve)}",
+            found,
+            "",
+            setting.order,
+            BANDS[setting.order],
+            "slope on the three finest steps that stand clear of the reference; the next power of "
+            "the step still shows in it",
+            "closed form",
+        )
+        for quantity in measured.units
+        for curve, found in measured.orders(quantity).items()
+        if (setting := settings[curve]).order and not setting.adaptive
+    ]
 
 
-def _silent(problem: Problem, points: list[Point]) -> Row:
-    """No wrong answer without a word."""
-    silent = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.status == "SILENT"]
-    unit = _quantity(problem)[1]
-    return _none_of(
-        f"price.{problem.key}.silent",
-        f"wrong answers without a word, of {len(points)} settings",
-        silent,
-        f"an error that is not finite, or beyond {problem.bound:.3g} {unit}, must come with an exception",
-    )
-
-
-def _counts(problem: Problem, points: list[Point]) -> Row:
-    """What adapters say about steps and force calls."""
-    return _none_of(
-        f"price.{problem.key}.counts.said",
-        "settings whose force calls are not stages times steps",
-        cost.miscounted(points, problem.duration),
-        "exact: stages from the methods' tableaux",
-    )
-
-
-def _repeat(problem: Problem, points: list[Point]) -> Row:
-    """A run that is repeated counts the same and errs by the same."""
-    changed = [f"{p.setting.curve} {p.setting.label()}" for p in points if p.changed]
-    again = sum(p.changed is not None for p in points)
-    return _none_of(
-        f"price.{problem.key}.counts.repeat",
-        f"settings that count or err otherwise in the last round, of {again} that have rounds",
-        changed,
-        "exact: all counts, and errors to the last digit",
-    )
-
-
-def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
-    """Row that passes if a list of offenders is empty, and names them if it is not."""
-    named_ones = f": {', '.join(found)}" if found else ""
-    return within(name, SYSTEM, what + named_ones, len(found), "settings", 0, 0, why, "closed form")
-
-
-def _promises(problem: Problem, points: list[Point]) -> Row:
+def _promises(problem: Problem, measured: Measured) -> Row:
     """Run the winners of the table of cheapest settings: their error must be what the table promises."""
-    quantity, _ = _quantity(problem)
     worst = 0.0
     for target in problem.tolerances:
-        best = cost.cheapest(cost.reaches(points, quantity, target, cost.costs(points)[0]))
+        best = cheapest(measured.reaches(target, measured.costs[0]))
         if best is not None:
-            found = cost.attempt(problem, _runnable(problem, points, *best))
-            worst = max(worst, found.errors.get(quantity, float("inf")) / target)
-    what = "error of the table's cheapest settings by their tolerance, each of them run, largest"
+            found = attempt(problem, _runnable(problem, measured, *best))
+            worst = max(worst, found.errors.get(measured.quantity, float("inf")) / target)
     return within(
         f"price.{problem.key}.cheapest",
         SYSTEM,
-        what,
+        "error of the table's cheapest settings by their tolerance, each of them run, largest",
         worst,
         "",
         0.0,
@@ -144,58 +117,53 @@ def _promises(problem: Problem, points: list[Point]) -> Row:
     )
 
 
-def _runnable(problem: Problem, points: list[Point], curve: str, one: Reach) -> Setting:
+def _runnable(problem: Problem, measured: Measured, curve: str, least: Reach) -> Setting:
     """The setting that the table names, a fixed step as the nearest one that divides the run."""
-    like = cost.by_curve(points)[curve][0].setting
-    value = one.value if like.adaptive else problem.duration / round(problem.duration / one.value)
+    like = measured.curves()[curve][0].setting
+    value = least.value if like.adaptive else problem.duration / round(problem.duration / least.value)
     return problem.setting(like.engine, like.method, value)
 
 
-def _sweep(problem: Problem, points: list[Point]) -> Row:
+def _sweep(measured: Measured) -> Row:
     """Six settings of each method, and from order 4 up four decades of them, or of error where nothing ends a curve."""
-    quantity, _ = _quantity(problem)
-    tried = cost.by_curve(points, None)
-    short = []
-    for curve, own in cost.by_curve(points).items():
-        ends = own[0], own[-1]
-        wide = any(a >= 1e4 * b for a, b in ([p.errors[quantity] for p in ends], [p.setting.value for p in ends]))
-        ended = tried[curve][0].status != "ok" or own[0].setting.cells
-        whole = ended and own[-1].errors[quantity] <= min(problem.tolerances)
-        settled = len(own) > 1 and own[-1].errors[quantity] >= SETTLED * own[-2].errors[quantity]
-        low = 0 < (own[0].setting.order or own[0].setting.nominal) < 4
-        if len(own) < 6 or not (wide or whole or settled or low):
+    tried, short = measured.curves(None), []
+    for curve, points in measured.curves().items():
+        errors, setting = list(map(measured.error, points)), points[0].setting
+        wide = errors[0] >= 1e4 * errors[-1] or setting.value >= 1e4 * points[-1].setting.value
+        ended = tried[curve][0].status != "ok" or setting.cells
+        whole = ended and errors[-1] <= min(measured.tolerances)
+        settled = len(points) > 1 and errors[-1] >= SETTLED * errors[-2]
+        low = 0 < (setting.order or setting.nominal) < 4
+        if len(points) < 6 or not (wide or whole or settled or low):
             short.append(curve)
     what = (
         "methods with fewer than 6 settings that answered, or from order 4 up with fewer than 4 decades of them or "
         "of error although coarser settings answer, or the finest tolerance is not met and the error still falls"
     )
-    return _none_of(f"price.{problem.key}.sweep", what, short, "what the study was asked to cover")
+    return _none_of(f"price.{measured.key}.sweep", what, short, "what the study was asked to cover")
 
 
-def _losses(problem: Problem, points: list[Point]) -> list[Row]:
+def _losses(measured: Measured) -> list[Row]:
     """What each default loses at the middle tolerance."""
-    target = cost.middle(problem.tolerances)
     return [
         row
-        for owner, p in cost.defaults(points).items()
+        for owner, p in measured.defaults.items()
         if p.status == "ok"
         for among, words in ((p.setting.engine, f"{owner}'s own cheapest"), ("", "the cheapest of all"))
-        for kind in cost.costs(points)
-        for row in _loss(problem, points, owner, p, target, among, words, kind)
+        for kind in measured.costs
+        for row in _loss(measured, owner, among, words, kind)
     ]
 
 
-def _loss(
-    problem: Problem, points: list[Point], owner: str, p: Point, target: float, among: str, words: str, kind: str
-) -> list[Row]:
-    quantity, unit = _quantity(problem)
-    one = cost.loss(points, quantity, target, kind, p.setting.curve, among)
-    if one is None:
+def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> list[Row]:
+    target, unit, p = measured.middle, measured.unit, measured.defaults[owner]
+    lost = measured.loss(target, kind, p.setting.curve, among)
+    if lost is None:
         return []
-    how = ", extrapolated by its order" if one.how == "extrapolated" else ""
-    name = f"price.{problem.key}.default.{p.setting.engine}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
-    told = f"95 % interval {one.low:.3g} to {one.high:.3g}" if one.low <= one.high else "too few rounds to tell"
+    how = ", extrapolated by its order" if lost.how == "extrapolated" else ""
+    name = f"price.{measured.key}.default.{p.setting.engine}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
+    told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     bounds = told if kind == "seconds" else "exact"
     what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
-    why = f"at its default {p.setting.label()} its error is {p.errors[quantity]:.3g} {unit}"
-    return [finding(name, SYSTEM, what, one.factor, "times", bounds, why, "none")]
+    why = f"at its default {p.setting.label()} its error is {measured.error(p):.3g} {unit}"
+    return [finding(name, SYSTEM, what, lost.factor, "times", bounds, why, "none")]

@@ -23,7 +23,7 @@ from models.machine.compiled import njit
 from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
 from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import Row, System, Table, finding
+from validation.common.rows import Row, Saved, System, Table, finding
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
@@ -71,25 +71,18 @@ def handed() -> Of:
     return of
 
 
+ZEROS = [0.0] * 4
+
+
 def nothing(positions: Any, rates: Any) -> Any:
     """No forces, whatever the state."""
     return ZEROS
 
 
-ZEROS = [0.0] * 4
+Runs = list[Callable[[], Any]]
 
 
-def marches() -> dict[tuple[str, str], list[Callable[[], Any]]]:
-    """The three runs by problem and engine."""
-    return {
-        ("road", "exudyn"): _road_exudyn(),
-        ("road", "mujoco"): _road_mujoco(),
-        ("wheel-20", "exudyn"): _wheel_exudyn(),
-        ("wheel-20", "mujoco"): _wheel_mujoco(),
-    }
-
-
-def _road_exudyn() -> list[Callable[[], Any]]:
+def _road_exudyn() -> Runs:
     """The vehicle on a road that is flat: its forces by the reference's own right-hand side."""
     assembly = assemble(road_excited.scene())
     p, y, road = assembly.parameters.array(), np.empty(8), np.zeros(4)
@@ -105,13 +98,13 @@ def _road_exudyn() -> list[Callable[[], Any]]:
     ]
 
 
-def _road_mujoco() -> list[Callable[[], Any]]:
+def _road_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assemble(road_excited.scene()), settings)
     return [partial(_within, one, compiled.coast) for one in (empty_law(), native_law(damper), law())]
 
 
-def _wheel_exudyn() -> list[Callable[[], Any]]:
+def _wheel_exudyn() -> Runs:
     wheels, steps, step = _wheels()
     return [
         partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
@@ -119,7 +112,7 @@ def _wheel_exudyn() -> list[Callable[[], Any]]:
     ]
 
 
-def _wheel_mujoco() -> list[Callable[[], Any]]:
+def _wheel_mujoco() -> Runs:
     wheels, steps, step = _wheels()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
@@ -137,62 +130,66 @@ def _within(callback: Any, run: Callable[[], Any]) -> None:
         run()
 
 
-def measure(rounds: int, least: float) -> list[dict[str, Any]]:
+MARCHES = {
+    ("road", "exudyn"): _road_exudyn,
+    ("road", "mujoco"): _road_mujoco,
+    ("wheel-20", "exudyn"): _wheel_exudyn,
+    ("wheel-20", "mujoco"): _wheel_mujoco,
+}
+"""What makes the three runs, by problem and engine."""
+
+
+def measure(rounds: int, least: float) -> list[Saved]:
     """Seconds of the three runs in every round, by problem and engine."""
-    found = marches()
-    seconds = interleave([job for jobs in found.values() for job in jobs], rounds, least)
+    seconds = interleave([job for make in MARCHES.values() for job in make()], rounds, least)
     return [
-        {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, own.tolist(), strict=True))}
-        for (problem, engine), own in zip(found, seconds.reshape(len(found), 3, -1), strict=True)
+        {"problem": problem, "engine": engine, "seconds": dict(zip(RUNS, rows.tolist(), strict=True))}
+        for (problem, engine), rows in zip(MARCHES, seconds.reshape(len(MARCHES), 3, -1), strict=True)
     ]
 
 
-def parts(saved: dict[str, Any]) -> np.ndarray:
+def parts(saved: Saved) -> np.ndarray:
     """Microseconds a step of engine, bridge and kernel (3,), by the medians of the rounds."""
     empty, cheap, real = (1e6 * float(np.median(saved["seconds"][run])) / STEPS[saved["problem"]] for run in RUNS)
     return np.array([empty, cheap - empty, real - cheap])
 
 
-def share(saved: dict[str, Any]) -> tuple[float, float, float]:
+def share(saved: Saved) -> tuple[float, float, float]:
     """The bridge's share of a step in % with its 95 % interval, by the medians of resampled rounds."""
     empty, cheap, real = (np.array(saved["seconds"][run]) for run in RUNS)
     return median(100.0 * (cheap - empty) / real)
 
 
-def rows(data: list[dict[str, Any]]) -> list[Row]:
+def rows(data: list[Saved]) -> list[Row]:
     """The bridge's share, reported."""
-    found = []
-    for one in data:
-        middle, low, high = share(one)
-        what = f"{LABELS[one['engine']]} {METHODS[one['engine']]}, {one['problem']}: the bridge's share of a step"
-        found.append(
-            finding(
-                f"price.{one['problem']}.split.{one['engine']}",
-                SYSTEM,
-                what,
-                middle,
-                "%",
-                f"95 % interval {low:.0f} to {high:.0f}",
-                "seconds are reported and never gated",
-                "none",
-            )
+    return [
+        finding(
+            f"price.{saved['problem']}.split.{saved['engine']}",
+            SYSTEM,
+            f"{_named(saved)}, {saved['problem']}: the bridge's share of a step",
+            middle,
+            "%",
+            f"95 % interval {low:.0f} to {high:.0f}",
+            "seconds are reported and never gated",
+            "none",
         )
-    return found
+        for saved in data
+        for middle, low, high in [share(saved)]
+    ]
 
 
-def table(data: list[dict[str, Any]], problem: str) -> list[Table]:
+def _named(saved: Saved) -> str:
+    return f"{LABELS[saved['engine']]} {METHODS[saved['engine']]}"
+
+
+def table(data: list[Saved], problem: str) -> list[Table]:
     """What a step of a problem is made of; nothing where it was not split."""
     lines = []
-    for one in (one for one in data if one["problem"] == problem):
-        method, (_, low, high) = METHODS[one["engine"]], share(one)
-        lines.append(
-            (
-                f"{LABELS[one['engine']]} {method}",
-                str(STAGES[method]),
-                *(f"{value:.2f}" for value in parts(one)),
-                f"{low:.0f} to {high:.0f}",
-            )
-        )
+    for saved in data:
+        if saved["problem"] == problem:
+            _, low, high = share(saved)
+            values = (f"{value:.2f}" for value in parts(saved))
+            lines.append((_named(saved), str(STAGES[METHODS[saved["engine"]]]), *values, f"{low:.0f} to {high:.0f}"))
     note = (
         f"Microseconds a step, median of all rounds, over {STEPS.get(problem, 0):,} steps; all forces in one "
         "callback, compiled in MuJoCo, from Python in Exudyn. Engine: with an empty callback; bridge: what one "

@@ -3,76 +3,52 @@
 import math
 from collections import Counter, defaultdict
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from models.advice.price import runner as cost
+from models.advice.price import runner
 from models.advice.price.curves import HOLLOW, Reach
-from models.advice.price.problem import Setting
-from models.advice.price.runner import Loss, Point, by_curve
+from models.advice.price.runner import Loss, Measured, Point, Reaches
 from models.drawing.figures import LABELS
 from models.machine.timing import describe
 from validation.common.rows import Table
 
+STATUSES = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
 
-def tables(problem: dict[str, Any], points: list[Point]) -> list[Table]:
+
+def tables(measured: Measured) -> list[Table]:
     """All tables of one problem from its saved data."""
-    return [
-        cheapest(problem, points),
-        losses(problem, points),
-        every_curve(problem, points),
-        outcomes(points),
-        failures(points),
-    ]
+    return [make(measured) for make in (cheapest, losses, every_curve, outcomes, failures)]
 
 
 def named(curve: str, groups: list[tuple[str, ...]] | None = None) -> str:
     """A curve as a reader names it, with those that coincide with it."""
     alike = next((group for group in groups or [] if curve in group), (curve,))
-    return " = ".join(_plain(one) for one in sorted(alike, key=lambda one: one != curve))
+    return " = ".join(map(_plain, sorted(alike, key=lambda other: other != curve)))
 
 
 def _plain(curve: str) -> str:
     engine, _, method = curve.partition(" ")
-    return f"{LABELS.get(engine, engine)} {method}"
+    return f"{LABELS[engine]} {method}"
 
 
-def quantity_of(problem: dict[str, Any]) -> str:
-    """The quantity that tolerances are set on."""
-    return next(iter(problem["units"]))
-
-
-def groups_of(problem: dict[str, Any], points: list[Point]) -> list[tuple[str, ...]]:
-    """Coinciding curves of a saved problem."""
-    quantity = quantity_of(problem)
-    return cost.same(points, quantity, problem["uncertainty"][quantity])
-
-
-def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
+def cheapest(measured: Measured) -> Table:
     """The cheapest setting that meets each tolerance."""
-    quantity, groups = quantity_of(problem), groups_of(problem, points)
-    unit, work = problem["units"][quantity], cost.costs(points)[0]
-    rivals = [engine for engine in cost.RIVALS if any(p.setting.engine == engine for p in points)]
+    work, groups = measured.costs[0], measured.same()
+    rivals = [engine for engine in runner.RIVALS if any(p.setting.engine == engine for p in measured.points)]
     rows = []
-    for target in problem["tolerances"]:
-        calls = cost.reaches(points, quantity, target, work)
-        seconds = cost.reaches(points, quantity, target, "seconds")
-        rows.append(
-            (
-                f"{target:g}",
-                _won(points, calls, "", work.split()[-1], groups),
-                *(_won(points, seconds, among, "ms") for among in ("", *rivals)),
-            )
-        )
+    for target in measured.tolerances:
+        calls, seconds = (measured.reaches(target, kind) for kind in measured.costs)
+        timed = (_won(measured, seconds, among, "ms") for among in ("", *rivals))
+        rows.append((f"{target:g}", _won(measured, calls, "", work.split()[-1], groups), *timed))
     note = (
         "Fixed steps are interpolated log-log between neighbouring settings; methods without one order count at "
         "the loosest setting tried that does; 'coarsest' is the coarsest setting tried. Nothing is extrapolated. "
         f"{work.capitalize()} are exact and the same on every machine; seconds are those of this processor, "
-        f"everything built anew. {rounds_of(points)}"
+        f"everything built anew. {rounds_of(measured.points)}"
     )
     heads = (
-        f"{quantity} error at most [{unit}]",
+        f"{measured.quantity} error at most [{measured.unit}]",
         f"fewest {work}",
         "fewest seconds",
         *(f"fewest in {LABELS[engine]}" for engine in rivals),
@@ -82,111 +58,99 @@ def cheapest(problem: dict[str, Any], points: list[Point]) -> Table:
 
 def rounds_of(points: list[Point]) -> str:
     """How many settings have how many rounds, and how far these wander."""
-    in_rounds = [p.seconds for p in points if p.status == "ok" and p.changed is not None]
+    answered = [p for p in points if p.status == "ok"]
+    in_rounds = [p.seconds for p in answered if p.changed is not None]
     numbers = Counter(map(len, in_rounds))
     told = " and ".join(f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True))
     if not in_rounds:
         return "Seconds are those of one run each."
     spread = float(np.median([one["mad"] / one["median"] for one in map(describe, in_rounds)]))
-    once = sum(p.status == "ok" for p in points) - len(in_rounds)
     return (
         f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
-        f"{1e3 * cost.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for {once} that "
-        f"are far from the cheapest, or longer than {1e3 * cost.LONG:g} ms and not for the middle "
+        f"{1e3 * runner.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
+        f"{len(answered) - len(in_rounds)} that "
+        f"are far from the cheapest, or longer than {1e3 * runner.LONG:g} ms and not for the middle "
         "tolerance."
     )
 
 
-def _won(
-    points: list[Point], found: dict[str, Reach], among: str, unit: str, groups: list[tuple[str, ...]] | None = None
-) -> str:
-    best = cost.cheapest(found, among)
+def _won(measured: Measured, found: Reaches, among: str, unit: str, groups: list[tuple[str, ...]] | None = None) -> str:
+    best = runner.cheapest(found, among)
     if best is None:
         return "none of those tried"
-    curve, one = best
-    paid = f"{1e3 * one.cost:.3g} ms" if unit == "ms" else f"{one.cost:,.0f} {unit}"
-    return f"{named(curve, groups)}, {_setting(points, curve, one)}: {paid}"
+    curve, least = best
+    label = replace(measured.curves()[curve][0].setting, value=least.value).label() + _coarsest(least)
+    paid = f"{1e3 * least.cost:.3g} ms" if unit == "ms" else f"{least.cost:,.0f} {unit}"
+    return f"{named(curve, groups)}, {label}: {paid}"
 
 
-def _setting(points: list[Point], curve: str, one: Reach) -> str:
-    label = replace(by_curve(points)[curve][0].setting, value=one.value).label()
-    return f"{label} (coarsest)" if one.how == "coarsest" else label
+def _coarsest(least: Reach) -> str:
+    return " (coarsest)" if least.how == "coarsest" else ""
 
 
-def losses(problem: dict[str, Any], points: list[Point]) -> Table:
+def losses(measured: Measured) -> Table:
     """What each engine's default method costs beside the cheapest one, for the same error."""
-    quantity = quantity_of(problem)
-    owners = cost.defaults(points)
-    rows = [
+    owners = measured.defaults
+    rows = tuple(
         (
             f"{target:g}",
             *(
-                _lost(cost.loss(points, quantity, target, kind, own.setting.curve, among))
-                for own in owners.values()
-                for among in (own.setting.engine, "")
-                for kind in cost.costs(points)
+                _lost(measured.loss(target, kind, usual.setting.curve, among))
+                for usual in owners.values()
+                for among in (usual.setting.engine, "")
+                for kind in measured.costs
             ),
         )
-        for target in problem["tolerances"]
-    ]
-    heads = tuple(
-        f"{owner} by best of {among}: {kind}"
-        for owner in owners
-        for among in (owner, "all")
-        for kind in cost.costs(points)
+        for target in measured.tolerances
+    )
+    heads = (
+        f"{owner} by best of {among}: {kind}" for owner in owners for among in (owner, "all") for kind in measured.costs
     )
     as_is = "; ".join(
-        f"{owner}: {own.setting.method} at {own.setting.label()}, which by itself "
+        f"{owner}: {usual.setting.method} at {usual.setting.label()}, which by itself "
         + (
-            f"gives {own.errors[quantity]:.3g} {problem['units'][quantity]}"
-            if own.status == "ok"
-            else f"is {STATUSES[own.status]}"
+            f"gives {measured.error(usual):.3g} {measured.unit}"
+            if usual.status == "ok"
+            else f"is {STATUSES[usual.status]}"
         )
-        for owner, own in owners.items()
+        for owner, usual in owners.items()
     )
     note = (
         "The default method, its step refined until it meets the tolerance, by the cheapest setting that does. "
         f"{as_is}. * means that no step tried was fine enough: extrapolated by the method's declared order. "
         "In brackets: 95 % interval, bootstrapped over the rounds that both have; none after fewer than "
-        f"{cost.FEWEST}."
+        f"{runner.FEWEST}."
     )
-    return Table("Factor that a default setting loses", note, (f"{quantity} error at most", *heads), tuple(rows))
+    return Table("Factor that a default setting loses", note, (f"{measured.quantity} error at most", *heads), rows)
 
 
 def _lost(found: Loss | None) -> str:
     if found is None:
         return "-"
+    factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (found.factor, found.low, found.high))
     mark = "*" if found.how == "extrapolated" else ""
-    if not found.low < found.high:  # a count, or too few rounds
-        return f"{_short(found.factor)}{mark}"
-    return f"{_short(found.factor)}{mark} [{_short(found.low)}, {_short(found.high)}]"
+    told = f" [{low}, {high}]" if found.low < found.high else ""  # none of a count, or after too few rounds
+    return f"{factor}{mark}{told}"
 
 
-def _short(value: float) -> str:
-    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
-
-
-def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
+def every_curve(measured: Measured) -> Table:
     """A row per curve: settings, errors, observed order, what an error of 1 costs."""
-    quantity, groups = quantity_of(problem), groups_of(problem, points)
-    orders = cost.orders(points, quantity, problem["uncertainty"][quantity])
-    work, middle = cost.costs(points)[0], cost.middle(problem["tolerances"])
-    calls, seconds = (cost.reaches(points, quantity, middle, kind) for kind in (work, "seconds"))
+    groups, orders, work = measured.same(), measured.orders(measured.quantity), measured.costs[0]
+    calls, seconds = (measured.reaches(measured.middle, kind) for kind in measured.costs)
     rows = tuple(
         (
             _plain(curve),
-            str(len(own)),
-            f"{own[0].setting.label()} to {own[-1].setting.label()}",
-            f"{own[0].errors[quantity]:.2g} to {own[-1].errors[quantity]:.2g}",
-            _order(orders[curve]),
-            _declared(own[0].setting),
+            str(len(points)),
+            f"{points[0].setting.label()} to {points[-1].setting.label()}",
+            f"{measured.error(points[0]):.2g} to {measured.error(points[-1]):.2g}",
+            "-" if math.isnan(orders[curve]) else f"{orders[curve]:.2f}",
+            str(points[0].setting.order or "varies"),
             _number(calls.get(curve), 1, ",.0f"),
-            _once(own, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
+            _once(points, seconds.get(curve)) + _number(seconds.get(curve), 1e3, ".3g"),
             named(curve, groups).partition(" = ")[2] or "-",
         )
-        for curve, own in by_curve(points).items()
+        for curve, points in measured.curves().items()
     )
-    unit = problem["units"][quantity]
     note = (
         f"Order: slope of the error over the step on the three finest settings whose error exceeds {HOLLOW:g} "
         "times the uncertainty of the reference; for adaptive methods over 1 / calls, where loose tolerances "
@@ -197,42 +161,30 @@ def every_curve(problem: dict[str, Any], points: list[Point]) -> Table:
         "curve",
         "settings",
         "from, to",
-        f"{quantity} error [{unit}]",
+        f"{measured.quantity} error [{measured.unit}]",
         "observed order",
         "declared",
-        f"{work} for {middle:g} {unit}",
-        f"ms for {middle:g} {unit}",
+        f"{work} for {measured.middle:g} {measured.unit}",
+        f"ms for {measured.middle:g} {measured.unit}",
         "coincides with",
     )
     return Table("Every integrator that each engine offers", note, heads, rows)
 
 
-def _once(own: list[Point], one: Reach | None) -> str:
+def _once(points: list[Point], least: Reach | None) -> str:
     """A mark for what rests on a setting that has no rounds."""
-    return "~" if one is not None and any(p.changed is None for p in cost.resting(own, one)) else ""
+    return "~" if least is not None and any(p.changed is None for p in runner.resting(points, least)) else ""
 
 
-def _order(found: float) -> str:
-    return "-" if math.isnan(found) else f"{found:.2f}"
+def _number(least: Reach | None, scale: float, form: str) -> str:
+    return "not met" if least is None else format(scale * least.cost, form) + _coarsest(least)
 
 
-def _declared(setting: Setting) -> str:
-    return str(setting.order) if setting.order else "varies"
-
-
-def _number(one: Reach | None, scale: float, form: str) -> str:
-    if one is None:
-        return "not met"
-    return format(scale * one.cost, form) + (" (coarsest)" if one.how == "coarsest" else "")
-
-
-def outcomes(points: list[Point]) -> Table:
+def outcomes(measured: Measured) -> Table:
     """How many settings of each engine ended in which way."""
-    engines = dict.fromkeys(p.setting.engine for p in points)
-    rows = tuple(
-        (LABELS.get(engine, engine), *(_ended(points, engine, status) for status in ("", *STATUSES)))
-        for engine in engines
-    )
+    ended = Counter((p.setting.engine, status) for p in measured.points for status in ("", p.status))
+    engines = dict.fromkeys(p.setting.engine for p in measured.points)
+    rows = tuple((LABELS[engine], *(str(ended[engine, status]) for status in ("", *STATUSES))) for engine in engines)
     note = (
         "Fine: an answer; raised: the run failed and said so; refused: not run, with the reason; flagged: "
         "an answer came with a doubt; silent: a wrong answer that came back as a result, of which there must be "
@@ -241,17 +193,10 @@ def outcomes(points: list[Point]) -> Table:
     return Table("Settings by how they ended", note, ("engine", "settings", *STATUSES.values()), rows)
 
 
-STATUSES = {"ok": "fine", "raised": "raised", "refused": "refused", "flagged": "flagged", "SILENT": "silent"}
-
-
-def _ended(points: list[Point], engine: str, status: str) -> str:
-    return str(sum(p.setting.engine == engine and status in ("", p.status) for p in points))
-
-
-def failures(points: list[Point]) -> Table:
+def failures(measured: Measured) -> Table:
     """Everything that gave no answer to rely on, with what was said."""
-    found: dict[tuple[str, str, str], list[str]] = defaultdict(list)
-    for p in points:
+    found = defaultdict(list)
+    for p in measured.points:
         if p.status != "ok":
             found[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
     rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from models.advice.price import Answer
-from models.advice.price.pitch_plane import OwnPitchPlane, own
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, recommend
+from models.advice.price.recommendation import LEAST, SLOWER, Choice, Recommendation, priced, recommend
 from models.advice.price.search import Tried
+from models.advice.price.systems.pitch_plane import OwnPitchPlane
 from models.advice.price.truth import Truth
 from models.core.time_series import write_time_series
 from models.engines.assembly import Settings
@@ -97,20 +97,18 @@ def drawn(number: int, folder: Path) -> Drawn:
         "effects": effects,
         **more,
     }
-    quantity = (
-        "enforced_moment"
-        if "prescribed_pitch" in effects
-        else str(
-            rng.choice(["f1,f2", "pitch", "z3", "f3,f4"] if "wheel_forces" not in effects else ["pitch", "z3", "f3,f4"])
-        )
-    )
+    quantity, common = "enforced_moment", ["pitch", "z3", "f3,f4"]
+    if "prescribed_pitch" not in effects:
+        quantity = str(rng.choice(common if "wheel_forces" in effects else ["f1,f2", *common]))
     return Drawn(build(table, "", folder), quantity, SCALES[quantity] * 10.0 ** rng.uniform(*PARTS))
 
 
-Kind = Callable[[np.random.Generator, Path, int], tuple[str, dict[str, Any], dict[str, Any]]]
+Random = np.random.Generator
+Kind = tuple[str, dict[str, Any], dict[str, Any]]
+"""Name, effects, and further tables of a scene."""
 
 
-def _iso_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _iso_road(rng: Random, folder: Path, number: int) -> Kind:
     road = {
         "source": "iso8608",
         "road_class": str(rng.choice(list("ABCDE"))),
@@ -120,42 +118,33 @@ def _iso_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str,
     return "rough road", {"road": road}, {}
 
 
-def _study_road(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _study_road(rng: Random, folder: Path, number: int) -> Kind:
     source = str(rng.choice(["study", "hills"]))
     return f"{source} road", {"road": {"source": source, "speed": float(round(rng.uniform(5.0, 35.0), 1))}}, {}
 
 
-def _release(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _release(rng: Random, folder: Path, number: int) -> Kind:
     start = {"z1": 2e-2, "z3": 5e-2, "pitch": 5e-2, "pitch_rate": 0.3, "z2_rate": 0.3}
-    return (
-        "release",
-        {},
-        {
-            "start": {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()},
-            "duration": float(rng.choice([0.2, 0.4, 2.5])),
-        },
-    )
+    drawn = {key: float(size * rng.uniform(-1, 1)) for key, size in start.items()}
+    return "release", {}, {"start": drawn, "duration": float(rng.choice([0.2, 0.4, 2.5]))}
 
 
-def _forces(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _forces(rng: Random, folder: Path, number: int) -> Kind:
     how, period = str(rng.choice(["linear", "held", "smooth"])), float(rng.choice([1e-2, 5e-3, 2e-3]))
     file = _written(rng, folder, number, period)
     return f"{how} forces", {"wheel_forces": {"file": file, "interpolation": how}}, {"duration": 0.2}
 
 
-def _guided(rng: np.random.Generator, folder: Path, number: int) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _guided(rng: Random, folder: Path, number: int) -> Kind:
     file, pitch = _written(rng, folder, number, 5e-3), f"pitch{number}.csv"
     times = 5e-3 * np.arange(101)
     wave = rng.uniform(5e-3, 3e-2) * (1 - np.cos(2 * np.pi * rng.uniform(0.5, 3.0) * times))
     write_time_series(folder / pitch, {"pitch": ("rad", wave)}, 5e-3)
-    return (
-        "prescribed pitch",
-        {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}},
-        {"duration": 0.2},
-    )
+    effects = {"wheel_forces": {"file": file, "interpolation": "smooth"}, "prescribed_pitch": {"file": pitch}}
+    return "prescribed pitch", effects, {"duration": 0.2}
 
 
-KINDS: tuple[Kind, ...] = (
+KINDS: tuple[Callable[[Random, Path, int], Kind], ...] = (
     _iso_road,
     _forces,
     _release,
@@ -169,7 +158,7 @@ KINDS: tuple[Kind, ...] = (
 )
 
 
-def _written(rng: np.random.Generator, folder: Path, number: int, period: float) -> str:
+def _written(rng: Random, folder: Path, number: int, period: float) -> str:
     """A file of wheel forces: the weight, two waves and noise of each sample."""
     times, name = period * np.arange(round(0.5 / period) + 1), f"forces{number}.csv"
     forces = {
@@ -187,9 +176,15 @@ def _written(rng: np.random.Generator, folder: Path, number: int, period: float)
 
 def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
-    scene = own(one.scene, one.quantity, engines)
-    found = recommend(scene, one.tolerance)
-    errors = true_errors(scene, [choice.tried.setting for choice in found.winners.values()])
+    return verdicts(one, engines, lambda found, settings: true_errors(found.scene, settings))
+
+
+def verdicts(
+    one: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
+) -> list[Verdict]:
+    """The same by what a function makes of the recommendation and its settings: the true error of each."""
+    found = recommend(priced(one.scene, one.quantity, engines), one.tolerance)
+    errors = true(found, list(dict.fromkeys(choice.tried.setting for choice in found.winners.values())))
     return [
         Verdict(
             one.scene.title,
@@ -206,9 +201,9 @@ def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     ]
 
 
-def true_errors(scene: OwnPitchPlane, settings: list[Setting]) -> dict[Setting, float]:
+def true_errors(scene: Any, settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the whole run, beside DOP853 on instants that all steps share if they can."""
-    runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in dict.fromkeys(settings)}
+    runs = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in settings}
     parts = {setting: 1 if setting.adaptive else round(scene.base / setting.value) for setting in runs}
     common = _fine(scene, math.lcm(*parts.values()))
     if scene.base / common < SHORTEST:
@@ -240,7 +235,7 @@ def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
 def _defaults(found: Recommendation) -> list[Tried]:
     """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
     was searched: what is recommended may have forgotten one."""
-    if found.scene.whole > found.scene.first * (1 + 1e-9):
+    if not found.whole:
         return [
             one.refined.tried for one in found.defaults.values() if one.refined is not None and not one.extrapolated
         ]

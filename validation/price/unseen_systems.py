@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from models.advice.price import Answer, Ladder
+from models.advice.price import Answer
 from models.advice.price.meshed import Meshed
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import SYSTEMS as PRICED
-from models.advice.price.recommendation import Recommendation, recommend
+from models.advice.price.recommendation import Recommendation
 from models.advice.price.truth import Truth
 from models.core.systems import SYSTEMS
-from validation.price.unseen import Drawn, Verdict, slower
+from validation.price.unseen import Drawn, Random, Verdict, verdicts
 
 SEED = 908
 ENGINES = {"wheelset": ("reference", "mujoco"), "handling": ("mujoco",), "braking": ("reference",)}
@@ -36,6 +35,10 @@ TOLERANCES = {
 }
 
 
+Asked = tuple[dict[str, Any], list[str]]
+"""Tables of a scene, and the quantities that may be asked about."""
+
+
 def drawn(system: str, number: int) -> Drawn:
     """Scene ``number`` of a system, with a quantity and a tolerance."""
     rng = np.random.Generator(np.random.Philox(key=[SEED, number]))
@@ -47,7 +50,7 @@ def drawn(system: str, number: int) -> Drawn:
     return Drawn(scene, quantity, float(np.exp(rng.uniform(low, high))))
 
 
-def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+def _wheelset(rng: Random) -> Asked:
     override = {
         "conicity": float(rng.uniform(0.02, 0.2)),
         "stiffness_x": float(rng.uniform(1e5, 1e6)),
@@ -60,13 +63,11 @@ def _wheelset(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
         "speeds": [float(round(rng.uniform(10.0, 60.0), 1))],
     }
     law = str(rng.choice(["fastsim", "fastsim", "linear"]))
-    return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": {"values": [10.0]}}, [
-        "y",
-        "fy",
-    ]
+    speeds = {"values": [10.0]}
+    return {"wheelset": {"override": override}, "contact": {"law": law}, "run": run, "speeds": speeds}, ["y", "fy"]
 
 
-def _handling(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+def _handling(rng: Random) -> Asked:
     own = {
         "speed": float(rng.uniform(12.0, 30.0)),
         "duration": 0.5,
@@ -77,7 +78,7 @@ def _handling(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
     return {"tyres": tyres, "manoeuvres": {"drawn": own}}, ["yaw_rate", "load"]
 
 
-def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
+def _braking(rng: Random) -> Asked:
     kind, surface = str(rng.choice(["straight", "j_turn", "split"])), str(rng.choice(["snow", "wet", "ice"]))
     own: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
     if kind == "j_turn":
@@ -97,43 +98,23 @@ def _braking(rng: np.random.Generator) -> tuple[dict[str, Any], list[str]]:
 
 def judge(one: Drawn) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene."""
-    system = one.scene.system
-    scene = import_module(PRICED[system]).own(one.scene, one.quantity, ENGINES[system])
-    found = recommend(scene, one.tolerance)
-    errors = {
-        setting: _error(scene, found, setting)
-        for setting in dict.fromkeys(choice.tried.setting for choice in found.winners.values())
-    }
-    return [
-        Verdict(
-            one.scene.title,
-            choice.tried.setting.curve,
-            choice.tried.setting.label(),
-            one.tolerance,
-            choice.error,
-            errors[choice.tried.setting],
-            found.truth.uncertainty,
-            slower(found, key, choice),
-            key[1],
-        )
-        for key, choice in found.winners.items()
-    ]
+    return verdicts(one, ENGINES[one.scene.system], true_errors)
 
 
-def _error(scene: Any, found: Recommendation, setting: Setting) -> float:
-    """Largest error of a setting over the whole run, beside a truth of another kind than the search's."""
-    rung, ladder = found.truth.rung, scene.reference()
-    exact = _exact(scene, setting) if isinstance(scene, Meshed) else _stopped(scene, ladder, rung)
-    return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
+def true_errors(found: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
+    """Largest error of each setting over the whole run, beside a truth of another kind than the search's."""
+    scene: Any = found.scene
+    ladder = scene.reference()
+    finer = Setting(ladder.engine, ladder.method, ladder.values[found.truth.rung] / MORE, ladder.order)
+
+    def error(setting: Setting) -> float:
+        exact = _exact(scene, setting) if isinstance(scene, Meshed) else scene.answer(scene.solve(finer, scene.whole))
+        return Truth(exact, 0.0, "", 0).error(scene.answer(scene.solve(setting, scene.whole)))
+
+    return {setting: error(setting) for setting in settings}
 
 
 def _exact(scene: Meshed, setting: Setting) -> Answer:
     cells = min(MOST, max(LEAST, FINER * round(1.0 / setting.value))) if scene.cells else 0
     step = min(scene.steps.values()) if scene.cells else setting.value
     return scene.answer((cells, scene.exact(cells, step, scene.whole)))
-
-
-def _stopped(scene: Any, ladder: Ladder, rung: int) -> Answer:
-    setting = Setting(ladder.engine, ladder.method, ladder.values[rung] / MORE, ladder.order)
-    answer: Answer = scene.answer(scene.solve(setting, scene.whole))
-    return answer

@@ -11,9 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from validation.replay import jobs as asked
-from validation.replay.answers import Answer, answer
-from validation.replay.differences import difference
-from validation.replay.kept import load, read_jobs, save, write_jobs
+from validation.replay.answers import JOBS, Answer, answer, difference, load, read_jobs, save, write_jobs
 
 
 def main(words: list[str]) -> int:
@@ -35,7 +33,7 @@ def main(words: list[str]) -> int:
 
 def _record(given: argparse.Namespace) -> int:
     given.folder.mkdir(parents=True, exist_ok=True)
-    if not (given.folder / "jobs.json").exists():
+    if not (given.folder / JOBS).exists():
         write_jobs(given.folder, asked.jobs(given.command))
     left = [job for job in _chosen(given) if load(given.folder, job.name) is None]
     for job, now in _answers(left, given):

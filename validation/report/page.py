@@ -3,23 +3,140 @@
 ``python -m validation.report FOLDER`` draws it again, byte for byte the same.
 """
 
+import inspect
 import json
-from collections.abc import Callable, Iterable
+import pkgutil
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from importlib import import_module
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, get_args
 
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
-from validation.common.rows import of_saved
-from validation.report import content
+from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
-from validation.report.shares import shares
+from validation.report.shares import case_of, shares
 from validation.report.shown import shown
 
 TEMPLATE = "page.html.jinja"
-BLANK: dict[str, Any] = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
+BLANK: Saved = {"quick": False, "command": "", "versions": {}, "seconds": {}, "wall": None}
 """What a page needs of its provenance, where the results do not hold it."""
+KINDS = {
+    "native": "both sides have force laws of their own; what they share is the description of the vehicle",
+    "handed over": "the engine is handed M, D and K of the description: what is tested is these and the integrator, no "
+    "spring of the engine's own",
+    "shared kernel": "both sides call the same force code: nothing is learned about that code",
+    "closed form": "the other side is an exact answer",
+    "published": "the other side is a figure from the literature",
+    "none": "there is no second side: a behaviour, or a count",
+}
+assert set(KINDS) == set(get_args(Independence))
+
+
+def verdict(results: Saved) -> Saved:
+    """Rows by status, what a reader must know first of where they are from, the tightest passed row and the time."""
+    rows = results["rows"]
+    of = {status: [row for row in rows if row["status"] == status] for status in STATUSES}
+    margins = [(ratio, row) for row in of["passed"] if (ratio := margin(row)) is not None]
+    return {
+        "count": len(rows),
+        "of": of,
+        "worst": max(margins, key=lambda pair: pair[0], default=None),
+        "seconds": results["provenance"]["wall"],
+        "source": _source(results["provenance"]),
+    }
+
+
+def _source(provenance: Saved) -> list[tuple[str, str]]:
+    """Version, commit, date, machine and data, as (name, value)."""
+    known = {"version": "twinrig", "commit": "commit", "date": "date", "machine": "machine", "data": "data"}
+    return [(name, str(provenance.get(key) or "not saved")) for name, key in known.items()]
+
+
+def silent_systems(rows: list[Saved]) -> list[str]:
+    """Systems that have no row, or none that was run."""
+    run = {row["system"] for row in rows if row["status"] != "not run"}
+    return [system for system in get_args(System) if system not in run]
+
+
+def systems(results: Saved, drawn: dict[str, Saved]) -> list[Saved]:
+    """Rows by system and, within it, by case, in the order of the report; drawn : what is shown of each case."""
+    order = list(dict.fromkeys((*get_args(System), *(row["system"] for row in results["rows"]))))
+    by_system = sorted(results["rows"], key=lambda row: order.index(row["system"]))
+    return [
+        {"name": system, "cases": list(_cases(list(rows), results["provenance"]["seconds"], drawn))}
+        for system, rows in groupby(by_system, key=lambda row: row["system"])
+    ]
+
+
+def _cases(rows: list[Saved], seconds: dict[str, float], drawn: dict[str, Saved]) -> Iterator[Saved]:
+    for name in dict.fromkeys(map(case_of, rows)):
+        of_case = [row for row in rows if case_of(row) == name]
+        groups: dict[str, list[Saved]] = {}
+        for row in of_case:
+            groups.setdefault(row["why"], []).append(row)
+        statuses = [row["status"] for row in of_case]
+        yield {
+            "name": name,
+            "seconds": seconds.get(name),
+            "groups": [{"why": why, "rows": alike} for why, alike in groups.items()],
+            "count": len(of_case),
+            "failed": statuses.count("failed"),
+            "missed": statuses.count("missed"),
+            **drawn[name],
+        }
+
+
+def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
+    """How many rows of each case rest on which kind of second side; drawn : what is shown of each, by name."""
+    lines = []
+    for name in dict.fromkeys(map(case_of, results["rows"])):
+        own = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
+        lines.append((name, drawn[name]["title"], [own.count(kind) for kind in KINDS]))
+    return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
+
+
+def conventions() -> list[tuple[str, str]]:
+    """Heading and text of every paragraph of the conventions page."""
+    import models
+
+    pairs: list[tuple[str, str]] = []
+    for line in (inspect.getdoc(models) or "").splitlines()[1:]:
+        if line and not line.startswith(" "):
+            pairs.append((line, ""))
+        elif pairs and line.strip():
+            pairs[-1] = (pairs[-1][0], f"{pairs[-1][1]} {line.strip()}".strip())
+    return pairs
+
+
+def parameter_tables() -> list[Saved]:
+    """One table per kind of vehicle: fields with unit and meaning, a column per parameter set, and sources."""
+    tables: dict[type, Saved] = {}
+    for name, module in _parameter_modules():
+        kind: Any = type(module.PARAMETERS)
+        title = (inspect.getdoc(kind) or kind.__name__).partition("\n")[0].rstrip(".")
+        fields = [
+            (key, str((field.json_schema_extra or {}).get("unit", "")), field.description or "")
+            for key, field in kind.model_fields.items()
+        ]
+        table = tables.setdefault(kind, {"title": title, "fields": fields, "sets": []})
+        values = [getattr(module.PARAMETERS, field) for field in kind.model_fields]
+        shown_as = [value if isinstance(value, int | float) else str(value) for value in values]
+        table["sets"].append({"name": name, "source": module.SOURCE, "values": shown_as})
+    return list(tables.values())
+
+
+def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
+    """Parameter sets that follow the form: SOURCE and a pydantic PARAMETERS."""
+    import models.vehicles.parameters as package
+
+    for name in sorted(found.name for found in pkgutil.iter_modules(package.__path__)):
+        module = import_module(f"{package.__name__}.{name}")
+        if hasattr(module, "SOURCE") and hasattr(type(getattr(module, "PARAMETERS", None)), "model_fields"):
+            yield name, module
 
 
 def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
@@ -33,7 +150,7 @@ def write(folder: Path, each: Callable[..., Iterable[Any]] = map) -> Path:
     return path
 
 
-def read(path: Path) -> dict[str, Any]:
+def read(path: Path) -> Saved:
     """Saved results; raises InputError if the file is not one."""
     try:
         results = json.loads(path.read_text(encoding="utf-8"))
@@ -48,36 +165,30 @@ def read(path: Path) -> dict[str, Any]:
         raise InputError(path, "", None, f"not the results of a validation: {error}") from None
 
 
-def page(results: dict[str, Any], data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
+def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -> str:
     """The page as text."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    environment.filters |= {
-        "number": number,
-        "share": share,
-        "duration": duration,
-        "powers": powers,
-        "marked": marked,
-        "numeric_columns": numeric_columns,
-    }
-    environment.globals |= {"margin": margin, "case_of": content.case_of}
-    names = list(dict.fromkeys(map(content.case_of, results["rows"])))
+    filters = (number, share, duration, powers, marked, numeric_columns)
+    environment.filters |= {filter.__name__: filter for filter in filters}
+    environment.globals |= {"margin": margin, "case_of": case_of}
+    names = list(dict.fromkeys(map(case_of, results["rows"])))
     drawn = dict(zip(names, each(partial(shown, data), names), strict=True))
-    systems = content.systems(results)
-    for case in (case for system in systems for case in system["cases"]):
-        case |= drawn[case["name"]]
     return environment.get_template(TEMPLATE).render(
-        verdict=content.verdict(results),
+        verdict=verdict(results),
         against=results.get("against"),
-        systems=systems,
-        silent=content.silent_systems(results["rows"]),
+        systems=systems(results, drawn),
+        silent=silent_systems(results["rows"]),
         shares=shares(results),
-        independence=content.independence(results, drawn),
-        conventions=content.conventions(),
-        parameters=content.parameter_tables(),
+        independence=independence(results, drawn),
+        conventions=conventions(),
+        parameters=parameter_tables(),
         provenance=results["provenance"],
     )

@@ -9,11 +9,12 @@ import sys
 from collections import Counter
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
-from validation.common.rows import System
+from validation.cases import CASES
+from validation.common.rows import Saved, System
 
 KEPT = Path(__file__).with_name("full_report.json")
 QUICK_SHARES = {
@@ -35,13 +36,19 @@ assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values())
 
 
 @cache
-def full() -> dict[str, dict[str, Any]]:
+def full() -> dict[str, Saved]:
     """What the last full report had of each case: "rows" by system, "seconds", "commit"."""
-    found: dict[str, dict[str, Any]] = json.loads(KEPT.read_text(encoding="utf-8"))
+    found: dict[str, Saved] = json.loads(KEPT.read_text(encoding="utf-8"))
     return found
 
 
-def shares(results: dict[str, Any]) -> list[dict[str, Any]]:
+def case_of(row: Saved) -> str:
+    """Name of the case that a row belongs to: its id begins with it, or with a word of it."""
+    first = row["id"].partition(".")[0]
+    return first if first in CASES else next((case for case in CASES if first in case.split("_")), first)
+
+
+def shares(results: Saved) -> list[Saved]:
     """Cases, rows and seconds of each system that was measured, those of a full report, and the stated seconds.
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
@@ -55,9 +62,7 @@ def shares(results: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _line(
-    system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]
-) -> dict[str, Any]:
+def _line(system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]) -> Saved:
     own = [case for case in found if main[case] == system]
     shared = [case for case in found if system in found[case]]
     return {
@@ -73,10 +78,8 @@ def _line(
     }
 
 
-def _counted(rows: list[dict[str, Any]]) -> dict[str, Counter[str]]:
+def _counted(rows: list[Saved]) -> dict[str, Counter[str]]:
     """Rows of each case by system."""
-    from validation.report.content import case_of
-
     found: dict[str, Counter[str]] = {}
     for row in rows:
         found.setdefault(case_of(row), Counter())[row["system"]] += 1

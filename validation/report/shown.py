@@ -1,20 +1,34 @@
-"""What the report shows of one case beside its rows, from its saved data alone: title, tables and figures."""
+"""What the report shows of one case beside its rows, from its saved data alone: title, tables and figures.
 
+Figures are SVG where that is small, PNG where it is not; the same bytes from the same data.
+"""
+
+import base64
 import inspect
+import io
 import json
+import re
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from markupsafe import Markup, escape
 
-def shown(folder: Path, name: str) -> dict[str, Any]:
+from validation.common.rows import Saved
+
+LARGEST_SVG = 150_000
+"""Bytes; above, the figure is drawn in points of colour."""
+
+
+def shown(folder: Path, name: str) -> Saved:
     """Title, tables and figures of a case, what is said of it and of its share; "notes" tell what cannot be read.
 
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
     module = _module(name)
-    found: dict[str, Any] = {
+    found: Saved = {
         "title": getattr(module, "TITLE", name.replace("_", " ")),
         "about": _doc(module),
         "share": _doc(getattr(module, "measure", None)),
@@ -34,7 +48,7 @@ def shown(folder: Path, name: str) -> dict[str, Any]:
         return found
     for kind, make in (("tables", _tables), ("figures", _figures)):
         try:
-            found[kind] = make(module, saved, name)
+            found[kind] = list(make(module, saved, name))
         except Exception as error:  # old data under new code must still give a page
             found["notes"].append(f"The {kind} cannot be shown from data/{path.name}: {type(error).__name__}: {error}")
     return found
@@ -55,14 +69,52 @@ def _doc(what: Any) -> str:
     return "" if what is None else (inspect.getdoc(what) or "").partition("\n\n")[0]
 
 
-def _tables(module: Any, saved: Any, name: str) -> list[Any]:
-    return list(module.tables(saved)) if hasattr(module, "tables") else []
+def _tables(module: Any, saved: Any, name: str) -> Iterable[Any]:
+    return module.tables(saved) if hasattr(module, "tables") else ()
 
 
-def _figures(module: Any, saved: Any, name: str) -> list[tuple[str, Any]]:
-    if not hasattr(module, "draw"):
-        return []
-    from validation.report.figures import inline
+def _figures(module: Any, saved: Any, name: str) -> Iterator[tuple[str, Any]]:
+    for i, (caption, figure) in enumerate(module.draw(saved) if hasattr(module, "draw") else ()):
+        yield caption, inline(figure, caption, f"{name}-{i}")
 
-    drawn = module.draw(saved)
-    return [(caption, inline(figure, caption, f"{name}-{i}")) for i, (caption, figure) in enumerate(drawn)]
+
+def inline(figure: Any, caption: str, key: str) -> Markup:
+    """A figure as markup that needs nothing else; ``key`` keeps its identifiers apart from other figures'."""
+    from models.drawing.figures import plt
+
+    vector = _svg(figure, caption, key)
+    picture = vector if len(vector) <= LARGEST_SVG else _png(figure, caption)
+    plt.close(figure)
+    return Markup(picture)
+
+
+def _svg(figure: Any, caption: str, key: str) -> str:
+    """SVG element without prologue, metadata and superfluous digits; drawn once, where ``savefig`` draws twice."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    buffer = io.StringIO()
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(?<= d=")[^"]*', _shorter, text)
+    text = re.sub(r'(?<=id=")|(?<=url\(#)|(?<=href="#)', f"{key}-", text)
+    text = re.sub(r">\s+<", "><", text).strip()
+    return text.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
+
+
+def _shorter(path: re.Match[str]) -> str:
+    """Coordinates of a path with two decimals: a hundredth of a point."""
+    rounded = re.sub(r"-?\d+\.\d+", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), path[0])
+    return rounded.replace("\n", " ")
+
+
+def _png(figure: Any, caption: str) -> str:
+    """PNG with a palette of 256 colours, as data within the page."""
+    from PIL import Image
+
+    buffer, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    Image.open(buffer).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(small, format="png", optimize=True)
+    data = base64.b64encode(small.getvalue()).decode("ascii")
+    return f'<img alt="{escape(caption)}" src="data:image/png;base64,{data}">'

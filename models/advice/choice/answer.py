@@ -46,20 +46,16 @@ class Answer:
 
     def of(self, name: str, file: str = "") -> Quantity:
         """A quantity, or "rms" or "max" of one; InputError for what there is not."""
+        if name in self.quantities:
+            return self.quantities[name]
         word, _, rest = name.partition(" ")
         path = self.quantities.get(rest)
-        if name not in self.quantities and word in SCALARS and path is not None and not path.sampled:
-            return Quantity(path.unit, tuple(np.array([SCALARS[word](one)]) for one in path.cases))
-        if name not in self.quantities:
-            raise InputError(
-                file,
-                "quantities",
-                name,
-                "no such quantity in this scene, whose own are, each also with "
-                "'rms' or 'max' before it if it is a path",
-                tuple(self.quantities),
-            )
-        return self.quantities[name]
+        if word in SCALARS and path is not None and not path.sampled:
+            return Quantity(path.unit, tuple(np.array([SCALARS[word](case)]) for case in path.cases))
+        allowed = (
+            "no such quantity in this scene, whose own are, each also with 'rms' or 'max' before it if it is a path"
+        )
+        raise InputError(file, "quantities", name, allowed, tuple(self.quantities))
 
 
 def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
@@ -67,8 +63,8 @@ def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
 
     A case that hardly moves beside the others is held to what it is of them.
     """
-    own = np.array([np.std(one) if len(one) > 1 else abs(float(one[0])) for one in full])
-    return np.maximum(own, HARDLY * own.max(initial=0.0))
+    found = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full])
+    return np.maximum(found, HARDLY * found.max(initial=0.0))
 
 
 def rounding(answer: Answer, unit: str) -> float:
@@ -108,9 +104,7 @@ def less(one: Cases, full: Cases) -> Cases:
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
-    found = []
-    for a, b in zip(one, full, strict=True):
-        few, many = sorted((len(a), len(b)))
+    for few, many in (sorted(map(len, pair)) for pair in zip(one, full, strict=True)):
         if few != many and (few < 2 or (many - 1) % (few - 1)):
             raise InputError(
                 "",
@@ -119,18 +113,18 @@ def less(one: Cases, full: Cases) -> Cases:
                 "paths of runs that end by themselves cannot be compared: ask for "
                 "'rms' or 'max' of them, or for another number",
             )
-        every = [(len(path) - 1) // max(few - 1, 1) or 1 for path in (a, b)]
-        found.append(a[:: every[0]] - b[:: every[1]])
-    return tuple(found)
+    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(one, full, strict=True))
+
+
+def _thinned(*paths: np.ndarray) -> list[np.ndarray]:
+    """Paths at the times that all have."""
+    few = min(map(len, paths))
+    return [path[:: (len(path) - 1) // max(few - 1, 1) or 1] for path in paths]
 
 
 def added(*changes: Cases) -> Cases:
     """Sum of differences, at the times that all have."""
-    found = []
-    for parts in zip(*changes, strict=True):
-        few = min(map(len, parts))
-        found.append(np.sum([part[:: (len(part) - 1) // max(few - 1, 1) or 1] for part in parts], axis=0))
-    return tuple(found)
+    return tuple(np.sum(_thinned(*parts), axis=0) for parts in zip(*changes, strict=True))
 
 
 def relative(change: Cases, size: np.ndarray) -> float:

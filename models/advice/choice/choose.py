@@ -104,8 +104,9 @@ class Chooser:
     def _part(self, window: float) -> Screen:
         """The first part of the scene, or few of its samples."""
         whole = self.whole.variants
-        steps = math.ceil(window * whole.system.steps(whole.scene))
-        part = whole.window(steps) if whole.system.WINDOWED else whole
+        if not whole.system.WINDOWED:
+            return self.whole
+        part = whole.window(math.ceil(window * whole.system.steps(whole.scene)))
         return self.whole if part is whole else Screen(part, self.whole.quantities)
 
     def _coarse(self, screen: Screen) -> Screen:
@@ -163,11 +164,7 @@ class Chooser:
                     break
                 if (found < self.tolerance).all():
                     self._doubtful.append(float(np.max(chance / (self.tolerance - found)) ** 2))
-        return self._sum(chosen)
-
-    def _sum(self, chosen: Set) -> np.ndarray:
-        _, found, chance = self._confirmed[chosen]
-        return found + chance
+        return np.add(*self._confirmed[chosen][1:])
 
     def holds(self, changes: np.ndarray) -> bool:
         """Whether all changes are within the tolerance."""
@@ -216,26 +213,21 @@ class Chooser:
 
     def _choice(self, chosen: Set) -> Choice:
         times, found, chance = self._confirmed[chosen]
-        whole = self.whole.variants
-        shown = [(frozenset[str](), 1), (frozenset[str](), self._confirmed[frozenset()][0]), (chosen, times)]
-        runs = [run for key in shown if (run := whole.of(*key)) is not None]
-        seconds = [
-            run.counts["calls"] * self.screen.variants.per_call(left_out)
-            for run, (left_out, _) in zip(runs, shown, strict=True)
-        ]
-        calls = [run.counts["calls"] for run in runs]
-        told, rest = self.told(chosen, times), self.teller.remainder(chosen)
+        none: Set = frozenset()
+        shown = [(none, 1), (none, self._confirmed[none][0]), (chosen, times)]
+        calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
+        each = [self.screen.variants.per_call(left_out) for left_out, _ in shown]
         return Choice(
             self.effects,
             tuple(sorted(chosen)),
             times,
-            told,
-            rest,
+            self.told(chosen, times),
+            self.teller.remainder(chosen),
             found,
             chance,
             self.holds(found + chance),
             tuple(calls),
-            tuple(seconds),
+            tuple(count * seconds for count, seconds in zip(calls, each, strict=True)),
             self.rounds,
             self._spent(),
             min(self._doubtful, default=0.0),

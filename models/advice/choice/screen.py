@@ -9,6 +9,7 @@ second as the second does to the first.
 """
 
 from itertools import combinations
+from typing import NoReturn
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from models.core.errors import InputError
 
 FEW = 1 / 3
 """Share of a sampled quantity's mean square that one sample may have."""
+Changes = dict[str, Cases]
+"""Differences of two runs, quantity by quantity."""
 
 
 class Screen:
@@ -29,34 +32,23 @@ class Screen:
         if full is None:  # tells why
             full = variants.system.answer(variants.scene, variants.engine)
         found = {name: full.of(name, variants.scene.file) for name in quantities}
-        self.full = {name: one.cases for name, one in found.items()}
-        self.sizes = {name: one.sizes for name, one in found.items()}
-        self.sampled = {name for name, one in found.items() if one.sampled}
+        self.full = {name: quantity.cases for name, quantity in found.items()}
+        self.sizes = {name: quantity.sizes for name, quantity in found.items()}
+        self.sampled = {name for name, quantity in found.items() if quantity.sampled}
         for name, size in self.sizes.items():
             if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
-                raise InputError(
-                    variants.scene.file,
-                    f"quantities.{name}",
-                    None,
-                    "does not move in this scene, so that there is nothing to hold it to",
-                )
+                self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
         for name in self.sampled:
-            self._check_samples(name)
+            share = max(float(case.max() / case.sum()) for case in self.full[name])
+            if share > FEW:  # no error could be told of it
+                m = len(self.full[name][0])
+                why = f"by one sample of {m}, so that chance decides: ask for more or longer ones"
+                self._refuse(name, f"is made up to {100 * share:.0f} % {why}")
 
-    def _check_samples(self, name: str) -> None:
-        """Refuse a quantity that few of its samples make up: no error could be told of it."""
-        share = max(float(case.max() / case.sum()) for case in self.full[name])
-        if share > FEW:
-            m = len(self.full[name][0])
-            raise InputError(
-                self.variants.scene.file,
-                f"quantities.{name}",
-                None,
-                f"is made up to {100 * share:.0f} % "
-                f"by one sample of {m}, so that chance decides: ask for more or longer ones",
-            )
+    def _refuse(self, name: str, why: str) -> NoReturn:
+        raise InputError(self.variants.scene.file, f"quantities.{name}", None, why)
 
-    def between(self, one: Answer | None, other: Answer | None) -> dict[str, Cases] | None:
+    def between(self, one: Answer | None, other: Answer | None) -> Changes | None:
         """Differences of two runs, quantity by quantity; None where one of them is missing."""
         if one is None or other is None:
             return None
@@ -67,50 +59,45 @@ class Screen:
                 return None  # what is left has no such quantity
             raise
 
-    def shares(self, change: dict[str, Cases] | None) -> np.ndarray:
+    def shares(self, change: Changes | None) -> np.ndarray:
         """Relative changes (quantities,); infinite where there is none."""
-        if change is None:
-            return np.full(len(self.quantities), np.inf)
-        return np.array(
-            [
-                by_chance(change[name], self.full[name])[0]
-                if name in self.sampled
-                else relative(change[name], self.sizes[name])
-                for name in self.quantities
-            ]
-        )
+        return self._judged(change)[0]
 
-    def chance(self, change: dict[str, Cases] | None) -> np.ndarray:
+    def chance(self, change: Changes | None) -> np.ndarray:
         """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
+        return self._judged(change)[1]
+
+    def _judged(self, change: Changes | None) -> np.ndarray:
+        """Both (2, quantities)."""
         if change is None:
-            return np.zeros(len(self.quantities))
-        return np.array(
-            [by_chance(change[name], self.full[name])[1] if name in self.sampled else 0.0 for name in self.quantities]
-        )
+            return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
+        pairs = [
+            by_chance(change[name], self.full[name])
+            if name in self.sampled
+            else (relative(change[name], self.sizes[name]), 0.0)
+            for name in self.quantities
+        ]
+        return np.array(pairs).T
 
-    def alone(self, effect: str) -> dict[str, Cases] | None:
+    def alone(self, effect: str) -> Changes | None:
         """d of an effect."""
-        return self.between(self.variants.of([effect]), self.variants.of())
+        return self.change(frozenset([effect]))
 
-    def pair(self, one: str, two: str) -> dict[str, Cases] | None:
-        """d of two effects that are left out together."""
-        return self.between(self.variants.of([one, two]), self.variants.of())
-
-    def second(self, one: str, two: str) -> dict[str, Cases] | None:
+    def second(self, one: str, two: str) -> Changes | None:
         """e of a pair."""
-        parts = self.pair(one, two), self.alone(one), self.alone(two)
-        if any(part is None for part in parts):
+        sets = map(frozenset, ((one, two), (one,), (two,)))
+        both, *singles = (self.change(effects) for effects in sets)
+        known = [part for part in singles if part is not None]
+        if both is None or len(known) < 2:
             return None
-        both, first, other = parts
-        assert both is not None and first is not None and other is not None
-        return {name: added(both[name], _minus(first[name]), _minus(other[name])) for name in self.quantities}
+        return {name: added(both[name], *(_minus(part[name]) for part in known)) for name in self.quantities}
 
-    def change(self, chosen: Set) -> dict[str, Cases] | None:
+    def change(self, chosen: Set) -> Changes | None:
         """Predicted differences of a set; None where they cannot be told."""
-        if len(chosen) <= 2:
-            return self.between(self.variants.of(chosen), self.variants.of())
-        parts = [*map(self.alone, chosen), *(self.second(*pair) for pair in combinations(sorted(chosen), 2))]
-        if any(part is None for part in parts):
+        parts: list[Changes | None] = [None]
+        if len(chosen) > 2:
+            parts = [*map(self.alone, chosen), *(self.second(*pair) for pair in combinations(sorted(chosen), 2))]
+        if None in parts:
             return self.between(self.variants.of(chosen), self.variants.of())
         return {name: added(*(part[name] for part in parts if part)) for name in self.quantities}
 

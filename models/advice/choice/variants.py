@@ -5,13 +5,13 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from models.advice.choice.answer import Answer
 from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import absent, beside, module_of, named, own_table, rebuilt, without
+from models.core.systems import modules_of
 
 Set = frozenset[str]
 LONGEST = 128
@@ -24,18 +24,17 @@ REPEATS, ENOUGH = 3, 0.02
 
 def system_of(scene: Any) -> ModuleType:
     """The file that runs scenes of this one's system; InputError where there is none."""
-    folder = Path(__file__).parent / "systems"
-    names = {path.stem.replace("_", "-"): path.stem for path in sorted(folder.glob("*.py")) if path.stem != "__init__"}
-    if scene.system not in names:
+    files = modules_of("models.advice.choice.systems")
+    if scene.system not in files:
         raise InputError(
             scene.file,
             "system",
             scene.system,
             "has no runs in time that effects could be priced or "
             "chosen by: linear scenes of ride have closed forms, and scenes of these systems have runs",
-            tuple(names),
+            tuple(files),
         )
-    return import_module(f"models.advice.choice.systems.{names[scene.system]}")
+    return import_module(files[scene.system])
 
 
 @dataclass

@@ -1,9 +1,6 @@
 """The price of accuracy of a user's own scene: ``twinrig price SCENE --tolerance T``.
 
-    scene -> OwnScene (a file per system) -> truth -> search -> recommendation -> text
-
-A system joins by a module with ``own(scene, quantity, engines) -> OwnScene`` and its name in
-``recommendation.SYSTEMS``.
+scene -> OwnScene (by a file of ``systems``) -> truth -> search -> recommendation -> text
 """
 
 from dataclasses import dataclass

@@ -27,21 +27,21 @@ def observed_order(sizes: Sequence[float], errors: Sequence[float], floor: float
     return slope(*zip(*clear, strict=True)) if len(clear) > 1 else float("nan")
 
 
-def coinciding(curves: Mapping[str, Mapping[float, float]], tolerance: float = SAME) -> list[tuple[str, ...]]:
-    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to ``tolerance``.
+def coinciding(curves: Mapping[str, Mapping[float, float]]) -> list[tuple[str, ...]]:
+    """Groups of curves (name -> {setting: error}) whose errors at all common settings agree to SAME.
 
     At least three settings must be common: two curves that merely cross are not the same.
     """
     groups: list[list[str]] = []
     for name, curve in curves.items():
-        home = next((group for group in groups if _same(curve, curves[group[0]], tolerance)), None)
+        home = next((group for group in groups if _same(curve, curves[group[0]])), None)
         groups.append([name]) if home is None else home.append(name)
     return [tuple(group) for group in groups if len(group) > 1]
 
 
-def _same(a: Mapping[float, float], b: Mapping[float, float], tolerance: float) -> bool:
+def _same(a: Mapping[float, float], b: Mapping[float, float]) -> bool:
     common = set(a) & set(b)
-    return len(common) >= 3 and all(abs(a[x] - b[x]) <= tolerance * max(a[x], b[x]) for x in common)
+    return len(common) >= 3 and all(abs(a[x] - b[x]) <= SAME * max(a[x], b[x]) for x in common)
 
 
 @dataclass(frozen=True)

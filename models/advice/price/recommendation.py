@@ -7,6 +7,7 @@ what is recommended beside it is never slower than it by more than that.
 """
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -19,25 +20,9 @@ from models.advice.price.problem import Setting
 from models.advice.price.search import Search, Tried
 from models.advice.price.truth import Truth, truth
 from models.core.errors import InputError, RunFailed
+from models.core.systems import SYSTEMS, modules_of
 from models.machine.timing import interleave, paired_ratio
 
-SYSTEMS = {
-    system: f"models.advice.price.{module}"
-    for system, module in (
-        ("pitch-plane", "pitch_plane"),
-        ("wheelset", "wheelset"),
-        ("handling", "handling"),
-        ("braking", "braking"),
-    )
-}
-"""Systems whose scenes have a price, and the modules that know them."""
-WITHOUT = {
-    "ride": "answers by covariances, which have no step; what its effects cost is told by `show SCENE --price`",
-    "hub-forces": 'takes whole parts of its samples for steps, the longest of which a choice, study = "choice", finds',
-    "contact": "has cells in place of steps, which the study contact_price prices",
-    "measured": "takes the samples of its files for steps",
-}
-"""Why others have none, and what there is instead."""
 NEAR = 2.0
 """Settings that took up to so many times the least seconds in one run are timed beside one another."""
 FAR = 8.0
@@ -72,6 +57,10 @@ class Choice:
     rounds: tuple[float, ...] = ()
 
 
+Winners = dict[tuple[str, str], Choice]
+"""By engine, "" for all, and by what is counted, "calls" or "seconds"."""
+
+
 @dataclass(frozen=True)
 class Default:
     """An engine's default method: its error as it comes (None if it gave no answer, then ``reason``), and refined to
@@ -91,21 +80,34 @@ class Recommendation:
     tolerance: float
     searched: Truth
     truth: Truth
-    winners: dict[tuple[str, str], Choice]
+    winners: Winners
     defaults: dict[str, Default]
     tried: tuple[Tried, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of the run was searched."""
+        return self.scene.whole <= self.scene.first * (1 + 1e-9)
 
 
 def price(scene: Any, tolerance: float, quantity: str | None, engines: tuple[str, ...]) -> Recommendation:
     """The cheapest settings of a scene; InputError for what cannot be asked, RunFailed where nothing is known."""
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError("--tolerance", "", tolerance, "must be a finite number above 0, in the quantity's unit")
-    if scene.system not in SYSTEMS:
-        why = WITHOUT.get(scene.system, "has no steps to choose")
-        raise InputError(
-            scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(SYSTEMS)
-        )
-    return recommend(import_module(SYSTEMS[scene.system]).own(scene, quantity, engines), tolerance)
+    return recommend(priced(scene, quantity, engines), tolerance)
+
+
+def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnScene:
+    """A scene as its system's file gives it to the search; InputError where there is none."""
+    files = modules_of("models.advice.price.systems")
+    if scene.system in files:
+        own: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
+        return own
+    package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
+    why = getattr(package, "NO_PRICE", "has no steps to choose")
+    raise InputError(
+        scene.file, "system", scene.system, f"{why}; accuracy is priced in scenes of other systems", tuple(files)
+    )
 
 
 def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
@@ -113,12 +115,8 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
     searched = known = truth(scene, tolerance, scene.first)
     search = Search(scene, searched, tolerance, scene.first).everything()
     timed = _timed(search)
-    winners = {
-        (engine, kind): best
-        for engine in ("", *dict.fromkeys(one.engine for one in scene.ladders()))
-        for kind in ("seconds", "calls")
-        if (best := _cheapest(timed, engine, kind)) is not None
-    }
+    engines = ("", *dict.fromkeys(ladder.engine for ladder in scene.ladders()))
+    winners = _winners(timed, [(engine, kind) for engine in engines for kind in ("seconds", "calls")])
     if scene.whole > scene.first * (1 + 1e-9) and winners:
         known, timed, winners = _confirmed(search, timed, winners)
     known, timed, winners = _resolved(scene, known, timed, winners)
@@ -134,18 +132,17 @@ def _timed(search: Search) -> list[Choice]:
     """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
     curves: dict[str, Tried] = {}
     for one in search.meeting():
-        held = curves.get(one.setting.curve)
-        if held is None or one.setting.value > held.setting.value:
+        coarsest = curves.setdefault(one.setting.curve, one)
+        if one.setting.value > coarsest.setting.value:
             curves[one.setting.curve] = one
-    found = list(curves.values())
-    if not found:
+    if not curves:
         return []
-    taken = _raced(search, _rivals(found))
-    longer = search.scene.whole / search.duration
-    seconds = {one.setting: tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found}
+    found = list(curves.values())
+    taken, longer = _raced(search, _rivals(found)), search.scene.whole / search.duration
+    seconds = [tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found]
     return [
-        Choice(one, one.error, longer * one.calls, float(np.median(seconds[one.setting])), False, seconds[one.setting])
-        for one in found
+        Choice(one, one.error, longer * one.calls, float(np.median(took)), False, took)
+        for one, took in zip(found, seconds, strict=True)
     ]
 
 
@@ -164,10 +161,9 @@ def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
     seconds = _rounds(search, rivals, FEWEST)
     middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
-    least = {
-        engine: min(own for setting, own in middle.items() if setting.engine == engine)
-        for engine in dict.fromkeys(setting.engine for setting in middle)
-    }
+    least: dict[str, float] = {}
+    for setting, took in middle.items():
+        least[setting.engine] = min(took, least.get(setting.engine, took))
     left = [
         one
         for one in rivals
@@ -183,6 +179,11 @@ def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, n
     lasted = [one.seconds for one in rivals]
     taken = interleave(jobs, rounds, LEAST, lasted=lasted, clock=time.process_time)
     return dict(zip((one.setting for one in rivals), taken, strict=True))
+
+
+def _winners(timed: list[Choice], keys: Iterable[tuple[str, str]]) -> Winners:
+    """The cheapest for every engine and cost for which there is any."""
+    return {key: best for key in keys if (best := _cheapest(timed, *key)) is not None}
 
 
 def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
@@ -203,20 +204,25 @@ def _slower(one: Choice, best: Choice) -> bool:
     return paired_ratio(one.rounds[:both], best.rounds[:both])[1] > SLOWER
 
 
-def _confirmed(
-    search: Search, timed: list[Choice], winners: dict[tuple[str, str], Choice]
-) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
+Known = tuple[Truth, list[Choice], Winners]
+
+
+def _confirmed(search: Search, timed: list[Choice], winners: Winners) -> Known:
     """The winners and the defaults run over the whole scene, and refined until they meet the tolerance there."""
     scene = search.scene
     known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
     over = Search(scene, known, search.tolerance, scene.whole)
     ladders = {f"{one.engine} {one.method}": one for one in scene.ladders()}
-    able = [*winners.values(), *(one for one in timed if one.tried.setting.default)]
-    found = {one.tried.setting: _over_all(over, ladders[one.tried.setting.curve], one) for one in able}
+    able = {one.tried.setting: one for one in _shown(timed, winners)}
+    found = (_over_all(over, ladders[setting.curve], one) for setting, one in able.items())
+    held = [one for one in found if one is not None]
     search.tried += [one for one in over.tried if one.status != "ok"]
-    held = [one for one in found.values() if one is not None]
-    again = {key: _cheapest(held, *key) for key in winners}
-    return known, held, {key: one for key, one in again.items() if one is not None}
+    return known, held, _winners(held, winners)
+
+
+def _shown(timed: list[Choice], winners: Winners) -> list[Choice]:
+    """The winners and the defaults."""
+    return list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
 
 
 def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
@@ -235,17 +241,14 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
     return None
 
 
-def _resolved(
-    scene: OwnScene, known: Truth, timed: list[Choice], winners: dict[tuple[str, str], Choice]
-) -> tuple[Truth, list[Choice], dict[tuple[str, str], Choice]]:
+def _resolved(scene: OwnScene, known: Truth, timed: list[Choice], winners: Winners) -> Known:
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
-    shown = list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
+    shown = _shown(timed, winners)
     errors = {one.tried.setting: one.error for one in shown}
     if _blurred(known, errors):
-        known, errors = _finer(
-            scene, known, {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
-        )
+        answers = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
+        known, errors = _finer(scene, known, answers)
     told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
     return (
         known,
@@ -276,16 +279,14 @@ def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tup
 def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
     """What the engine's default does as it comes, and what it takes to meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
-    own = [one for one in search.tried if one.setting.curve == curve]
-    if not own:
+    tried = [one for one in search.tried if one.setting.curve == curve]
+    if not tried:
         return None
-    as_it_is = min(own, key=lambda one: abs(np.log(one.setting.value / ladder.default)))
+    as_it_is = min(tried, key=lambda one: abs(np.log(one.setting.value / ladder.default)))
     met = next((one for one in timed if one.tried.setting.curve == curve), None)
-    if met is not None:
+    clear = [one for one in tried if one.status == "ok"]
+    if met is not None or not clear:
         return Default(as_it_is, met, False)
-    clear = [one for one in own if one.status == "ok"]
-    if not clear:
-        return Default(as_it_is, None, False)
     finest = min(clear, key=lambda one: one.setting.value)
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)

@@ -1,6 +1,6 @@
 """The one work-precision runner: every setting of a problem tried, judged, counted and timed.
 
-    problem (validation/problems) -> points -> curves -> table of cheapest settings
+    problem (validation/price/problems) -> points -> curves -> table of cheapest settings
 
 Counts are what the report is gated on; seconds stand beside them. A setting that fails is a point like
 any other, and one that gives a wrong answer without saying so is called SILENT.
@@ -9,18 +9,20 @@ any other, and one that gives a wrong answer without saying so is called SILENT.
 import math
 import time
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
-from models.advice.price import curves
+from models.advice.price.curves import HOLLOW, Reach, coinciding, observed_order, pareto, reach
 from models.advice.price.problem import Problem, Setting
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import interleave, interval, resamples
 
 Status = Literal["ok", "raised", "refused", "flagged", "SILENT"]
+Reaches = dict[str, Reach]
 WORK = ("contact cells", "force calls")
 """What work may be counted in: the first that a problem's points have."""
 RIVALS = ("exudyn", "mujoco")
@@ -58,206 +60,6 @@ class Point:
         """A count, or the median of the seconds."""
         return float(np.median(self.seconds)) if kind == "seconds" else float(self.counts[kind])
 
-    def as_dict(self) -> dict[str, Any]:
-        """The point as ``data/price.json`` keeps it."""
-        return asdict(self)
-
-
-def point(saved: dict[str, Any]) -> Point:
-    """A point from what ``as_dict`` saved."""
-    return Point(**{**saved, "setting": Setting(**saved["setting"]), "seconds": tuple(saved["seconds"])})
-
-
-def costs(points: list[Point]) -> tuple[str, str]:
-    """What work is counted in, and seconds."""
-    return next(kind for kind in WORK if any(kind in p.counts for p in points)), "seconds"
-
-
-def attempt(problem: Problem, setting: Setting) -> Point:
-    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
-    a doubt, the solution's ``doubt``), or SILENT.
-    """
-    begun = CLOCK()
-    try:
-        solution = problem.build(setting).run()
-    except InputError as error:
-        return Point(setting, "refused", str(error))
-    except RunFailed as error:
-        return Point(setting, "raised", str(error))
-    seconds, errors, counts = CLOCK() - begun, problem.errors(solution), dict(solution.counts)
-    doubt = getattr(solution, "doubt", "")
-    return Point(setting, *(("flagged", doubt) if doubt else _judged(problem, errors)), errors, counts, (seconds,))
-
-
-def _judged(problem: Problem, errors: dict[str, float]) -> tuple[Status, str]:
-    """An answer that came back without a word is SILENT if it is not finite or beyond all sense."""
-    first = errors[next(iter(problem.units))]
-    if not all(math.isfinite(error) for error in errors.values()):
-        return "SILENT", "an error that is not a number came back as a result"
-    if first > problem.bound:
-        return "SILENT", f"an error of {first:.3g}, more than {problem.bound:.3g}, came back as a result"
-    return "ok", ""
-
-
-def describe(problem: Problem, points: list[Point]) -> dict[str, Any]:
-    """What tables and figures need to know of a problem, as JSON keeps it."""
-    names = ("key", "title", "note", "units", "reference", "uncertainty", "bound", "tolerances", "duration")
-    return {name: getattr(problem, name) for name in names}
-
-
-def miscounted(points: list[Point], duration: float) -> list[str]:
-    """Settings with fixed stages whose force calls are not stages times steps."""
-    wrong = []
-    for p in points:
-        if p.status == "ok" and p.setting.stages:
-            steps = round(duration / p.setting.value)
-            found = (p.counts["steps"], p.counts["force calls"])
-            if found != (steps, p.setting.stages * steps):
-                wrong.append(f"{p.setting.curve} {p.setting.label()}: {found[1]} instead of {p.setting.stages * steps}")
-    return wrong
-
-
-def measure(problem: Problem, quick: bool, rounds: int, least: float) -> list[Point]:
-    """All points of a problem: with the seconds of ``rounds`` interleaved rounds where they decide something, else with
-    those of one run.
-
-    Seconds are those of building the model and running it, input tables included, for every engine alike.
-    """
-    settings = problem.settings(quick)
-    for first in {setting.curve: setting for setting in reversed(settings)}.values():
-        attempt(problem, first)  # imports and compiled code are loaded before anything is timed
-    points = [attempt(problem, setting) for setting in settings]
-    again = _timed(problem, racing(problem, points), rounds, least)
-    return [again.get(p.setting, p) for p in points]
-
-
-def racing(problem: Problem, points: list[Point]) -> list[Point]:
-    """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on, and
-    what those may that take little longer, of all and of each engine; what a default rests on that is refined; of the
-    front of the figure what is not slow; what takes LONG, for the middle tolerance alone. Work is counted, so what wins
-    by it needs no rounds.
-    """
-    quantity, own, usual = next(iter(problem.units)), by_curve(points), defaults(points).values()
-    best = front(points, quantity, problem.uncertainty[quantity], "seconds")
-    chosen = [p for p in usual if p.status == "ok"] + [p for p in best if p.cost("seconds") <= SLOW]
-    for target in problem.tolerances:
-        met, all_of = (reaches(points, quantity, target, "seconds", extrapolate) for extrapolate in (False, True))
-        near = {
-            curve: one
-            for engine in ("", *RIVALS, *(p.setting.engine for p in usual))
-            for curve, one in _near(met, engine).items()
-        }
-        near |= {p.setting.curve: all_of[p.setting.curve] for p in usual if p.setting.curve in all_of}
-        chosen += [
-            p
-            for curve, one in near.items()
-            for p in resting(own[curve], one)
-            if target == middle(problem.tolerances) or p.cost("seconds") <= LONG
-        ]
-    return list({p.setting: p for p in chosen}.values())
-
-
-def middle(tolerances: Sequence[float]) -> float:
-    """The tolerance that rows are about, the looser of two."""
-    return sorted(tolerances)[len(tolerances) // 2]
-
-
-def _near(found: dict[str, curves.Reach], among: str) -> dict[str, curves.Reach]:
-    """The cheapest curve among those of one engine, or of all, and those that take little longer."""
-    best = cheapest(found, among)
-    return {
-        curve: one
-        for curve, one in found.items()
-        if best and curve.startswith(among) and one.cost <= NEAR * best[1].cost
-    }
-
-
-def resting(own: list[Point], one: curves.Reach) -> list[Point]:
-    """The one or two points of a curve that a reach is made of."""
-    coarser = [p for p in own if p.setting.value >= one.value * (1 - 1e-12)]
-    finer = [p for p in own if p.setting.value <= one.value * (1 + 1e-12)]
-    return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
-
-
-def front(points: list[Point], quantity: str, uncertainty: float, kind: str) -> list[Point]:
-    """The points that stand clear of the reference's uncertainty and that no other one beats, by rising cost."""
-    clear = [p for p in points if p.status == "ok" and p.errors[quantity] >= curves.HOLLOW * uncertainty]
-    return [clear[i] for i in curves.pareto([p.cost(kind) for p in clear], [p.errors[quantity] for p in clear])]
-
-
-def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
-    """The points with the seconds of their rounds, and whether their last run was as their first."""
-    last: dict[int, Any] = {}
-    jobs = [lambda i=i, p=p: last.update({i: problem.build(p.setting).run()}) for i, p in enumerate(points)]
-    lasted = [p.cost("seconds") for p in points]
-    apart = -(-rounds // FEWEST) if rounds >= FEWEST else rounds
-    every = [apart if one > SLOW else 1 for one in lasted]
-    found = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
-    return {
-        p.setting: replace(p, seconds=tuple(own[np.isfinite(own)].tolist()), changed=_changed(problem, p, last[i]))
-        for i, (p, own) in enumerate(zip(points, found, strict=True))
-        if i in last
-    }
-
-
-def _changed(problem: Problem, p: Point, again: Any) -> bool:
-    """Whether a repeated run counted or gave something else."""
-    return dict(again.counts) != p.counts or problem.errors(again) != p.errors
-
-
-def by_curve(points: list[Point], status: Status | None = "ok") -> dict[str, list[Point]]:
-    """Points of each curve, from coarse to fine; None takes every status."""
-    found: dict[str, list[Point]] = defaultdict(list)
-    for p in sorted(points, key=lambda p: -p.setting.value):
-        if status is None or p.status == status:
-            found[p.setting.curve].append(p)
-    return found
-
-
-def orders(points: list[Point], quantity: str, uncertainty: float) -> dict[str, float]:
-    """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
-    found = {}
-    for curve, own in by_curve(points).items():
-        sizes = [1 / p.cost(costs(points)[0]) if p.setting.adaptive else p.setting.value for p in own]
-        found[curve] = curves.observed_order(sizes, [p.errors[quantity] for p in own], curves.HOLLOW * uncertainty)
-    return found
-
-
-def same(points: list[Point], quantity: str, uncertainty: float) -> list[tuple[str, ...]]:
-    """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
-    clear = {
-        curve: {p.setting.value: p.errors[quantity] for p in own if p.errors[quantity] >= curves.HOLLOW * uncertainty}
-        for curve, own in by_curve(points).items()
-    }
-    return curves.coinciding(clear)
-
-
-def reaches(
-    points: list[Point], quantity: str, target: float, kind: str, extrapolate: bool = False
-) -> dict[str, curves.Reach]:
-    """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
-    found = {}
-    for curve, own in by_curve(points).items():
-        one = _reach(own, quantity, target, [p.cost(kind) for p in own], extrapolate)
-        if one is not None:
-            found[curve] = one
-    return found
-
-
-def _reach(
-    own: list[Point], quantity: str, target: float, costs: Sequence[float], extrapolate: bool = False
-) -> curves.Reach | None:
-    """``curves.reach`` on the points of one curve."""
-    values, errors = [p.setting.value for p in own], [p.errors[quantity] for p in own]
-    order = 0 if own[0].setting.adaptive else own[0].setting.order
-    return curves.reach(values, errors, costs, target, order, extrapolate)
-
-
-def cheapest(found: dict[str, curves.Reach], among: str = "") -> tuple[str, curves.Reach] | None:
-    """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
-    able = {curve: one for curve, one in found.items() if curve.startswith(among)}
-    return min(able.items(), key=lambda item: item[1].cost) if able else None
-
 
 @dataclass(frozen=True)
 class Loss:
@@ -273,31 +75,251 @@ class Loss:
     how: str
 
 
-def loss(points: list[Point], quantity: str, target: float, kind: str, default: str, among: str = "") -> Loss | None:
-    """Loss of the curve ``default`` against the cheapest one among ``among`` ("" for all); None if none meets it."""
-    best = cheapest(reaches(points, quantity, target, kind), among)
-    own = reaches(points, quantity, target, kind, extrapolate=True).get(default)
-    if best is None or own is None:
-        return None
-    factor = low = high = own.cost / best[1].cost
-    if kind == "seconds" and best[0] != default:
-        pair = [resting(by_curve(points)[curve], one) for curve, one in ((default, own), best)]
-        rounds = min(len(p.seconds) for side in pair for p in side)
-        if rounds < FEWEST:
-            return Loss(factor, math.nan, math.nan, own.how)
-        sides = [_resampled(side, quantity, target, rounds) for side in pair]
-        factor, low, high = interval(sides[0] / sides[1])
-    return Loss(factor, low, high, own.how)
+@dataclass(frozen=True)
+class Measured:
+    """All points of a problem, with what tables and figures need to know of it (see ``Problem``); as JSON keeps it."""
+
+    key: str
+    title: str
+    note: str
+    units: dict[str, str]
+    reference: str
+    uncertainty: dict[str, float]
+    bound: float
+    tolerances: Sequence[float]
+    duration: float
+    points: list[Point]
+
+    @property
+    def quantity(self) -> str:
+        """What tolerances are set on."""
+        return next(iter(self.units))
+
+    @property
+    def unit(self) -> str:
+        """Of that quantity."""
+        return self.units[self.quantity]
+
+    @property
+    def middle(self) -> float:
+        """The tolerance that rows are about, the looser of two."""
+        return sorted(self.tolerances)[len(self.tolerances) // 2]
+
+    @property
+    def costs(self) -> tuple[str, str]:
+        """What work is counted in, and seconds."""
+        return next(kind for kind in WORK if any(kind in p.counts for p in self.points)), "seconds"
+
+    @property
+    def defaults(self) -> dict[str, Point]:
+        """The points that are somebody's default setting, by whose."""
+        return {p.setting.default: p for p in self.points if p.setting.default}
+
+    def error(self, p: Point) -> float:
+        """Of the quantity that tolerances are set on."""
+        return p.errors[self.quantity]
+
+    def floor(self, quantity: str = "") -> float:
+        """Error of a quantity below which the reference cannot judge."""
+        return HOLLOW * self.uncertainty[quantity or self.quantity]
+
+    def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
+        """Points of each curve, from coarse to fine; None takes every status."""
+        found = defaultdict(list)
+        for p in sorted(self.points, key=lambda p: -p.setting.value):
+            if status in (None, p.status):
+                found[p.setting.curve].append(p)
+        return found
+
+    def front(self, kind: str) -> list[Point]:
+        """The points that stand clear of the reference's uncertainty and that no other one beats, by rising cost."""
+        clear = [p for p in self.points if p.status == "ok" and self.error(p) >= self.floor()]
+        return [clear[i] for i in pareto([p.cost(kind) for p in clear], list(map(self.error, clear)))]
+
+    def orders(self, quantity: str) -> dict[str, float]:
+        """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
+        found = {}
+        for curve, points in self.curves().items():
+            sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
+            found[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.floor(quantity))
+        return found
+
+    def same(self) -> list[tuple[str, ...]]:
+        """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
+        return coinciding(
+            {
+                curve: {p.setting.value: self.error(p) for p in points if self.error(p) >= self.floor()}
+                for curve, points in self.curves().items()
+            }
+        )
+
+    def miscounted(self) -> list[str]:
+        """Settings with fixed stages whose force calls are not stages times steps."""
+        wrong = []
+        for p in self.points:
+            steps = round(self.duration / p.setting.value)
+            calls = p.setting.stages * steps
+            if p.status == "ok" and p.setting.stages and (p.counts["steps"], p.counts["force calls"]) != (steps, calls):
+                told = f"{p.counts['force calls']} instead of {calls}"
+                wrong.append(f"{p.setting.curve} {p.setting.label()}: {told}")
+        return wrong
+
+    def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
+        """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
+        found = {
+            curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
+            for curve, points in self.curves().items()
+        }
+        return {curve: least for curve, least in found.items() if least is not None}
+
+    def _reach(
+        self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
+    ) -> Reach | None:
+        """``curves.reach`` on the points of one curve."""
+        order = 0 if points[0].setting.adaptive else points[0].setting.order
+        values = [p.setting.value for p in points]
+        return reach(values, list(map(self.error, points)), costs, target, order, extrapolate)
+
+    def loss(self, target: float, kind: str, default: str, among: str = "") -> Loss | None:
+        """Loss of the curve ``default`` against the cheapest one among ``among`` ("" for all); None if none meets
+        it."""
+        best = cheapest(self.reaches(target, kind), among)
+        usual = self.reaches(target, kind, extrapolate=True).get(default)
+        if best is None or usual is None:
+            return None
+        factor = low = high = usual.cost / best[1].cost
+        if kind == "seconds" and best[0] != default:
+            pair = [resting(self.curves()[curve], least) for curve, least in ((default, usual), best)]
+            rounds = min(len(p.seconds) for side in pair for p in side)
+            if rounds < FEWEST:
+                return Loss(factor, math.nan, math.nan, usual.how)
+            sides = [self._resampled(side, target, rounds) for side in pair]
+            factor, low, high = interval(sides[0] / sides[1])
+        return Loss(factor, low, high, usual.how)
+
+    def _resampled(self, side: list[Point], target: float, rounds: int) -> np.ndarray:
+        """Seconds that a curve needs by the points it rests on, once per bootstrapped set of the rounds that both
+        have."""
+        kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
+        medians = np.array([np.median(seconds[resamples(rounds, DRAWS)], axis=1) for seconds in kept])
+        found = [self._reach(side, target, costs) for costs in medians.T]
+        return np.array([least.cost for least in found if least is not None])
+
+    def racing(self) -> list[Point]:
+        """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on,
+        and what those may that take little longer, of all and of each engine; what a default rests on that is refined;
+        of the front of the figure what is not slow; what takes LONG, for the middle tolerance alone. Work is counted,
+        so what wins by it needs no rounds.
+        """
+        curves, usual = self.curves(), self.defaults.values()
+        chosen = [p for p in usual if p.status == "ok"] + [
+            p for p in self.front("seconds") if p.cost("seconds") <= SLOW
+        ]
+        for target in self.tolerances:
+            met, refined = (self.reaches(target, "seconds", extrapolate) for extrapolate in (False, True))
+            near: Reaches = {}
+            for engine in ("", *RIVALS, *(p.setting.engine for p in usual)):
+                near |= _near(met, engine)
+            near |= {p.setting.curve: refined[p.setting.curve] for p in usual if p.setting.curve in refined}
+            rests = (p for curve, least in near.items() for p in resting(curves[curve], least))
+            chosen += [p for p in rests if target == self.middle or p.cost("seconds") <= LONG]
+        return list({p.setting: p for p in chosen}.values())
 
 
-def _resampled(side: list[Point], quantity: str, target: float, rounds: int) -> np.ndarray:
-    """Seconds that a curve needs by the points it rests on, once per bootstrapped set of the rounds that both have."""
-    kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
-    medians = np.array([np.median(own[resamples(rounds, DRAWS)], axis=1) for own in kept])
-    found = [_reach(side, quantity, target, costs, extrapolate=True) for costs in medians.T]
-    return np.array([one.cost for one in found if one is not None])
+def measured(problem: Problem, points: Iterable[Point]) -> Measured:
+    """A problem with its points."""
+    told = {each.name: getattr(problem, each.name) for each in fields(Measured) if each.name != "points"}
+    return Measured(**told, points=list(points))
 
 
-def defaults(points: list[Point]) -> dict[str, Point]:
-    """The points that are somebody's default setting, by whose."""
-    return {p.setting.default: p for p in points if p.setting.default}
+def of_saved(saved: dict[str, Any]) -> Measured:
+    """The same from what ``dataclasses.asdict`` made of it."""
+    points = [
+        Point(**{**p, "setting": Setting(**p["setting"]), "seconds": tuple(p["seconds"])}) for p in saved["points"]
+    ]
+    return Measured(**{**saved, "points": points})
+
+
+def attempt(problem: Problem, setting: Setting) -> Point:
+    """Try one setting: ok, raised (the run failed and said so), refused (it was not run), flagged (an answer came with
+    a doubt, the solution's ``doubt``), or SILENT: it is not finite or beyond all sense, and came back without a word.
+    """
+    begun = CLOCK()
+    try:
+        solution = problem.build(setting).run()
+    except InputError as error:
+        return Point(setting, "refused", str(error))
+    except RunFailed as error:
+        return Point(setting, "raised", str(error))
+    seconds, errors = CLOCK() - begun, problem.errors(solution)
+    status: Status = "SILENT"
+    first = errors[next(iter(problem.units))]
+    if reason := getattr(solution, "doubt", ""):
+        status = "flagged"
+    elif not all(map(math.isfinite, errors.values())):
+        reason = "an error that is not a number came back as a result"
+    elif first > problem.bound:
+        reason = f"an error of {first:.3g}, more than {problem.bound:.3g}, came back as a result"
+    else:
+        status = "ok"
+    return Point(setting, status, reason, errors, dict(solution.counts), (seconds,))
+
+
+def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measured:
+    """All points of a problem: with the seconds of ``rounds`` interleaved rounds where they decide something, else with
+    those of one run.
+
+    Seconds are those of building the model and running it, input tables included, for every engine alike.
+    """
+    settings = problem.settings(quick)
+    for first in {setting.curve: setting for setting in reversed(settings)}.values():
+        attempt(problem, first)  # imports and compiled code are loaded before anything is timed
+    once = measured(problem, [attempt(problem, setting) for setting in settings])
+    again = _timed(problem, once.racing(), rounds, least)
+    return replace(once, points=[again.get(p.setting, p) for p in once.points])
+
+
+def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> dict[Setting, Point]:
+    """The points with the seconds of their rounds, and whether their last run counted and gave what their first did."""
+    last: dict[Setting, Any] = {}
+
+    def run(setting: Setting) -> None:
+        last[setting] = problem.build(setting).run()
+
+    lasted = [p.cost("seconds") for p in points]
+    apart = -(-rounds // FEWEST) if rounds >= FEWEST else rounds
+    every = [apart if seconds > SLOW else 1 for seconds in lasted]
+    jobs = [partial(run, p.setting) for p in points]
+    timed = interleave(jobs, rounds, least, lasted=lasted, every=every, clock=CLOCK)
+    return {
+        p.setting: replace(
+            p,
+            seconds=tuple(seconds[np.isfinite(seconds)].tolist()),
+            changed=dict(last[p.setting].counts) != p.counts or problem.errors(last[p.setting]) != p.errors,
+        )
+        for p, seconds in zip(points, timed, strict=True)
+        if p.setting in last
+    }
+
+
+def _near(found: Reaches, among: str) -> Reaches:
+    """The cheapest curve among those of one engine, or of all, and those that take little longer."""
+    best = cheapest(found, among)
+    return {
+        curve: least
+        for curve, least in found.items()
+        if best and curve.startswith(among) and least.cost <= NEAR * best[1].cost
+    }
+
+
+def resting(points: list[Point], least: Reach) -> list[Point]:
+    """The one or two points of a curve that a reach is made of."""
+    coarser = [p for p in points if p.setting.value >= least.value * (1 - 1e-12)]
+    finer = [p for p in points if p.setting.value <= least.value * (1 + 1e-12)]
+    return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
+
+
+def cheapest(found: Reaches, among: str = "") -> tuple[str, Reach] | None:
+    """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
+    able = [item for item in found.items() if item[0].startswith(among)]
+    return min(able, key=lambda item: item[1].cost, default=None)

@@ -3,7 +3,8 @@
 import time
 from bisect import bisect_left
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 from models.advice.price import Ladder, OwnScene
 from models.advice.price.problem import Setting
@@ -76,12 +77,11 @@ class Search:
             found = Tried(setting, "raised", str(error))
         else:
             seconds, answer = time.process_time() - begun, self.scene.answer(solution)
-            error_of = self.truth.error(answer)
-            lies = not error_of <= BEYOND * max(self.truth.size, self.tolerance)
-            why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result" if lies else ""
-            found = Tried(
-                setting, "SILENT" if lies else "ok", why, error_of, answer.counts.get(self.scene.counted, 0), seconds
-            )
+            error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
+            found = Tried(setting, "ok", "", error_of, calls, seconds)
+            if not error_of <= BEYOND * max(self.truth.size, self.tolerance):
+                why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
+                found = replace(found, status="SILENT", reason=why)
         self.tried.append(found)
         return found
 
@@ -116,32 +116,23 @@ class Search:
 
     def _elsewhere(self, ladder: Ladder) -> float:
         """The value that the method needs in another engine, 0 where none has it."""
-        return max(
-            (
-                one.setting.value
-                for one in self.meeting()
-                if one.setting.method == ladder.method and one.setting.value in ladder.values
-            ),
-            default=0.0,
-        )
+        alike = [one.setting.value for one in self.meeting() if one.setting.method == ladder.method]
+        return max((value for value in alike if value in ladder.values), default=0.0)
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
         """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
         best = min(one.seconds for one in self.meeting(ladder.engine))
         most = max(PATIENCE, best) / max(last.seconds, 1e-9)
-        return max(
-            i for i, value in enumerate(ladder.values) if i == 0 or ladder.work(last.setting.value, value) <= most
-        )
+        work = [ladder.work(last.setting.value, value) for value in ladder.values]
+        return max(i for i, times in enumerate(work) if i == 0 or times <= most)
 
     def _hopeless(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would cost far more than what its engine has that meets the tolerance."""
-        if last is None or not last.seconds:
+        best = self.meeting(ladder.engine)
+        if last is None or not last.seconds or ladder.default or not best:
             return False
         finer = ladder.work(last.setting.value, ladder.values[i])
-        seconds, calls, best = finer * last.seconds, finer * last.calls, self.meeting(ladder.engine)
-        if ladder.default or not best:
-            return False
-        return seconds > WORTH * min(one.seconds for one in best) and calls > WORTH * min(one.calls for one in best)
+        return all(finer * cost(last) > WORTH * min(map(cost, best)) for cost in (_seconds, _calls))
 
     def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
@@ -149,14 +140,12 @@ class Search:
         seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
         if seconds <= max(TOO_LONG, WORTH * best):
             return False
-        self.tried.append(
-            Tried(
-                ladder.setting(i),
-                "refused",
-                f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s",
-            )
-        )
+        why = f"not run: it would take about {seconds:.0f} s, and the tolerance is met in {best:.2g} s"
+        self.tried.append(Tried(ladder.setting(i), "refused", why))
         return True
+
+
+_seconds, _calls = attrgetter("seconds"), attrgetter("calls")
 
 
 def _next(ladder: Ladder, low: int, high: int, last: Tried | None, tolerance: float) -> int:

@@ -4,7 +4,7 @@ from collections import defaultdict
 from typing import Any
 
 from models.advice.price.problem import Setting
-from models.advice.price.recommendation import Choice, Recommendation
+from models.advice.price.recommendation import Choice, Recommendation, Winners
 from models.advice.price.search import Tried
 from models.drawing.figures import LABELS
 from models.machine.seconds import cost
@@ -17,19 +17,20 @@ HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 def lines(found: Recommendation) -> list[str]:
     """The table of cheapest settings, what the defaults lose, what failed, and what to write into the scene."""
     own = found.scene
+    first = (
+        f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
+        f"{found.searched.uncertainty:.1e} {own.unit}"
+    )
+    doubt = (
+        f"  DOUBT: {own.quantity} is at most {found.truth.size:.3g} {own.unit} itself: within {found.tolerance:g} "
+        f"{own.unit} even zero would do"
+    )
     return [
         f"{own.title}: {own.quantity} within {found.tolerance:g} {own.unit} over {own.whole:g} s",
         f"  truth: {found.truth.how} {found.truth.uncertainty:.1e} {own.unit}",
-        *(
-            []
-            if _whole(found)
-            else [
-                f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
-                f"{found.searched.uncertainty:.1e} {own.unit}"
-            ]
-        ),
+        *([] if found.whole else [first]),
         *([f"  {own.note}"] if own.note else []),
-        *_loose(found),
+        *([doubt] if found.tolerance >= found.truth.size else []),
         "",
         *(_table(found) if found.winners else _none(found)),
         *_defaults(found),
@@ -38,47 +39,25 @@ def lines(found: Recommendation) -> list[str]:
     ]
 
 
-def _whole(found: Recommendation) -> bool:
-    """Whether all of the run was searched."""
-    return found.scene.whole <= found.scene.first * (1 + 1e-9)
-
-
-def _loose(found: Recommendation) -> list[str]:
-    """A doubt about a tolerance that no wrong answer would break."""
-    size, unit = found.truth.size, found.scene.unit
-    return (
-        [
-            f"  DOUBT: {found.scene.quantity} is at most {size:.3g} {unit} itself: within {found.tolerance:g} {unit} "
-            "even zero would do"
-        ]
-        if found.tolerance >= size
-        else []
-    )
-
-
 def _table(found: Recommendation) -> list[str]:
     rows, unit = [HEAD.format(counted=found.scene.counted)], found.scene.unit
     for (engine, kinds), one in _merged(found.winners).items():
-        who = f"{LABELS.get(engine, engine) if engine else 'all'}, by {kinds}"
+        who = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
             f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
             f"{one.calls:>16,.0f}   {cost(one.rounds or (one.seconds,))}"
         )
-    how = (
-        "measured over the whole run"
-        if _whole(found) or all(one.confirmed for one in found.winners.values())
-        else "measured"
-    )
+    over = " over the whole run" if found.whole or all(one.confirmed for one in found.winners.values()) else ""
     return [
         *rows,
-        f"  errors are {how}, against the truth; times are those of this machine's processor, model built "
+        f"  errors are measured{over}, against the truth; times are those of this machine's processor, model built "
         "anew: median and range of interleaved runs, or of one run",
     ]
 
 
-def _merged(winners: dict[tuple[str, str], Choice]) -> dict[tuple[str, str], Choice]:
+def _merged(winners: Winners) -> Winners:
     """One row where the same setting is the cheapest by both costs."""
-    rows = dict[tuple[str, str], Choice]()
+    rows = Winners()
     for (engine, kind), one in winners.items():
         if (engine, "seconds") in rows and rows[engine, "seconds"] is one:
             rows[engine, "both"] = rows.pop((engine, "seconds"))
@@ -99,23 +78,21 @@ def _none(found: Recommendation) -> list[str]:
 
 
 def _named(setting: Setting, whole: bool) -> str:
-    engine = f"{LABELS.get(setting.engine, setting.engine)} " if whole else ""
+    engine = f"{LABELS[setting.engine]} " if whole else ""
     return f"{engine if setting.method != setting.engine else ''}{setting.method}, {setting.label()}"
 
 
 def _defaults(found: Recommendation) -> list[str]:
-    rows, own = [], found.scene
+    rows = [""]
     for engine, one in found.defaults.items():
-        tried, unit = one.as_it_is, own.unit
+        tried = one.as_it_is
         known = max(tried.error, found.searched.uncertainty)
-        error = f"{'' if known == tried.error else 'below '}{known:.2g} {unit}"
-        over = "" if _whole(found) else f" over {own.first:g} s"
-        as_it_is = f"{error}{over}" if tried.status == "ok" else f"{tried.status}"
-        rows.append(
-            f"  {LABELS.get(engine, engine)}'s default, {_named(tried.setting, False)}: {as_it_is}"
-            + _lost(found, engine, one.refined, one.extrapolated)
-        )
-    return ["", *rows] if rows else []
+        error = f"{'' if known == tried.error else 'below '}{known:.2g} {found.scene.unit}"
+        over = "" if found.whole else f" over {found.scene.first:g} s"
+        as_it_is = f"{error}{over}" if tried.status == "ok" else tried.status
+        lost = _lost(found, engine, one.refined, one.extrapolated)
+        rows.append(f"  {LABELS[engine]}'s default, {_named(tried.setting, False)}: {as_it_is}{lost}")
+    return rows if found.defaults else []
 
 
 def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
@@ -124,7 +101,7 @@ def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolat
         return "; no step tried gives an answer"
     parts = [
         f"{ratio:.3g} times the {kind} of {whose}"
-        for whose, key in ((f"{LABELS.get(engine, engine)}'s cheapest", engine), ("the cheapest of all", ""))
+        for whose, key in ((f"{LABELS[engine]}'s cheapest", engine), ("the cheapest of all", ""))
         for kind in ("calls", "seconds")
         if (best := found.winners.get((key, kind))) is not None
         and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > SAME
@@ -138,7 +115,7 @@ def _failures(tried: tuple[Tried, ...]) -> list[str]:
     known = defaultdict[tuple[str, str], list[Tried]](list)
     for one in tried:
         if one.status != "ok":
-            known[one.status, f"{LABELS.get(one.setting.engine, one.setting.engine)} {one.setting.method}"].append(one)
+            known[one.status, f"{LABELS[one.setting.engine]} {one.setting.method}"].append(one)
     if not known:
         return []
     return [
@@ -190,13 +167,6 @@ def _choice(one: Choice) -> dict[str, Any]:
 
 
 def _tried(one: Tried) -> dict[str, Any]:
-    error = one.error if one.status == "ok" else None
-    return {
-        "engine": one.setting.engine,
-        "method": one.setting.method,
-        "value": one.setting.value,
-        "status": one.status,
-        "reason": one.reason,
-        "error": error,
-        "seconds": one.seconds,
-    }
+    setting = {name: getattr(one.setting, name) for name in ("engine", "method", "value")}
+    told = {name: getattr(one, name) for name in ("status", "reason", "error", "seconds")}
+    return {**setting, **told, "error": one.error if one.status == "ok" else None}

@@ -70,19 +70,17 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     """
     ladder = scene.reference()
     found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
-    said = f"{ladder.engine} {ladder.method} at {ladder.setting(rung).label()}"
+    said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
     alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds)
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
+    both = f"{said} and {_named(other)}"
     if differs > tolerance / AGREED:
-        raise RunFailed(
-            "reference",
-            f"{said} and {_named(other)} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged",
-        )
-    return replace(alone, uncertainty=max(change, differs), how=f"{said} and {_named(other)}, which differ by")
+        raise RunFailed("reference", f"{both} differ by {differs:.3g} {scene.unit}: the tolerance cannot be judged")
+    return replace(alone, uncertainty=max(change, differs), how=f"{both}, which differ by")
 
 
 def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
@@ -120,9 +118,6 @@ def _settled(
         before = now
     if before is None:
         raise RunFailed("reference", failure or "no step is fine enough")
-    raise InputError(
-        "--tolerance",
-        "",
-        tolerance,
-        f"is finer than the scene's own reference can be known here: at least {ladder.sure * change:.2g} {scene.unit}",
-    )
+    least = f"{ladder.sure * change:.2g} {scene.unit}"
+    allowed = f"is finer than the scene's own reference can be known here: at least {least}"
+    raise InputError("--tolerance", "", tolerance, allowed)

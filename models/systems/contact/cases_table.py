@@ -19,8 +19,7 @@ from models.contact.fastsim import fastsim
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.core.errors import InputError
-from models.core.table_stream import Block, blocks
-from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES
+from models.core.tables import METRES, NEWTONS, PER_METRE, SHARES, Block, blocks
 from models.core.whole_files import whole_file
 from models.systems.contact.scene import Method
 

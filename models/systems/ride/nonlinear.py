@@ -13,7 +13,7 @@ from pydantic import Field
 
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
-from models.engines.protocol import Settings
+from models.engines.assembly import Settings
 from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
 from models.ride.covariance import stationary
 from models.ride.excited import excited

@@ -3,3 +3,32 @@
 A problem knows its reference solution and that solution's own uncertainty; ``models.advice.price.runner`` does the
 rest. A new system adds a file here whose class fulfils ``models.advice.price.problem.Problem``.
 """
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.advice.price.problem import Setting
+
+Curves = dict[tuple[str, str], tuple[float, ...]]
+"""Steps (s), tolerances or cells that are tried, by engine and method."""
+
+
+def curves(engine: str, values: tuple[float, ...], *methods: str) -> Curves:
+    """The same values for several methods of an engine."""
+    return {(engine, method): values for method in methods}
+
+
+def ms(*steps: float) -> tuple[float, ...]:
+    """Steps (s) from milliseconds."""
+    return tuple(1e-3 * step for step in steps)
+
+
+def each(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple[Setting, ...]:
+    """A setting for every value of every curve."""
+    return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
+
+
+def apart(found: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
+    """Largest difference of each quantity from its reference."""
+    return {name: float(np.abs(values - true[name]).max()) for name, values in found.items()}

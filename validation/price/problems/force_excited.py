@@ -1,8 +1,9 @@
-"""Problem B: the pitch-plane vehicle driven by the samples of its wheel forces, before it drifts off.
+"""Problems B: the pitch-plane vehicle driven by the samples of its wheel forces, before it drifts off.
 
 The forces are a virtual measurement of the study road at 100 Hz, linear between the samples: every solver reads the
 same ones, so the error here is the integrator's alone, and not that of the interpolation, from which such a run
-drifts. Adaptive solvers restart at each sample; what they do is in the case ``drift_solvers``.
+drifts. Adaptive solvers restart at each sample; what they do is in the case ``drift_solvers``. Beside it stand the same
+with the error of a sensor on every sample, and with the pitch prescribed, as measured on the road.
 """
 
 import math
@@ -12,42 +13,49 @@ from functools import cache
 import numpy as np
 
 from models.advice.price.problem import Setting
-from models.core.signals import Sampled
+from models.core.noise import normal
+from models.core.signals import Sampled, Smooth, Stacked
 from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.protocol import build
+from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
-from validation.price.problems.road_excited import SPEED, scene, setting, settings_of
+from validation.price.problems import Curves, apart, curves, each, ms
+from validation.price.problems.road_excited import MUJOCO, SPEED, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0
 """Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
 PERIOD = 1 / RATE
 FINE = PERIOD / 1280
 """Step (s) of the reference's own Runge-Kutta march, which meets every sample: its error is that of rounding."""
-
-MS = 1e-3
-STEPS = (2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS, 0.0625 * MS)
-FULL: dict[tuple[str, str], tuple[float, ...]] = {
+STEPS = ms(2.5, 2, 1.25, 1, 0.5, 0.25, 0.125, 0.0625)
+FULL: Curves = {
     ("reference", "RK4"): STEPS,
     ("exudyn", "RK44"): STEPS[:-1],
-    ("exudyn", "ExplicitMidpoint"): STEPS,
-    ("exudyn", "ExplicitEuler"): STEPS,
-    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *STEPS),
-    ("exudyn", "GeneralizedAlpha 0.6"): STEPS[:-1],
-    ("exudyn", "TrapezoidalIndex2"): STEPS[:-1],
+    **curves("exudyn", STEPS, "ExplicitMidpoint", "ExplicitEuler"),
+    ("exudyn", "GeneralizedAlpha 0.9"): (*ms(10), *STEPS),
+    **curves("exudyn", STEPS[:-1], "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
     ("mujoco", "RK4"): STEPS[:-1],
     ("mujoco", "Euler"): STEPS,
-    ("mujoco", "implicit"): STEPS[:-1],
-    ("mujoco", "implicitfast"): STEPS[:-1],
-    ("mujoco", "discrete"): STEPS[:-1],
+    **curves("mujoco", STEPS[:-1], "implicit", "implicitfast", "discrete"),
 }
 """Steps (s) of every method; the finest is for the engines' defaults and those whose order shows late."""
-QUICK: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "RK4"): (0.5 * MS, 0.25 * MS, 0.125 * MS),
-    ("exudyn", "ExplicitEuler"): (1 * MS, 0.5 * MS, 0.25 * MS),
-    ("mujoco", "Euler"): (2 * MS, 1 * MS, 0.5 * MS),
+QUICK: Curves = {
+    ("reference", "RK4"): ms(0.5, 0.25, 0.125),
+    ("exudyn", "ExplicitEuler"): ms(1, 0.5, 0.25),
+    ("mujoco", "Euler"): ms(2, 1, 0.5),
 }
 """The named share of FULL that the quick report takes."""
+GUIDED: Curves = {
+    ("reference", "RK4"): STEPS,
+    **curves("exudyn", (*ms(10), *STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6"),
+    ("exudyn", "RK44"): ms(1),
+    **curves("mujoco", STEPS[:-2], *MUJOCO),
+}
+"""With the pitch prescribed. RK44 is there to be refused: it does not solve for that. MuJoCo calls Python in every
+step."""
+SEED, DEVIATION = 77, 100.0
+"""Of the noise; its standard deviation, N."""
 
 
 def driven() -> Assembly:
@@ -59,17 +67,17 @@ def driven() -> Assembly:
 
 
 class ForceExcited:
-    """The problem with its reference; see ``validation.price.problems.Problem``."""
+    """The problem with its reference; see ``validation.price.problems.Problem``. ``first`` : of a kind of problem, the
+    quantity that tolerances are set on, before the states."""
 
-    key = "forces"
-    duration = DURATION
+    key, duration, full, quick = "forces", DURATION, FULL, QUICK
     note = "The forces are those of a virtual measurement at 100 Hz, linear between the samples, the same for all."
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
     what = "driven by its wheel forces"
+    first: tuple[tuple[str, str], ...] = ()
 
-    def __init__(self, quick: bool, first: tuple[str, str] | None = None) -> None:
-        """first : a quantity and its unit on which tolerances are set, before those of the states."""
-        self.units = dict([*([first] if first else []), ("state", "m, rad, m/s, rad/s")])
+    def __init__(self, quick: bool) -> None:
+        self.units = dict((*self.first, ("state", "m, rad, m/s, rad/s")))
         steps = [1e3 * one.value for one in self.settings(quick)]
         self.title = (
             f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
@@ -78,13 +86,12 @@ class ForceExcited:
         self.assembly = self.driven()
         other = Settings("RK4", 2 * FINE, DURATION) if quick else Settings("DOP853", PERIOD, DURATION, 1e-12)
         self.reference = f"RK4 at {1e6 * FINE:.2g} us and " + ("twice that" if quick else "DOP853 at 1e-12")
-        self._true = self._by(Settings("RK4", FINE, DURATION))
-        self.uncertainty = self._off(self._by(other))
+        self._true, check = (
+            self._sampled(build("reference", self.assembly, settings).run())
+            for settings in (Settings("RK4", FINE, DURATION), other)
+        )
+        self.uncertainty = apart(check, self._true)
         self.bound = 10 * float(np.abs(next(iter(self._true.values()))).max())
-
-    def chosen(self, quick: bool) -> dict[tuple[str, str], tuple[float, ...]]:
-        """Steps (s) of every method."""
-        return QUICK if quick else FULL
 
     def driven(self) -> Assembly:
         """What is solved."""
@@ -94,22 +101,14 @@ class ForceExcited:
         """The quantities, (n, ...) each, at all instants of a run."""
         return {"state": run.states}
 
-    def _by(self, settings: Settings) -> dict[str, np.ndarray]:
-        """The quantities by the paper's equations at the samples."""
-        return self._sampled(build("reference", self.assembly, settings).run())
-
     def _sampled(self, run: Trajectory) -> dict[str, np.ndarray]:
+        """The quantities at the samples."""
         every = (len(run.states) - 1) // round(DURATION / PERIOD)
         return {name: values[::every] for name, values in self.read(run).items()}
 
-    def _off(self, found: dict[str, np.ndarray]) -> dict[str, float]:
-        """Largest difference of each quantity from the reference."""
-        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
-
     def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL, or its named share QUICK."""
-        chosen = self.chosen(quick)
-        return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+        """All settings, or their named share."""
+        return each(self.quick if quick else self.full, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting of this problem by its curve and the longest step (s) up to ``value`` that meets every sample."""
@@ -121,10 +120,61 @@ class ForceExcited:
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of each quantity at the samples, which every fixed step meets."""
-        return self._off(self._sampled(solution))
+        return apart(self._sampled(solution), self._true)
 
 
-@cache
-def problem(quick: bool) -> ForceExcited:
-    """The problem, its reference computed once per process."""
-    return ForceExcited(quick)
+class NoisyForces(ForceExcited):
+    """The same with a fixed noise file for all, so that no sampling error enters. An engineer reads the forces of the
+    suspension, which the measured wheel forces do not tell."""
+
+    key = "noise"
+    note = f"The forces carry the noise of one fixed file, {DEVIATION:g} N on every sample at 100 Hz."
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
+    what = "driven by noisy wheel forces"
+    first = (("suspension force", "N"),)
+
+    def driven(self) -> Assembly:
+        """The vehicle driven by forces with noise on them."""
+        clean = driven()
+        assert isinstance(clean.input, Sampled)
+        noise = DEVIATION * normal(SEED, 0, *clean.input.values.shape)
+        return replace(clean, input=Sampled(clean.input.values + noise, PERIOD, held=False))
+
+    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+        """Both suspension forces, and states."""
+        found = outputs(self.assembly, run)
+        return {"suspension force": np.column_stack([found[name][2] for name in ("f3", "f4")]), "state": run.states}
+
+
+class PrescribedPitch(ForceExcited):
+    """The same with its pitch prescribed, as measured on the road, and the moment that this takes.
+
+    The pitch at 100 Hz is a quintic spline: twice differentiable, and the same for all. A constraint is solved by
+    Exudyn's generalised-alpha alone, whose multiplier needs a radius below one; MuJoCo and the reference have the
+    reduced model, in which the pitch is an input.
+    """
+
+    key, full, quick = "pitch", GUIDED, GUIDED
+    note = "The moment of Exudyn is a multiplier, that of the others follows from the reduced model."
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
+    what = "driven by its wheel forces, pitch prescribed"
+    first = (("enforced moment", "N m"),)
+
+    def driven(self) -> Assembly:
+        """The vehicle with forces and pitch as inputs, on the pitch at the start."""
+        forces = driven()
+        assert isinstance(forces.input, Sampled)
+        run = build("reference", assemble(scene(DURATION)), Settings("RK4", PERIOD / 80, DURATION)).run()
+        pitch = Smooth(run.states[::80, 3, None], PERIOD, derivatives=2, degree=5)
+        guided = replace(forces, initial=forces.initial.copy()).with_input("pitch", Stacked((forces.input, pitch)))
+        guided.initial[[3, 7]] = pitch.at(0.0)[:2]
+        return guided
+
+    def read(self, run: Trajectory) -> dict[str, np.ndarray]:
+        """Moment and states."""
+        assert run.moment is not None
+        return {"enforced moment": run.moment, "state": run.states}
+
+
+problem, noisy, guided = cache(ForceExcited), cache(NoisyForces), cache(PrescribedPitch)
+"""The problems, the reference of each computed once per process."""

@@ -21,6 +21,7 @@ from models.engines.spatial_reference import SpatialReference
 from models.systems.ride.nonlinear import row_of
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
+from validation.price.problems import Curves, apart, curves, each, ms
 from validation.price.problems.road_excited import setting, settings_of
 
 DURATION, SPEED = 0.5, 20.0
@@ -34,25 +35,19 @@ RISE, SOFT = 3.0, 0.5
 GRID = 20e-3
 """Spacing (s) of the instants that are compared, which every step meets."""
 GRAVITY = 9.81
-MS = 1e-3
-_LONG = (20 * MS, 10 * MS, 20 / 3 * MS, 5 * MS, 4 * MS, 2 * MS)
-_MIDDLE = (10 * MS, 5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS)
-_SHORT = (20 / 7 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.3125 * MS)
-_NATIVE = (20 * MS, 10 * MS, 5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
-FULL: dict[tuple[str, str], tuple[float, ...]] = {
+_LONG = ms(20, 10, 20 / 3, 5, 4, 2)
+_MIDDLE = ms(10, 5, 4, 2.5, 2, 1)
+_SHORT = ms(20 / 7, 2.5, 2, 1, 0.5, 0.3125)
+_NATIVE = ms(20, 10, 5, 4, 2, 1, 0.5, 0.25, 0.125)
+FULL: Curves = {
     ("exudyn", "RK44"): _LONG,
-    ("exudyn", "ExplicitMidpoint"): (10 * MS, 20 / 3 * MS, 5 * MS, 4 * MS, 2.5 * MS, 2 * MS),
+    ("exudyn", "ExplicitMidpoint"): ms(10, 20 / 3, 5, 4, 2.5, 2),
     ("exudyn", "ExplicitEuler"): _SHORT,
     ("exudyn", "VelocityVerlet"): _MIDDLE,
-    ("exudyn", "GeneralizedAlpha 0.9"): _LONG,
-    ("exudyn", "TrapezoidalIndex2"): _LONG,
-    ("exudyn", "DOPRI5"): (1e-6,),
-    ("exudyn", "ODE23"): (1e-6,),
+    **curves("exudyn", _LONG, "GeneralizedAlpha 0.9", "TrapezoidalIndex2"),
+    **curves("exudyn", (1e-6,), "DOPRI5", "ODE23"),
     ("mujoco", "RK4"): _NATIVE,
-    ("mujoco", "Euler"): _NATIVE[1:],
-    ("mujoco", "implicit"): _NATIVE[1:],
-    ("mujoco", "implicitfast"): _NATIVE[1:],
-    ("mujoco", "discrete"): _NATIVE[1:],
+    **curves("mujoco", _NATIVE[1:], "Euler", "implicit", "implicitfast", "discrete"),
 }
 """Steps (s) of every method; Exudyn's are few, because a call takes it half a millisecond. Adaptive methods are there
 to be refused: the road is read at half steps."""
@@ -82,8 +77,7 @@ class Solver:
 class FreeVehicle:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
-    key = "vehicle"
-    duration = DURATION
+    key, duration = "vehicle", DURATION
     note = (
         "All of Exudyn's calls ask Python for side forces, bars and the road, fifty times as dear as MuJoCo's "
         "compiled callback: force calls do not show it, seconds do."
@@ -105,7 +99,7 @@ class FreeVehicle:
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
         self.states, self.others = (self._solved(law, *one[:2]) for law, one in zip(laws, REFERENCES, strict=True))
         self._true = self.read(self.states, self.instants)
-        self.uncertainty = self._off(self.read(self.others, self.instants))
+        self.uncertainty = apart(self.read(self.others, self.instants), self._true)
         self.bound = 10 * float(np.abs(self._true["wheel load"]).max())
 
     def road(self, times: ArrayLike) -> np.ndarray:
@@ -146,7 +140,7 @@ class FreeVehicle:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL: there is no quick share, of which the reference alone would take seconds."""
-        return tuple(self.setting(*curve, value) for curve, values in FULL.items() for value in values)
+        return each(FULL, self.setting)
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that meets every instant, or a tolerance."""
@@ -156,7 +150,7 @@ class FreeVehicle:
 
     def build(self, setting: Setting) -> Solver:
         """The vehicle in one engine."""
-        own = replace(settings_of(setting, DURATION), step=MS if setting.adaptive else setting.value)
+        own = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
         times = 0.5 * own.step * np.arange(2 * own.steps + 1)
         model = build(setting.engine, self.vehicle, own, SPEED, self.road(times))
         rest = np.zeros(len(self.vehicle.coordinates()))
@@ -166,14 +160,8 @@ class FreeVehicle:
         """Largest error of any wheel load and of any acceleration, at the instants."""
         every = round(GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::every]
-        return self._off(self.read(states, self.instants))
-
-    def _off(self, found: dict[str, np.ndarray]) -> dict[str, float]:
-        """Largest difference of each quantity from the reference."""
-        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
+        return apart(self.read(states, self.instants), self._true)
 
 
-@cache
-def problem(quick: bool) -> FreeVehicle:
-    """The problem, its reference computed once per process."""
-    return FreeVehicle(quick)
+problem = cache(FreeVehicle)
+"""The problem, its reference computed once per process."""

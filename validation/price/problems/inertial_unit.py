@@ -12,7 +12,8 @@ import numpy as np
 
 from models.advice.price.problem import Setting
 from models.sensors.rotations import Rule, conjugate, from_cardan, integrate, logarithm, product
-from validation.price.problems.road_excited import STAGES
+from validation.price.problems import Curves, curves, each
+from validation.price.problems.road_excited import DEFAULTS, STAGES
 from validation.price.problems.turning_sphere import Attitudes, in_exudyn, in_mujoco
 
 DURATION, GRID = 600.0, 1.0
@@ -31,20 +32,19 @@ FIRST = {"ExplicitEuler", "Euler", "implicit", "implicitfast", "discrete"}
 """Methods of first order; all others are of second, because rates are linear between samples."""
 ADAPTIVE = ("DOPRI5", "ODE23")
 """Methods that are there to be refused."""
-DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
 _OWN, _FEW = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0), (5.0, 8.0, 10.0, 16.0, 20.0, 25.0)
 _NATIVE, _IMPLICIT = (5.0, 8.0, 10.0, 20.0, 50.0, 100.0), (10.0, 12.0, 16.0, 20.0, 25.0, 100.0)
-FULL: dict[tuple[str, str], tuple[float, ...]] = {
-    **{("reference", rule): _OWN for rule in RULES},
-    **{("exudyn", method): _FEW for method in ("RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler")},
-    **{("exudyn", method): _IMPLICIT for method in ("GeneralizedAlpha 0.9", "VelocityVerlet")},
+FULL: Curves = {
+    **curves("reference", _OWN, *RULES),
+    **curves("exudyn", _FEW, "RK44", "RK67", "RK33", "ExplicitMidpoint", "ExplicitEuler"),
+    **curves("exudyn", _IMPLICIT, "GeneralizedAlpha 0.9", "VelocityVerlet"),
     ("exudyn", "TrapezoidalIndex2"): (8.0, *_IMPLICIT[:-1]),
-    **{("exudyn", method): (100.0,) for method in ADAPTIVE},
+    **curves("exudyn", (100.0,), *ADAPTIVE),
     ("mujoco", "Euler"): (*_NATIVE, 500.0),
-    **{("mujoco", method): (4.0, *_NATIVE[:-1]) for method in ("RK4", "implicit", "implicitfast", "discrete")},
+    **curves("mujoco", (4.0, *_NATIVE[:-1]), "RK4", "implicit", "implicitfast", "discrete"),
 }
 """Samples per second of every method; the last two of Exudyn are there to be refused."""
-QUICK = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
+QUICK: Curves = {("reference", "cubic rates"): (10.0, 20.0, 50.0, 100.0), ("mujoco", "Euler"): (5.0, 10.0, 20.0)}
 """The named share of FULL that the quick report takes."""
 FINE = 5e-3
 """Step (s) of the sixth-order method that the closed form is compared with."""
@@ -99,51 +99,30 @@ def apart(found: np.ndarray, true: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Rules:
-    """A rule of our own, ready to run."""
+class Solver:
+    """A setting, ready to run: a rule of our own, or the sphere of an engine."""
 
-    rule: Rule
-    period: float
-
-    def run(self) -> Attitudes:
-        """Attitudes at the instants."""
-        count = round(DURATION / self.period)
-        found = integrate(gyro(self.period * np.arange(count + 1)), self.period, attitude(np.zeros(1))[0], self.rule)
-        return Attitudes(found[:: round(GRID / self.period)], {"steps": count, "force calls": count})
-
-
-@dataclass(frozen=True)
-class InEngine:
-    """The sphere of an engine, ready to run."""
-
-    engine: str
-    method: str
-    period: float
+    setting: Setting
 
     def run(self) -> Attitudes:
         """Attitudes at the instants; Refused or RunFailed by the engine."""
-        solve = in_exudyn if self.engine == "exudyn" else in_mujoco
-        return solve(
-            self.method,
-            self.period,
-            round(DURATION / self.period),
-            round(GRID / self.period),
-            attitude(np.zeros(1))[0],
-            gyro,
-        )
+        engine, method, period = self.setting.engine, self.setting.method, self.setting.value
+        count, every, start = round(DURATION / period), round(GRID / period), attitude(np.zeros(1))[0]
+        if engine != "reference":
+            return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, every, start, gyro)
+        found = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
+        return Attitudes(found[::every], {"steps": count, "force calls": count})
 
 
 class InertialUnit:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
-    key = "unit"
-    duration = DURATION
+    key, duration, bound = "unit", DURATION, 1.0
     note = (
         "A force call is a sample of the rates, in an engine an evaluation of the torque. Rates are linear between "
         "the samples for an engine, which leaves its methods order two at most."
     )
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-    bound = 1.0
 
     def __init__(self, quick: bool) -> None:
         rates = [1 / one.value for one in self.settings(quick)]
@@ -157,8 +136,7 @@ class InertialUnit:
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
         """FULL, or its named share QUICK."""
-        chosen = QUICK if quick else FULL
-        return tuple(self.setting(*curve, 1 / rate) for curve, rates in chosen.items() for rate in rates)
+        return each(QUICK if quick else FULL, lambda engine, method, rate: self.setting(engine, method, 1 / rate))
 
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that meets every instant."""
@@ -175,18 +153,14 @@ class InertialUnit:
             default=DEFAULTS.get((engine, method, float(step)), ""),
         )
 
-    def build(self, setting: Setting) -> Rules | InEngine:
+    def build(self, setting: Setting) -> Solver:
         """One way to integrate, ready to run."""
-        if setting.engine == "reference":
-            return Rules(RULES[setting.method][0], setting.value)
-        return InEngine(setting.engine, setting.method, setting.value)
+        return Solver(setting)
 
     def errors(self, solution: Attitudes) -> dict[str, float]:
         """Largest angle between the attitude and the true one at the instants."""
         return {"attitude": apart(solution.quaternions, self.true)}
 
 
-@cache
-def problem(quick: bool) -> InertialUnit:
-    """The problem, its reference computed once per process."""
-    return InertialUnit(quick)
+problem = cache(InertialUnit)
+"""The problem, its reference computed once per process."""

@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
-from models.advice.price.pitch_plane import engine_settings
 from models.advice.price.problem import Setting
+from models.advice.price.systems.pitch_plane import engine_settings
 from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
+from validation.price.problems import Curves, curves, each, ms
 
 DURATION, SPEED = 2.0, 20.0
 GRID = 1.25e-4
@@ -41,44 +42,35 @@ STAGES = {
 DEFAULTS = {("exudyn", "GeneralizedAlpha 0.9", 1e-2): "Exudyn", ("mujoco", "Euler", 2e-3): "MuJoCo"}
 """What the engines do if not told otherwise: Exudyn 100 steps in 1 s, MuJoCo a timestep of 2 ms."""
 
-MS = 1e-3
-_STEPS = (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS, 0.125 * MS)
+MUJOCO = ("RK4", "Euler", "implicit", "implicitfast", "discrete")
+_STEPS = ms(5, 4, 2.5, 2, 1, 0.5, 0.25, 0.125)
 _TIGHT = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-FULL: dict[tuple[str, str], tuple[float, ...]] = {
+FULL: Curves = {
     ("reference", "RK4"): _STEPS,
     ("reference", "DOP853"): (1e-2, *_TIGHT[:-1]),
     ("reference", "Radau"): (1e-1, 1e-2, *_TIGHT[:-2]),
     ("reference", "LSODA"): _TIGHT,
     ("exudyn", "RK44"): _STEPS,
-    ("exudyn", "RK67"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.625 * MS),
-    ("exudyn", "RK33"): (5 * MS, 4 * MS, 2.5 * MS, 2 * MS, 1.25 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
-    ("exudyn", "ExplicitMidpoint"): _STEPS,
-    ("exudyn", "ExplicitEuler"): _STEPS,
-    ("exudyn", "VelocityVerlet"): _STEPS,
-    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, *_STEPS),
-    ("exudyn", "GeneralizedAlpha 0.6"): (10 * MS, *_STEPS),
-    ("exudyn", "TrapezoidalIndex2"): (10 * MS, *_STEPS),
+    ("exudyn", "RK67"): ms(5, 4, 2.5, 2, 1.25, 1, 0.625),
+    ("exudyn", "RK33"): ms(5, 4, 2.5, 2, 1.25, 1, 0.5, 0.25),
+    **curves("exudyn", _STEPS, "ExplicitMidpoint", "ExplicitEuler", "VelocityVerlet"),
+    **curves("exudyn", (*ms(10), *_STEPS), "GeneralizedAlpha 0.9", "GeneralizedAlpha 0.6", "TrapezoidalIndex2"),
     ("exudyn", "DOPRI5"): (1e-2, *_TIGHT),
     ("exudyn", "DVERK6"): (1e-6,),
     ("exudyn", "ODE23"): (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
-    ("mujoco", "RK4"): _STEPS,
-    ("mujoco", "Euler"): _STEPS,
-    ("mujoco", "implicit"): _STEPS,
-    ("mujoco", "implicitfast"): _STEPS,
-    ("mujoco", "discrete"): _STEPS,
+    **curves("mujoco", _STEPS, *MUJOCO),
 }
-QUICK: dict[tuple[str, str], tuple[float, ...]] = {
-    ("reference", "RK4"): (4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
+QUICK: Curves = {
+    ("reference", "RK4"): ms(4, 2, 1, 0.5, 0.25),
     ("reference", "LSODA"): (1e-3, 1e-4, 1e-6),
-    ("exudyn", "RK44"): (5 * MS, 4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
-    ("exudyn", "ExplicitEuler"): (5 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
-    ("exudyn", "GeneralizedAlpha 0.9"): (10 * MS, 2 * MS, 1 * MS, 0.5 * MS),
+    ("exudyn", "RK44"): ms(5, 4, 2, 1, 0.5, 0.25),
+    ("exudyn", "ExplicitEuler"): ms(5, 1, 0.5, 0.25),
+    ("exudyn", "GeneralizedAlpha 0.9"): ms(10, 2, 1, 0.5),
     ("exudyn", "DOPRI5"): (1e-3, 1e-4),
     ("exudyn", "DVERK6"): (1e-6,),
-    ("mujoco", "RK4"): (4 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
-    ("mujoco", "Euler"): (5 * MS, 2 * MS, 1 * MS, 0.5 * MS, 0.25 * MS),
-    ("mujoco", "implicit"): (2 * MS, 1 * MS, 0.5 * MS),
-    ("mujoco", "implicitfast"): (2 * MS, 1 * MS, 0.5 * MS),
+    ("mujoco", "RK4"): ms(4, 2, 1, 0.5, 0.25),
+    ("mujoco", "Euler"): ms(5, 2, 1, 0.5, 0.25),
+    **curves("mujoco", ms(2, 1, 0.5), "implicit", "implicitfast"),
 }
 """The named share of FULL that the quick report takes: each engine's default and fourth-order method, one
 adaptive solver, one that is unstable, one that is refused."""
@@ -115,11 +107,10 @@ def setting(engine: str, method: str, value: float) -> Setting:
 
 def settings(quick: bool) -> tuple[Setting, ...]:
     """FULL, or its named share QUICK."""
-    chosen = QUICK if quick else FULL
-    return tuple(setting(*curve, value) for curve, values in chosen.items() for value in values)
+    return each(QUICK if quick else FULL, setting)
 
 
-def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
+def dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
     """A scipy solution of the paper's equations at any time, restarted where the road is only C2."""
     derivative, p = derivative_of("road", assembly.vehicle.geometry), assembly.parameters.array()
     assert assembly.input is not None
@@ -145,8 +136,9 @@ def _dense(assembly: Assembly, method: str, tolerance: float) -> OdeSolution:
 class RoadExcited:
     """The problem with its reference; see ``validation.price.problems.Problem``."""
 
-    key = "road"
-    duration = DURATION
+    key, duration = "road", DURATION
+    tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
+    settings, setting = staticmethod(settings), staticmethod(setting)
     note = (
         "Exudyn's RK33, RK67 and adaptive methods read the road anew at every stage, in Python: their seconds show "
         "it, their force calls do not."
@@ -159,25 +151,19 @@ class RoadExcited:
             f"fixed steps of {min(steps):g} to {max(steps):g} ms"
         )
         self.units = {"wheel force": "N", "state": "m, rad, m/s, rad/s"}
-        self.tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1, 0.01)
         self.assembly = assemble(scene())
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self._solution = _dense(self.assembly, *solvers[0])
+        self._solution = dense(self.assembly, *solvers[0])
         times = GRID * np.arange(round(DURATION / GRID) + 1)
         self._states = self._solution(times).T
-        others = [_dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
+        others = [dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
         differences = [self._largest(other - self._states) for other in others]
         self.uncertainty = {name: max(found[name] for found in differences) for name in self.units}
-        self.bound = 10 * self._largest_force(times)
-
-    def settings(self, quick: bool) -> tuple[Setting, ...]:
-        """FULL, or its named share QUICK."""
-        return settings(quick)
-
-    def setting(self, engine: str, method: str, value: float) -> Setting:
-        """A setting of this problem by its curve and its step (s) or tolerance."""
-        return setting(engine, method, value)
+        signal, p = self.assembly.input, self.assembly.parameters
+        assert signal is not None
+        off = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(times))
+        self.bound = 10 * float(np.abs(off[:, :2] * [p.k1, p.k2] + off[:, 2:] * [p.d1, p.d2]).max())
 
     def build(self, setting: Setting) -> Model:
         """The vehicle in one engine."""
@@ -200,15 +186,6 @@ class RoadExcited:
         forces = off[:, :2] * [p.k1, p.k2] + off[:, 4:6] * [p.d1, p.d2]
         return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(off).max())}
 
-    def _largest_force(self, times: np.ndarray) -> float:
-        """Largest wheel force of the reference, N."""
-        assert self.assembly.input is not None
-        road, p = self.assembly.input.sample(0.0, GRID, len(times)), self.assembly.parameters
-        off = self._states[:, [0, 1, 4, 5]] - road
-        return float(np.abs(off[:, :2] * [p.k1, p.k2] + off[:, 2:] * [p.d1, p.d2]).max())
 
-
-@cache
-def problem(quick: bool) -> RoadExcited:
-    """The problem, its reference computed once per process."""
-    return RoadExcited(quick)
+problem = cache(RoadExcited)
+"""The problem, its reference computed once per process."""

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from studies.folders import new_folder
+from models.core.result_folders import new_folder
 from validation.price.sheets import main
 
 main(new_folder(Path(sys.argv[1]) if sys.argv[1:] else None, "sheets"))

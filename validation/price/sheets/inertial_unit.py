@@ -17,7 +17,7 @@ def write(folder: Path) -> list[Value]:
     values = [
         Value("unit", name, "", DURATION, float(part), sure) for name, part in zip(NAMES, problem.true[-1], strict=True)
     ]
-    write_page(
+    return write_page(
         folder,
         "unit",
         problem.title,
@@ -26,7 +26,6 @@ def write(folder: Path) -> list[Value]:
         "uncertainty is the largest angle between the two, rad. q and -q are the same attitude.",
         values,
     )
-    return values
 
 
 def _body() -> str:

@@ -40,8 +40,8 @@ def vector(values: Sequence[float] | np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.17g}" for value in values) + ")"
 
 
-def write(folder: Path, key: str, title: str, body: str, known: str, values: Sequence[Value]) -> None:
-    """The page: what is to be solved, then how the reference was made and what it gives."""
+def write(folder: Path, key: str, title: str, body: str, known: str, values: list[Value]) -> list[Value]:
+    """The page: what is to be solved, then how the reference was made and what it gives; its values."""
     lines = "\n".join(f"| {v.quantity} | {v.value:.16e} | {v.unit} | {v.uncertainty:.1e} |" for v in values)
     (folder / f"{key}.md").write_text(f"""# {title}
 
@@ -53,3 +53,4 @@ def write(folder: Path, key: str, title: str, body: str, known: str, values: Seq
 |---|---|---|---|
 {lines}
 """)
+    return values

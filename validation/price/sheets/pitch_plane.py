@@ -7,13 +7,13 @@ import numpy as np
 from models.engines.assembly import Settings
 from models.engines.protocol import build
 from models.road.study import WINDOW, study_road
-from validation.price.problems import force_excited, noisy_forces, prescribed_pitch, road_excited
+from validation.price.problems import force_excited, road_excited
 from validation.price.problems.force_excited import DURATION, FINE, PERIOD, ForceExcited
 from validation.price.problems.road_excited import SOLVERS, SPEED
 from validation.price.sheets.page import Value, columns
 from validation.price.sheets.page import write as write_page
 
-PROBLEMS = (force_excited.problem, noisy_forces.problem, prescribed_pitch.problem)
+PROBLEMS = (force_excited.problem, force_excited.noisy, force_excited.guided)
 NAMES = ("z1", "z2", "z3", "pitch", "z1_rate", "z2_rate", "z3_rate", "pitch_rate")
 UNITS = ("m", "m", "m", "rad", "m/s", "m/s", "m/s", "rad/s")
 EQUATIONS = r"""
@@ -49,42 +49,36 @@ def on_road(folder: Path) -> list[Value]:
         np.column_stack([road.amplitude, road.wavenumber, road.phase]),
     )
     end = np.array([road_excited.DURATION])
-    true, *others = (road_excited._dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
+    true, *others = (road_excited.dense(problem.assembly, *solver)(end)[:, 0] for solver in SOLVERS[False])
     sure = np.max([np.abs(other - true) for other in others], axis=0)
-    values = _values("road", problem.duration, true, sure)
-    body = f"{EQUATIONS}{ON_ROAD}\n{_numbers(problem)}"
-    write_page(
+    return write_page(
         folder,
         "road",
         problem.title,
-        body,
+        f"{EQUATIONS}{ON_ROAD}\n{_numbers(problem)}",
         f"End values at {problem.duration:g} s ({problem.reference}); the "
         "uncertainty is the largest difference of the three.",
-        values,
+        _values("road", problem.duration, true, sure),
     )
-    return values
 
 
 def by_forces(problem: ForceExcited, folder: Path) -> list[Value]:
     """The sheet and the input of a problem that forces drive."""
-    own, signal = problem.assembly, problem.assembly.input
+    signal, guided = problem.assembly.input, bool(problem.assembly.guided)
     assert signal is not None
-    guided = bool(own.guided)
     heads = ["time [s]", "front [N]", "rear [N]", *(["pitch [rad]"] if guided else [])]
     times = PERIOD * np.arange(round(DURATION / PERIOD) + 1)
     inputs = signal.sample(0.0, PERIOD, len(times))[:, : len(heads) - 1]
     columns(folder, problem.key, heads, np.column_stack([times, inputs]))
-    values = ends(problem)
-    write_page(
+    return write_page(
         folder,
         problem.key,
         problem.title,
         _body(problem, guided),
         f"End values at {DURATION:g} s "
         f"({problem.reference}); the uncertainty is the largest difference of the two over the run.",
-        values,
+        ends(problem),
     )
-    return values
 
 
 def ends(problem: ForceExcited) -> list[Value]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -67,7 +68,7 @@ def write(folder: Path) -> list[Value]:
         "Asked for: the largest error of a tyre force and of an acceleration along z of body, engine or seats at "
         f"every {1e3 * free_vehicle.GRID:g} ms."
     )
-    write_page(
+    return write_page(
         folder,
         "vehicle",
         problem.title,
@@ -76,7 +77,6 @@ def write(folder: Path) -> list[Value]:
         "two over the run.",
         values,
     )
-    return values
 
 
 def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
@@ -91,11 +91,11 @@ def _states(problem: FreeVehicle) -> list[tuple[str, str]]:
 def _tables(vehicle: SpatialVehicle) -> str:
     """Every number of the vehicle."""
     held = preloads(vehicle)
-    parts: dict[tuple[str, ...], Sequence[tuple[str, ...]]] = {
+    parts: dict[tuple[str, ...], Sequence[Sequence[Any]]] = {
         ("body", "mass [kg]", "place", "freedoms", "inertia, rows", "parent"): [
             (
                 b.name,
-                f"{b.mass:.17g}",
+                b.mass,
                 vector(b.position),
                 " ".join(b.freedoms),
                 " ".join(map(vector, b.inertia)),
@@ -108,12 +108,10 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 s.name,
                 s.one,
                 s.two or "ground",
-                vector(s.point_one),
-                vector(s.point_two),
-                vector(s.axis),
-                f"{s.stiffness:.17g}",
-                f"{s.damping:.17g}",
-                f"{held.parts[s.name]:.17g}",
+                *map(vector, (s.point_one, s.point_two, s.axis)),
+                s.stiffness,
+                s.damping,
+                held.parts[s.name],
             )
             for s in vehicle.springs
         ],
@@ -123,25 +121,25 @@ def _tables(vehicle: SpatialVehicle) -> str:
                 b.body,
                 b.left,
                 b.right,
-                vector(b.point_left),
-                vector(b.point_right),
-                f"{b.stiffness:.17g}",
-                f"{b.damping:.17g}",
-                f"{held.parts[b.name]:.17g}",
+                *map(vector, (b.point_left, b.point_right)),
+                b.stiffness,
+                b.damping,
+                held.parts[b.name],
             )
             for b in vehicle.bars
         ],
         ("tyre", "body", "place", "k [N/m]", "F0 [N]"): [
-            (t.name, t.body, vector(t.point), f"{t.stiffness:.17g}", f"{held.tyres[t.name]:.17g}")
-            for t in vehicle.tyres
+            (t.name, t.body, vector(t.point), t.stiffness, held.tyres[t.name]) for t in vehicle.tyres
         ],
         ("side force", "body", "point", "C [N/rad]"): [
-            (f.name, f.body, vector(f.point), f"{f.stiffness:.17g}") for f in vehicle.side_forces
+            (f.name, f.body, vector(f.point), f.stiffness) for f in vehicle.side_forces
         ],
-        ("drag", "c [N s^2/m^2]"): [(d.body, f"{d.coefficient:.17g}") for d in vehicle.drags],
+        ("drag", "c [N s^2/m^2]"): [(d.body, d.coefficient) for d in vehicle.drags],
     }
     return "\n\n".join(_table(heads, rows) for heads, rows in parts.items())
 
 
-def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *rows))
+def _table(heads: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+    """A table of text and of numbers, these to all digits."""
+    told = [[cell if isinstance(cell, str) else f"{cell:.17g}" for cell in row] for row in rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ("---",) * len(heads), *told))

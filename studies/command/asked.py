@@ -1,7 +1,9 @@
 """What the user asked for on the command line: a scene, its study and the engines that run it."""
 
 import os
+import re
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,38 +13,20 @@ from models.core.finding import Finding
 from models.core.systems import DEFAULT, SYSTEMS, listed, load
 from models.measured.file_kinds import is_measurement
 
-SCENES = Path(__file__).parent / "scenes"
-KNOWN = SYSTEMS | listed(Path(__file__).parent, __package__)
+STUDIES = Path(__file__).parents[1]
+SCENES = STUDIES / "scenes"
+KNOWN = SYSTEMS | listed(STUDIES, STUDIES.name)
 """Systems of scenes: those of the models, and studies that have scenes of their own (folders with a ``scene``)."""
-
 ANY = "any"
 """System of a study that runs scenes of all systems."""
-NOT_STUDIES = (
-    "__init__",
-    "asked",
-    "braking_figures",
-    "choice_figure",
-    "command_line",
-    "comparison",
-    "contact_figures",
-    "figures",
-    "folders",
-    "handling_figures",
-    "hub_forces_figures",
-    "log_axis",
-    "recording_figures",
-    "recording_page",
-    "recording_runs",
-    "ride_figures",
-    "stabiliser_figures",
-    "summary_numbers",
-    "sweep",
-    "sweep_figure",
-    "tyre_figure",
-    "virtual_measurement",
-    "wheelset_figures",
-)
-"""Modules beside the studies that are none."""
+
+
+@cache
+def studies() -> tuple[str, ...]:
+    """Names of all studies, read and not imported: files of ``studies`` that have ``run(scene, engines, folder,
+    progress)``."""
+    files = sorted(STUDIES.glob("*.py"))
+    return tuple(file.stem for file in files if re.search(r"^def run\(\s*scene", file.read_text(), re.MULTILINE))
 
 
 def load_scene(name: str, changes: list[str] | None) -> Any:
@@ -143,9 +127,8 @@ def study_of(scene: Any) -> Any:
     """The study's module, once the scene's options are known to be its own."""
     from models.core.strict import read
 
-    names = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if path.stem not in NOT_STUDIES))
-    if scene.study not in names:
-        raise InputError(scene.file, "study", scene.study, "no such study", names)
+    if scene.study not in studies():
+        raise InputError(scene.file, "study", scene.study, "no such study", studies())
     module = import_module(f"studies.{scene.study}")
     own = getattr(module, "SYSTEM", DEFAULT)
     if own not in (ANY, scene.system):

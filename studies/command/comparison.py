@@ -1,7 +1,8 @@
 """Two results of one study beside each other: every quantity's largest and rms difference, and where it is largest."""
 
 import csv
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,9 +60,14 @@ class Difference:
         return np.where(same, 0.0, np.where(np.isnan(gap), np.inf, gap))
 
     @property
+    def row(self) -> int:
+        """Where the difference is largest."""
+        return int(np.abs(self.gap).argmax())
+
+    @property
     def largest(self) -> float:
         """Largest magnitude of the difference."""
-        return float(np.abs(self.gap).max())
+        return float(abs(self.gap[self.row]))
 
     @property
     def rms(self) -> float:
@@ -71,13 +77,12 @@ class Difference:
     @property
     def at(self) -> float:
         """Where on the grid the difference is largest."""
-        return float(self.grid[np.abs(self.gap).argmax()])
+        return float(self.grid[self.row])
 
     @property
     def where(self) -> str:
         """The same in words."""
-        label = self.labels[np.abs(self.gap).argmax()] if self.labels else f"{self.at:.9g}"
-        return f"{self.over.partition(' [')[0]} = {label}"
+        return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property
     def share(self) -> float:
@@ -91,67 +96,63 @@ def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
-    found, notes = list[Difference](), list[str]()
-    pairs = _pairs(one, two, notes)
-    for name, first, second in pairs:
-        a, b = _read(first), _read(second)
+    pairs, notes = _pairs(one, two)
+    found = list[Difference]()
+    for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
-        notes += [
-            f"{prefix}only in {path}: {', '.join(own)}"
-            for path, own in ((first, [key for key in a if key not in b]), (second, [key for key in b if key not in a]))
-            if own
-        ]
-        found += [_difference(prefix + key, a[key], b[key], second) for key in a if key in b]
+        a, b = (dict(_netcdf(file) if file.suffix == ".nc" else _table(file)) for file in files)
+        notes += _alone(prefix, (files[0], a), (files[1], b))
+        found += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
     if not found:
         raise InputError(two, "", None, f"has no quantity in common with {one}: compare two results of one study")
     return sorted(found, key=lambda each: -each.share), notes
 
 
-def _pairs(one: Path, two: Path, notes: list[str]) -> list[tuple[str, Path, Path]]:
-    """Files to compare: the two themselves, or those of the same name in both folders."""
+def _alone(prefix: str, *sides: tuple[Path, Collection[str]]) -> list[str]:
+    """Notes on names that one side alone has."""
+    return [
+        f"{prefix}only in {path}: {', '.join(alone)}"
+        for (path, names), (_, others) in (sides, sides[::-1])
+        if (alone := [name for name in names if name not in others])
+    ]
+
+
+def _pairs(one: Path, two: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
+    """Files to compare, the two themselves or those of the same name in both folders, and notes on the others."""
     for path in (one, two):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
         if path.is_file() and path.suffix not in SUFFIXES:
             raise InputError(path, "", None, "is no result: name a folder, a netCDF file (.nc) or a table (.csv)")
-    if one.is_file() != two.is_file():
-        raise InputError(two, "", None, f"is a {_kind(two)} and {one} a {_kind(one)}: name two of a kind")
+    kinds = ["file" if path.is_file() else "folder" for path in (one, two)]
+    if kinds[0] != kinds[1]:
+        raise InputError(two, "", None, f"is a {kinds[1]} and {one} a {kinds[0]}: name two of a kind")
     if one.is_file():
-        return [("", one, two)]
+        return [("", one, two)], []
     first, second = _files(one), _files(two)
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
-        return [("", next(iter(first.values())), next(iter(second.values())))]
+        return [("", next(iter(first.values())), next(iter(second.values())))], []
     if not common:
         raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
-    notes += [
-        f"only in {path}: {', '.join(own)}"
-        for path, own in (
-            (one, [name for name in first if name not in second]),
-            (two, [name for name in second if name not in first]),
-        )
-        if own
-    ]
-    return [(name, first[name], second[name]) for name in common]
-
-
-def _kind(path: Path) -> str:
-    return "file" if path.is_file() else "folder"
+    return [(name, first[name], second[name]) for name in common], _alone("", (one, first), (two, second))
 
 
 def _files(folder: Path) -> dict[str, Path]:
-    """Results of a folder by their names within it; netCDF files alone where there are any."""
-    found = {
-        path.relative_to(folder).as_posix(): path
+    """Results of a folder by their names within it; netCDF files alone where there are any that no table repeats."""
+    found = [
+        path
         for path in sorted(folder.rglob("*"))
-        if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.parts[len(folder.parts) :])
-    }
-    netcdf = {name: path for name, path in found.items() if path.suffix == ".nc"}
-    return netcdf or found
+        if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    ]
+    netcdf = [path for path in found if path.suffix == ".nc" and not _tabled(path)]
+    chosen = netcdf or [path for path in found if path.suffix == ".csv"]
+    return {path.relative_to(folder).as_posix(): path for path in chosen}
 
 
-def _read(path: Path) -> dict[str, Quantity]:
-    return dict(_netcdf(path) if path.suffix == ".nc" else _table(path))
+def _tabled(path: Path) -> bool:
+    """Whether the CSV beside a netCDF file is the same table: its channels have one axis."""
+    return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
 def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -165,28 +166,24 @@ def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
         others = [dim for dim in channel.dims if dim != along]
         for place in np.ndindex(*(channel.sizes[dim] for dim in others)):
             at = dict(zip(others, place, strict=True))
-            own = ", ".join([str(name), *(_label(channel, dim, i) for dim, i in at.items())])
+            labels = (str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}" for dim, i in at.items())
             values = channel.isel(at).values.astype(float).reshape(-1)
-            yield own, Quantity(str(channel.attrs.get("units", "")), values, over, grid, kinds)
+            quantity = Quantity(str(channel.attrs.get("units", "")), values, over, grid, kinds)
+            yield ", ".join((str(name), *labels)), quantity
 
 
 def _along(channel: Any) -> Any:
     """The dimension that a channel is read along: time, or the longest whose entries are numbers or have no names."""
     numbered = [dim for dim in channel.dims if dim not in channel.coords or channel[dim].dtype.kind in "fiu"]
-    return "time" if "time" in numbered else max(numbered, key=lambda dim: channel.sizes[dim], default=None)
+    return "time" if "time" in numbered else max(numbered, key=channel.sizes.get, default=None)
 
 
 def _grid(channel: Any, along: Any) -> tuple[str, np.ndarray]:
     """Name and values of the coordinate along a dimension; entries are counted where it has none."""
-    if along is None or along not in channel.coords:
+    if along not in channel.coords:
         return "entry", np.arange(channel.sizes.get(along, 1), dtype=float)
     unit = channel[along].attrs.get("units", "s" if along == "time" else "")
     return f"{along} [{unit}]" if unit else str(along), channel[along].values.astype(float)
-
-
-def _label(channel: Any, dim: Any, i: int) -> str:
-    """What names an entry of another dimension."""
-    return str(channel[dim].values[i]) if dim in channel.coords else f"{dim} {i}"
 
 
 def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -194,26 +191,22 @@ def _table(path: Path) -> Iterator[tuple[str, Quantity]]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             heads, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
-        columns = dict(zip(_once(heads), zip(*rows, strict=True), strict=True)) if rows else {}
+        names = [head.strip() for head in heads]
+        for name, count in Counter(names).items():
+            if count > 1:
+                raise ValueError(f"two columns are called {name!r}")
+        columns = dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(path, "", None, f"is not a table of results: {error}") from None
     if not columns:
         raise InputError(path, "", None, "is not a table of results: it has no rows")
-    numeric = {head: own for head, cells in columns.items() if (own := _numbers(cells)) is not None}
-    over = next(iter(columns))
-    names = columns[over] if over not in numeric else ()
+    numeric = {head: values for head, cells in columns.items() if (values := _numbers(cells)) is not None}
+    over = names[0]
+    labels = () if over in numeric else columns[over]
     grid = numeric.pop(over, np.arange(len(rows), dtype=float))
     for head, values in numeric.items():
         name, _, unit = head.partition(" [")
-        yield name, Quantity(unit.rstrip("]"), values, over, grid, labels=names)
-
-
-def _once(heads: list[str]) -> list[str]:
-    """Headings without blanks around them; ValueError for two that are the same."""
-    names = [head.strip() for head in heads]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise ValueError(f"two columns are called {twice[0]!r}")
-    return names
+        yield name, Quantity(unit.rstrip("]"), values, over, grid, labels=labels)
 
 
 def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
@@ -228,10 +221,11 @@ def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Differen
     """Raises InputError where kinds of runs, units or rows do not fit."""
     if one.kind != two.kind:
         raise InputError(file, name, two.kind, f"the other run is of {one.kind}: compare two runs of one kind")
-    if one.unit != two.unit or one.over != two.over:
+    if (one.unit, one.over) != (two.unit, two.over):
         raise InputError(file, name, f"{two.unit} over {two.over}", f"the other one is in {one.unit} over {one.over}")
-    if other := next(((a, b) for a, b in zip(one.labels, two.labels, strict=False) if a != b), None):
-        raise InputError(file, name, other[1], f"has other rows than the first, which has {other[0]!r} there")
+    for label, other in zip(one.labels, two.labels, strict=False):
+        if label != other:
+            raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
     near = NEAR * np.abs(one.grid).max(initial=0.0)
     if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=0.0, atol=near):
         return Difference(name, one.unit, one.over, one.grid, one.values, two.values, labels=one.labels)
@@ -246,62 +240,51 @@ def _in_time(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
     from scipy.interpolate import CubicSpline
 
     fine, coarse = (one, two) if len(one.grid) > len(two.grid) else (two, one)
+    unread = "cannot be read at other times: the"
     if not (np.diff(fine.grid) > 0.0).all():
-        raise InputError(file, name, None, "cannot be read at other times: the times of the denser run do not increase")
+        raise InputError(file, name, None, f"{unread} times of the denser run do not increase")
     if not np.isfinite(fine.values).all():
-        raise InputError(file, name, None, "cannot be read at other times: the denser run holds what is no number")
+        raise InputError(file, name, None, f"{unread} denser run holds what is no number")
     inside = (coarse.grid >= fine.grid[0] - 1e-9) & (coarse.grid <= fine.grid[-1] + 1e-9)
     if not (inside.sum() > 1 and len(fine.grid) > 3):
         raise InputError(file, name, None, "has no times in common with the first")
-    read = CubicSpline(fine.grid, fine.values)(coarse.grid[inside])
-    pair = (read, coarse.values[inside]) if fine is one else (coarse.values[inside], read)
-    note = f"on {int(inside.sum())} common rows, the denser run by a cubic spline"
-    return Difference(name, one.unit, one.over, coarse.grid[inside], *pair, note)
+    times = coarse.grid[inside]
+    pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
+    note = f"on {len(times)} common rows, the denser run by a cubic spline"
+    return Difference(name, one.unit, one.over, times, *(pair if fine is one else pair[::-1]), note)
 
 
 def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
     """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
     found, notes = compare(one, two)
-    names = [each.name for each in found]
-    table = {
-        "largest": [each.largest for each in found],
-        "rms": [each.rms for each in found],
-        "at": [each.at for each in found],
-        "share": [each.share for each in found],
-    }
-    _save(folder / "compare.csv", found)
+    with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
+        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share) for d in found)
     _figure(one, two, found, folder / "compare.png")
     return {
         "scene": f"{two} less {one}",
         "folder": str(folder),
         "failed": {},
-        "names": names,
-        "differences": table,
+        "names": [each.name for each in found],
+        "differences": {name: [getattr(each, name) for each in found] for name in ("largest", "rms", "at", "share")},
         "table": [*_lines(found), *(f"  {note}" for note in notes)],
     }
 
 
-def _save(path: Path, found: list[Difference]) -> None:
-    with whole_file(path) as part, part.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
-        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share) for d in found)
-
-
 def _lines(found: list[Difference]) -> list[str]:
-    same = [each.name for each in found if each.largest == 0.0]
-    if len(same) == len(found):
+    differ = [each for each in found if each.largest > 0.0]
+    if not differ:
         return [f"  all {len(found)} quantities are the same to the last bit"]
-    lines = [f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest"]
-    lines += [
-        f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {d.where}"
-        for d in found[:SHOWN]
-        if d.largest > 0.0
+    shown = [each for each in found[:SHOWN] if each.largest > 0.0]
+    same, more = len(found) - len(differ), len(differ) - len(shown)
+    return [
+        f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
+        *(f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {d.where}" for d in shown),
+        *([f"  {more} more that differ less: compare.csv"] if more else []),
+        *([f"  the same to the last bit: {same} of {len(found)}"] if same else []),
+        *(f"  {note}" for note in dict.fromkeys(each.note for each in found if each.note)),
     ]
-    more = sum(each.largest > 0.0 for each in found[SHOWN:])
-    lines += [f"  {more} more that differ less: compare.csv"] if more else []
-    lines += [f"  the same to the last bit: {len(same)} of {len(found)}"] if same else []
-    return lines + [f"  {note}" for note in dict.fromkeys(each.note for each in found if each.note)]
 
 
 def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
@@ -315,9 +298,8 @@ def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
         top.plot(each.grid, each.two, color="#d55e00", linewidth=1.0, label=str(two))
         top.set_title(f"{each.name} [{each.unit or '-'}]")
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color="#0072b2")
-        below.plot(each.at, each.gap[np.abs(each.gap).argmax()], "o", color="#0072b2", markersize=5)
-        below.set_title(f"difference, largest {each.largest:.3g} at the mark")
-        below.set_xlabel(each.over)
+        below.plot(each.at, each.gap[each.row], "o", color="#0072b2", markersize=5)
+        below.set(title=f"difference, largest {each.largest:.3g} at the mark", xlabel=each.over)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     figure.suptitle(f"Largest differences of {len(found)} quantities", x=0.01, ha="left", fontweight="bold")
     save(figure, path)

@@ -1,4 +1,4 @@
-"""A scene at many values of one key: every point a run of its own, kept as soon as it is finished.
+"""A scene at many values of one key: every point a run of its own, kept as soon as it is finished, and drawn.
 
 ``twinrig run SCENE --sweep vehicle.override.k3=8e4:1.2e5:9`` leaves a folder ``runs/0003`` per point, as the run of
 that scene alone would, and ``sweep.csv``, ``sweep.json`` and figures of every number that its study gives. A sweep is
@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +23,13 @@ import numpy as np
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed
 from models.core.whole_files import write_whole
+from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import processes
-from studies.asked import engines_of, load_scene, ready, scene_path
-from studies.summary_numbers import numbers
+from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
+from studies.command.summary_numbers import numbers
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -37,7 +38,16 @@ MOST = 10_000
 WORKERS = 2
 """Processes, if there are so many cores; the results do not depend on it."""
 
+ACROSS, DOWN, PAGES = 3, 4, 4
+"""Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
+DECADES = 30.0
+"""Ratio of the largest to the least value from which on an axis is logarithmic."""
+
 Record = dict[str, Any]
+Columns = dict[str, list[Any]]
+"""Numbers of all points by their names, None where there is none."""
+Failures = list[dict[str, str]]
+"""What failed at each point, by engine."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,7 @@ class Points:
 
     def __call__(self, paths: range) -> Arrays:
         """``record`` (n,): the record of each point as JSON."""
-        return _array([self.record(i) for i in paths])
+        return _array(map(self.record, paths))
 
     def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point; InputError if it cannot be run."""
@@ -64,14 +74,15 @@ class Points:
 
     def check(self) -> None:
         """Raise the InputError of the first point if every point is refused: then it is not one value that is wrong."""
-        reasons = []
+        first: InputError | None = None
         for i in range(len(self.values)):
             try:
                 self.ready(i)
                 return
             except InputError as error:
-                reasons.append(error)
-        raise reasons[0]
+                first = first or error
+        if first:
+            raise first
 
     def record(self, i: int) -> Record:
         """Numbers of one point by their names, and what failed, by engine where the study told it."""
@@ -80,7 +91,7 @@ class Points:
             with whole_folder(self.folder / RUNS / f"{i:04d}") as own:
                 summary = study.run(scene, engines, own, lambda text, part: None)
         except (InputError, RunFailed) as error:
-            return _failed(str(error))
+            return _failed(error)
         return {"numbers": numbers(summary), "failed": summary.get("failed", {})}
 
     def facts(self) -> dict[str, Any]:
@@ -93,16 +104,16 @@ class Points:
             "engine": self.engine,
             "scene": table,
             "files": named_files([table, self.values, self.engine], path.parent),
-            "code of studies": code(Path(__file__).parent),
+            "code of studies": code(STUDIES),
         }
 
 
-def _array(records: list[Record]) -> Arrays:
-    return {"record": np.array([json.dumps(record) for record in records])}
+def _array(records: Iterable[Record]) -> Arrays:
+    return {"record": np.array(list(map(json.dumps, records)))}
 
 
-def _failed(reason: str) -> Record:
-    return {"numbers": {}, "failed": {"": reason}}
+def _failed(reason: object) -> Record:
+    return {"numbers": {}, "failed": {"": str(reason)}}
 
 
 @contextmanager
@@ -137,6 +148,14 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
     if len(set(map(_written, values))) < len(values):
         raise InputError("--sweep", key, rest, "gives a value twice")
     return key, values
+
+
+def points(text: str, scene: str, changes: Sequence[str], engine: str | None) -> Points:
+    """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
+    key, values = asked(text)
+    job = Points(scene, tuple(changes), key, values, engine, Path())
+    job.check()
+    return job
 
 
 def _spaced(text: str, first: str, last: str, count: str) -> tuple[Any, ...]:
@@ -175,8 +194,6 @@ def _writable(value: Any) -> bool:
 
 def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
     """All points that are not finished yet, then table and figures."""
-    from studies.sweep_figure import draw
-
     with locked(job.folder):
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
@@ -208,7 +225,7 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
         progress(f"{done.done} of {done.paths} points", done.done / done.paths)
 
     def lost(points: range, reason: str) -> Arrays:
-        return _array([_failed(reason) for _ in points])
+        return _array(_failed(reason) for _ in points)
 
     with processes(min(WORKERS, os.cpu_count() or 1, len(job.values))) as pool:
         found = run_paths(job, len(job.values), job.folder / RECORDS, pool, 1, tell, lost)["record"]
@@ -218,7 +235,7 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
     return records
 
 
-def _save(job: Points, columns: dict[str, list[Any]], failures: list[dict[str, str]]) -> None:
+def _save(job: Points, columns: Columns, failures: Failures) -> None:
     """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
@@ -231,14 +248,119 @@ def _save(job: Points, columns: dict[str, list[Any]], failures: list[dict[str, s
     write_whole(job.folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
-def _table(columns: dict[str, list[Any]], pages: list[str]) -> list[str]:
+def _table(columns: Columns, pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
-    moving = {
-        name: own for name, column in columns.items() if len(set(own := [v for v in column if v is not None])) > 1
-    }
+    moving = {name: _there(column) for name, column in columns.items() if _moves(column)}
     lines = [
         f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
         for name, own in list(moving.items())[:12]
     ]
     rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
     return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]
+
+
+def draw(job: Points, columns: Columns, failures: Failures) -> list[str]:
+    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
+    panels = _panels(columns)
+    size, names = ACROSS * DOWN, list[str]()
+    shown = list(panels.items())[: size * PAGES] or [("no number changes", {})]
+    for first in range(0, len(shown), size):
+        name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
+        _page(job, shown[first : first + size], failures, name, f"the {len(panels)} quantities that change")
+        names.append(name)
+    return names
+
+
+def _panels(columns: Columns) -> dict[str, dict[str, list[Any]]]:
+    """Quantities that change -> curve of each implementation, "" where there is but one."""
+    panels: dict[str, dict[str, list[Any]]] = {}
+    for name, column in columns.items():
+        first, _, rest = name.partition(", ")
+        engine, what = (first, rest) if rest and first in LABELS else ("", name)
+        panels.setdefault(what, {})[engine] = column
+    return {what: own for what, own in panels.items() if any(_moves(column) for column in own.values())}
+
+
+def _there(column: list[Any]) -> list[Any]:
+    return [value for value in column if value is not None]
+
+
+def _moves(column: list[Any]) -> bool:
+    return len(set(_there(column))) > 1
+
+
+def _page(
+    job: Points, panels: list[tuple[str, dict[str, list[Any]]]], failures: Failures, name: str, note: str
+) -> None:
+    down = -(-len(panels) // ACROSS)
+    figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
+    at, ticks = _places(job.values)
+    for axis, (what, curves) in zip(axes.flat, panels, strict=False):
+        _panel(axis, at, what, curves, failures, "o" if ticks else "o-")
+        if ticks:
+            axis.set_xticks(at, ticks)
+        elif _spread(at):
+            axis.set_xscale("log")
+        axis.set_xlabel(job.key)
+    for axis in axes.flat[len(panels) :]:
+        axis.set_visible(False)
+    handles: dict[str, Any] = {}
+    for axis in axes.flat:
+        found, labels = axis.get_legend_handles_labels()
+        handles |= dict(zip(labels, found, strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
+    figure.suptitle(f"{job.scene.rpartition('/')[2]} over {job.key}: {note}", x=0.01, ha="left", fontweight="bold")
+    save(figure, job.folder / name)
+
+
+def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+    """Places on the axis and, for values that are no numbers, what is written there."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array(values, float), []
+    return np.arange(float(len(values))), [str(value)[:18] for value in values]
+
+
+def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: Failures, style: str) -> None:
+    order = np.argsort(at)
+    for i, (engine, column) in enumerate(curves.items()):
+        axis.plot(
+            at[order],
+            np.array(column, float)[order],
+            style,
+            color=COLOURS.get(engine, "#0072b2"),
+            markersize=3.5,
+            linewidth=2.2 - 0.6 * min(i, 2),
+            label=LABELS[engine] or None,
+        )
+    if all(_spread(np.array(_there(column), float)) for column in curves.values()):
+        axis.set_yscale("log")
+    else:
+        axis.ticklabel_format(axis="y", useOffset=False)
+    lost = [i for i, failed in enumerate(failures) if failed and any(column[i] is None for column in curves.values())]
+    if lost:
+        axis.plot(
+            at[lost],
+            np.full(len(lost), 0.04),
+            "x",
+            transform=axis.get_xaxis_transform(),
+            color="#cc0000",
+            markersize=8,
+            markeredgewidth=2,
+            clip_on=False,
+            label="failed",
+        )
+    axis.set_title(_title(what), fontsize=9)
+
+
+def _title(what: str) -> str:
+    """The quantity on at most two lines, its unit last."""
+    text, unit = re.fullmatch(r"(.*?)( \[[^\[\]]*\])?", what, re.DOTALL).groups()  # type: ignore[union-attr]
+    if len(what) <= 46:
+        return what
+    cut = text.rfind(", ", 0, 46)
+    cut = cut + 1 if cut > 0 else 46
+    return f"{text[:cut]}\n{text[cut : cut + 46].strip()}{unit or ''}"
+
+
+def _spread(values: np.ndarray) -> bool:
+    return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())
