@@ -26,8 +26,8 @@ MASKS = (
 )
 """What a machine decides in messages, and what stands in its place."""
 JOBS = "jobs.json"
-UNWATCHED = ("seconds", "folder", "command", "price")
-"""Keys of printed tables that a machine decides."""
+UNWATCHED = ("seconds", "folder", "command", "price", "range")
+"""Keys of printed tables, and columns, that a machine decides."""
 
 
 @dataclass
@@ -200,6 +200,8 @@ def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, 
         told.other.append(f"message {before.message.strip()[:200]!r} is {now.message.strip()[:200]!r}")
     matched = set()
     for name, array in before.arrays.items():
+        if not {*re.split(r"[:/ ]+", name)}.isdisjoint(UNWATCHED):
+            continue
         if (later := _later(name, now.arrays, renamed)) is None:
             told.wrong.append(f"{name} is gone")
             continue

@@ -1,0 +1,31 @@
+"""What every shipped scene saves: netCDF files that say of which scene, version and machine they are."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from models.core.result import load
+from studies.command.asked import SCENES, engines_of, load_scene, ready
+from validation.replay.jobs import SHORTER
+
+LESS = tomllib.loads(SHORTER.read_text())
+NAMES = sorted(path.stem for path in SCENES.glob("*.toml"))
+PICTURES, SEARCHES = ("animation",), ("contact_price",)
+"""Films are no results; a search for the cheapest theory takes half a minute and saves what others save."""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in PICTURES + SEARCHES])
+def test_every_netcdf_is_a_result_of_its_scene(name: str, tmp_path: Path):
+    scene = load_scene(name, LESS.get(name, []))
+    engines = engines_of(getattr(getattr(scene, "run", None), "engine", None), scene.system)
+    ready(scene, engines).run(scene, engines, tmp_path, lambda text, part: None)
+    saved = sorted(tmp_path.rglob("*.nc"))
+    assert saved, "a study leaves at least one result"
+    for path in saved:
+        said = load(path).data.attrs
+        assert json.loads(said["scene_table"])["title"] == said["title"] == scene.title, path.name
+        assert json.loads(said["provenance"])["twinrig"], path.name
+        assert said["system"] == scene.system and "counts" in said, path.name
