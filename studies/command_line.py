@@ -38,6 +38,8 @@ Sweep = Annotated[
     str | None,
     typer.Option(metavar="KEY=FROM:TO:N", help="Run the scene at N values of a key, or at those of KEY=a,b,c."),
 ]
+NoError = Annotated[bool, typer.Option("--no-error", help="Do not estimate the error of steps or cells.")]
+Strictly = Annotated[bool, typer.Option("--strict", help="End with code 1 where an assumption is broken.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
 
@@ -147,6 +149,8 @@ def run_scene(
     resume: Resume = None,
     sweep: Sweep = None,
     changes: Changes = None,
+    no_error: NoError = False,
+    strict: Strictly = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
@@ -158,12 +162,13 @@ def run_scene(
         folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
         return _finish(lambda progress: run_points(replace(job, folder=folder), progress), folder, as_json)
     loaded = load_scene(scene, changes)
+    loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
         module = ready(loaded, engines)
         folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
-        _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts)
+        _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts, strict)
 
 
 @contextmanager
@@ -261,17 +266,22 @@ def validate(
 
 
 def _finish(
-    work: Callable[[Any], dict[str, Any]], folder: Path, as_json: bool, doubts: tuple[Finding, ...] = ()
+    work: Callable[[Any], dict[str, Any]],
+    folder: Path,
+    as_json: bool,
+    doubts: tuple[Finding, ...] = (),
+    strict: bool = False,
 ) -> None:
     """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
 
-    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results.
+    doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
+    a broken assumption ends with code 1.
     """
     from models.core.result_folders import COMMAND, drop_if_empty
 
     try:
         with _progress(as_json) as progress:
-            summary = work(progress)
+            summary = _judged(work(progress))
         if doubts:
             summary["queries"] = queries(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
@@ -284,8 +294,26 @@ def _finish(
         print(json.dumps(summary, indent=1))
     else:
         _print(summary, doubts)
-    if summary.get("failed"):
+    if summary.get("failed") or (strict and any(one["broken"] for one in summary["assumptions"].values())):
         sys.exit(1)
+
+
+def _judged(summary: dict[str, Any]) -> dict[str, Any]:
+    """The summary with the errors and assumptions of the "results" that a study hands over, told at its end."""
+    from models.core.assumptions import broken_of
+    from models.core.discretisation import error_lines
+
+    results = summary.pop("results", {})
+    said: dict[str, list[str]] = {}
+    for name, run in results.items():
+        for line in (*error_lines(run), *(one.line() for one in broken_of(run))):
+            said.setdefault(line, []).append(name)
+    summary["errors"] = {name: json.loads(run.data.attrs["error"]) for name, run in results.items()}
+    summary["assumptions"] = {
+        name: {"broken": [], **json.loads(run.data.attrs["assumptions"])} for name, run in results.items()
+    }
+    told = [f"  {', '.join(names)}: {line}" for line, names in said.items()]
+    return summary | {"table": [*summary.get("table", []), *told]}
 
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:

@@ -25,7 +25,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     for i, engine in enumerate(engines):
         progress(f"{scene.title}: {engine}", i / len(engines))
         try:
-            results[engine] = simulate(scene, engine)
+            results[engine] = simulate(scene, engine, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
             continue
@@ -41,6 +41,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "folder": str(folder),
         "runs": {engine: _line(result) for engine, result in results.items()},
         "failed": failed,
+        "results": results,
         "largest difference of states": agreement(results),
         "doubts": list(assembly.doubts),
         "table": [*trust_line(assembly), *doubt_lines(assembly), *beside],

@@ -24,6 +24,7 @@ class SceneFile(Strict):
     options: dict[str, Any] = Field(default_factory=dict, description="options of the study")
     quantities: list[str] = Field(default_factory=list, description="what a choice of effects must hold")
     tolerance: float | None = Field(default=None, gt=0, lt=1, description="relative, of their standard deviations")
+    error: bool = Field(default=True, exclude=True, description="whether the error of steps or cells is estimated")
     file: str = Field(default="", exclude=True)
     folder: str = Field(default=".", exclude=True)
 

@@ -22,8 +22,6 @@ BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
 
 Sixty rows cost 5 ms. Clean data are met to 1e-4; white noise on the data that is differentiated over a
 step of one sample comes out 10 times too large, a constant wrong multiplier 0.2 to 1 times."""
-WAVE = 4
-"""Finest details in the shortest wave of an input: a fixed step that is longer cannot tell it from another one."""
 SIZE_BOUND = 1e4
 """A state above this (m, rad, m/s, rad/s) is not a vehicle any more: 1e303 is finite, too."""
 
@@ -74,13 +72,6 @@ def _reading(engine: str, integrator: Integrator, settings: Settings, signal: Si
             engine,
             f"{settings.integrator} may take steps of {settings.step:g} s and miss details of the "
             f"input, which are {signal.resolution:.3g} s long: use a step of at most that",
-        )
-    if signal.period is None and not integrator.adaptive and settings.step > WAVE * signal.resolution:
-        raise Refused(
-            engine,
-            f"a step of {settings.step:g} s passes over whole waves of the road, whose finest "
-            f"details are {signal.resolution:.3g} s long, and would see another one: use at most "
-            f"{WAVE * signal.resolution:.3g} s, a quarter of it to follow them",
         )
 
 

@@ -1,5 +1,6 @@
 """What a scene will compute: printed by ``twinrig show``, checked before any run."""
 
+from models.core.assumptions import assumption_lines
 from models.core.errors import Refused
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
@@ -9,6 +10,7 @@ from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.protocol import check as check_engine
+from models.systems.pitch_plane.assumptions import assumptions
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.vehicles.pitch_plane import STATE_NAMES
 from models.vehicles.plausible_plane import plausible_plane
@@ -47,7 +49,7 @@ def describe(scene: Scene) -> str:
     lines += [_line("motion", motion)]
     lines += _vehicle(scene, assembly) + effect_lines(scene)
     lines += [_line("channels", ", ".join(_channels(assembly))), *trust_line(assembly), *doubt_lines(assembly)]
-    lines += ["", *_engines(scene, assembly)]
+    lines += [*assumption_lines(assumptions(assembly)), "", *_engines(scene, assembly)]
     return "\n".join(lines)
 
 

@@ -1,28 +1,38 @@
 """One run, from scene to result: assemble, build in an engine, integrate, label."""
 
 import json
+import math
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from models.core.assumptions import judged
+from models.core.discretisation import Series, estimated, of_tolerance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Assembly, Channels, Model, Settings, Trajectory
-from models.engines.catalogue import OUTSIDE
+from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.protocol import build
+from models.systems.pitch_plane.assumptions import PRINCIPAL, assumptions
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of
 from models.vehicles.pitch_plane import STATES
 from models.vehicles.pitch_plane_equations import suspension_loads
 
 MEANINGS = ("front wheel, down", "rear wheel, down", "chassis heave, down", "pitch, nose up")
 """Of STATES."""
+LOOSER = 10.0
+"""Factor on the tolerance of an adaptive method that tells its error."""
 
 
-def run(scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None) -> Result:
+def run(
+    scene: Scene, engine: str, settings: Settings | None = None, assembly: Assembly | None = None, error: bool = False
+) -> Result:
     """Run a scene in one engine; raises InputError, Refused or RunFailed, never returns a partial run.
 
-    settings : in place of the scene's own; assembly : what runs, where it is known already or was changed by hand.
+    settings : in place of the scene's own; assembly : what runs, where it is known already or was changed by hand;
+    error : whether the error of the steps is estimated, by further runs. What the run assumes is judged always.
     The result's ``detail`` is the trajectory, at every step. A run of an engine from outside the tree is compared with
     the reference, and says so in "beside reference".
     """
@@ -37,7 +47,7 @@ def run(scene: Scene, engine: str, settings: Settings | None = None, assembly: A
         from models.engines.outside import beside_reference
 
         beside["beside reference"] = beside_reference(engine, assembly, settings, trajectory)
-    return result(
+    labelled = result(
         scene,
         {name: Channel("time", values[rows], unit, meaning) for name, (unit, meaning, values) in channels.items()},
         {"time": Channel("time", trajectory.times[rows], "s", "time")},
@@ -52,6 +62,33 @@ def run(scene: Scene, engine: str, settings: Settings | None = None, assembly: A
         integrated=json.dumps(STATES),
         **beside,
     )
+    judged(labelled, assumptions(assembly))
+    return _with_error(labelled, assembly, settings, channels) if error else labelled
+
+
+def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
+    """The result with the error of its principal channels, at all steps and not at the saved rows alone."""
+    engine, fine = run.data.attrs["engine"], _principal(run.detail.times, channels)
+    method = CATALOGUE[engine][settings.integrator]
+
+    def again(changed: Settings) -> Series:
+        trajectory = build(engine, assembly, changed).run()
+        return _principal(trajectory.times, outputs(replace(assembly, sensors=()), trajectory))
+
+    if method.adaptive:
+        looser = again(replace(settings, tolerance=LOOSER * settings.tolerance))
+        return of_tolerance(run, fine, looser, LOOSER, settings.tolerance)
+    return estimated(run, fine, lambda times, share: again(_other(settings, times, share)), method.order, settings.step)
+
+
+def _principal(times: np.ndarray, channels: Channels) -> Series:
+    return Series(times, {name: channels[name][2] for name in PRINCIPAL})
+
+
+def _other(settings: Settings, times: float, share: float) -> Settings:
+    """Steps so many times as long, over a share of the run, in whole steps."""
+    step = times * settings.step
+    return replace(settings, step=step, duration=step * max(1, math.floor(share * settings.duration / step + 1e-9)))
 
 
 def _keep_every(scene: Scene, settings: Settings) -> int:

@@ -1,0 +1,112 @@
+"""What a vehicle, an effect or a law takes for granted, and whether a run kept to it."""
+
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from models.core.result import Result
+
+Watched = Mapping[str, np.ndarray]
+"""Values at every row of a run, by the name of the part (wheel, strut, joint) that they are of."""
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """One thing that is taken for granted: that ``watched`` stays from ``least`` to ``most``, in ``unit``.
+
+    name : a few words; says : a sentence; remedy : what lifts it, such as the effect to name.
+    """
+
+    name: str
+    says: str
+    remedy: str
+    watched: Callable[[Result], Watched]
+    unit: str
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def allowed(self) -> str:
+        """The range in words."""
+        low, high = f"at least {self.least:g}", f"at most {self.most:g}"
+        if math.isinf(self.most):
+            return f"{low} {self.unit}".rstrip()
+        return (high if math.isinf(self.least) else f"from {self.least:g} to {self.most:g}") + f" {self.unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Broken:
+    """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value."""
+
+    name: str
+    says: str
+    where: str
+    share: float
+    first: float
+    worst: float
+    unit: str
+    allowed: str
+    remedy: str
+
+    def line(self) -> str:
+        """A sentence for readers."""
+        unit = f" {self.unit}" if self.unit else ""
+        time = (
+            "once" if math.isnan(self.first) else f"{100.0 * self.share:.2g} % of the time, first at {self.first:.4g} s"
+        )
+        return (
+            f"assumption broken: {self.says}; {self.where}: {time}, worst {self.worst:.4g}{unit} "
+            f"(allowed {self.allowed}); {self.remedy}"
+        )
+
+
+def broken(run: Result, assumption: Assumption) -> Broken | None:
+    """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
+    found = [
+        _broken(run, assumption, where, np.asarray(values, float)) for where, values in assumption.watched(run).items()
+    ]
+    return max((one for one in found if one is not None), key=lambda one: one.share, default=None)
+
+
+def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broken | None:
+    beyond = (values < a.least) | (values > a.most)
+    if not beyond.any():
+        return None
+    excess = np.where(beyond, np.maximum(a.least - values, values - a.most), -np.inf)
+    timed = "time" in run.data.coords and len(values) == len(run.times)
+    first = float(run.times[np.argmax(beyond)]) if timed else math.nan
+    worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
+    return Broken(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
+
+
+def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
+    """The result with what it assumes, and what of that it broke; its status says so, too."""
+    listed = list(assumptions)
+    breaches = [one for one in (broken(run, each) for each in listed) if one is not None]
+    run.data.attrs["assumptions"] = json.dumps(
+        {"assumed": [each.says for each in listed], "broken": [asdict(one) for one in breaches]}
+    )
+    if breaches:
+        run.data.attrs["status"] += ", assumptions broken"
+    return run
+
+
+def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
+    """What ``twinrig show`` says that a scene assumes, a line each."""
+    return [f"  {'assumes':<{width}} {one.says} ({one.allowed})" for one in assumptions]
+
+
+def broken_of(run: Result) -> list[Broken]:
+    """Assumptions that a result says it broke."""
+    said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    return [Broken(**one) for one in said.get("broken", ())]
+
+
+def assumed_of(run: Result) -> list[str]:
+    """Assumptions that a result was judged by."""
+    said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
+    return list(said.get("assumed", ()))

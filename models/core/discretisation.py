@@ -1,0 +1,204 @@
+"""How far its steps leave a run from the answer of steps without length, told by a second run in longer ones.
+
+With steps twice as long a method of order p errs 2^p times as much: the difference of both runs, divided by 2^p - 1, is
+the error of the finer one (Richardson). Roads, switches and contacts lower the order, so that it is observed, where a
+third run in still longer steps is given, and never taken above the declared one. Errors are root mean squares over the
+run, and their shares are of the channel's standard deviation over the run, or of its size where it does not move.
+"""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+
+WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
+"""Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
+WINDOW, FINE_WINDOW = 0.4, 0.2
+"""Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
+LEAST_ORDER = 0.5
+"""Observed orders are taken for at least this: below, runs differ by chance."""
+STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
+"""Deviation by size below which a channel does not move; error by size of one rounding."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
+
+    step : longest step (s), or cell, that would hold the share to GOAL.
+    """
+
+    error: float
+    unit: str
+    share: float
+    order: float
+    step: float
+
+    @property
+    def warned(self) -> bool:
+        """Whether a reader must be warned."""
+        return not self.share <= WARNED
+
+    @property
+    def refused(self) -> bool:
+        """Whether the channel is no answer."""
+        return not self.share <= REFUSED
+
+
+def size_of(values: np.ndarray) -> float:
+    """What the share of an error is of: the standard deviation over the first axis, or the size of what is still."""
+    largest = float(np.abs(values).max(initial=0.0))
+    deviation = float(np.sqrt(np.mean(np.var(values, axis=0))))
+    return deviation if deviation > STILL * largest else largest
+
+
+def observed_order(fine: float, coarse: float, declared: float) -> float:
+    """Order by two differences of neighbouring runs, from LEAST_ORDER to the declared one."""
+    if not (fine > 0.0 and coarse > 0.0 and math.isfinite(fine) and math.isfinite(coarse)):
+        return declared if fine == 0.0 else LEAST_ORDER
+    return float(np.clip(math.log2(coarse / fine), LEAST_ORDER, declared))
+
+
+def estimate(
+    fine: np.ndarray,
+    coarse: np.ndarray,
+    declared: float,
+    step: float,
+    coarser: np.ndarray | None = None,
+    unit: str = "",
+) -> Estimate:
+    """Error of ``fine`` (m, ...) by runs in steps twice and, over the first rows, four times as long, at rows that the
+    run in twice the step has.
+
+    coarse : (m, ...); coarser : (k, ...) with k <= (m + 1) / 2, rows of every second one of these.
+    """
+    gap, order = _rms(fine - coarse), declared
+    if coarser is not None and len(coarser) > 1:
+        window = slice(0, 2 * len(coarser) - 1, 2)
+        order = observed_order(_rms((fine - coarse)[window]), _rms(coarse[window] - coarser), declared)
+    largest = float(np.abs(fine).max(initial=0.0))
+    error = max(gap / (2.0**order - 1.0), ROUNDING * largest * math.sqrt(len(fine)))
+    return _rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
+
+
+def _rms(values: np.ndarray) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
+
+
+def rows_at(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Rows of ``times`` (n,) that are nearest to the wanted ones (m,), both rising."""
+    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+    return after - (wanted - times[after - 1] < times[after] - wanted)
+
+
+class Series(NamedTuple):
+    """Channels (n, ...) of a run by name, at its times (n,) in s."""
+
+    times: np.ndarray
+    channels: Mapping[str, np.ndarray]
+
+
+Again = Callable[[float, float], Series]
+"""The same run in steps ``factor`` times as long, over a ``share`` of its time from the start on; raises InputError or
+RunFailed where that cannot be."""
+
+
+def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
+    """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
+
+    Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
+    be, half of it over a part tells. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    """
+    try:
+        told, how = _by_longer_steps(fine, again, order, step), "runs in twice and, over a part, four times the step"
+    except (InputError, RunFailed):
+        told, how = _by_half_steps(fine, again, order, step), "a part of the run in half the step"
+    units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
+    return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
+
+
+def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
+    coarse = again(2.0, 1.0)
+    coarser: Mapping[str, np.ndarray] = {}
+    with suppress(InputError, RunFailed):
+        coarser = again(4.0, WINDOW).channels
+    rows = rows_at(fine.times, coarse.times)
+    return {
+        name: estimate(values[rows], coarse.channels[name], order, step, coarser.get(name))
+        for name, values in fine.channels.items()
+    }
+
+
+def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
+    """The error of the finer run, times what its order makes of twice the step."""
+    finer = again(0.5, FINE_WINDOW)
+    part = fine.times <= finer.times[-1] * (1.0 + 1e-9)
+    rows = rows_at(finer.times, fine.times[part])
+    told = {}
+    for name, values in fine.channels.items():
+        one = estimate(finer.channels[name][rows], values[part], order, step)
+        told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
+    return told
+
+
+def _rescaled(one: Estimate, size: float, step: float) -> Estimate:
+    """The estimate with the share and the step that follow from its error and the size of the whole channel."""
+    share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
+    advised = step * min(1.0, (GOAL / share) ** (1.0 / one.order)) if share > 0.0 else step
+    return replace(one, share=share, step=float(f"{advised:.2g}"))
+
+
+def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, tolerance: float) -> Result:
+    """The result of an adaptive method with the errors of its channels, by a run whose tolerance is ``factor`` times
+    as large: its error is taken to be larger by the root of that only, so that what is told is rather too large.
+
+    Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
+    """
+    from scipy.interpolate import CubicSpline
+
+    told = {}
+    for name, values in fine.channels.items():
+        at = CubicSpline(fine.times, values)(looser.times)
+        error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
+        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
+        told[name] = _rescaled(one, size_of(values), tolerance)
+    return stated(run, told, f"a run with {factor:g} times the tolerance")
+
+
+def stated(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
+    """The result that says its error, channel by channel, and how that was found; RunFailed as ``with_error``."""
+    run.data.attrs["error"] = json.dumps({"how": how, "channels": {name: asdict(one) for name, one in told.items()}})
+    worst = max(told, key=lambda name: told[name].share, default=None)
+    if worst is not None and told[worst].refused:
+        engine, one = run.data.attrs["engine"], told[worst]
+        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use at most {one.step:g}"
+        failure = RunFailed(engine, f"the steps are too long: {why}")
+        failure.partial = run
+        raise failure
+    return run
+
+
+def errors_of(run: Result) -> dict[str, Estimate]:
+    """Estimates that a result says, by channel; empty where none was made."""
+    said = json.loads(run.data.attrs.get("error", "{}"))
+    return {name: Estimate(**values) for name, values in said.get("channels", {}).items()}
+
+
+def error_lines(run: Result) -> list[str]:
+    """What is printed of a result's error: the worst channel, and a warning with the step to use where one is due."""
+    told = errors_of(run)
+    if not told:
+        reason = json.loads(run.data.attrs.get("error", "{}")).get("why", "")
+        return [f"error not estimated: {reason}"] if reason else []
+    name, one = max(told.items(), key=lambda entry: entry[1].share)
+    size = f"{one.error:.2g} {one.unit}".rstrip()
+    line = f"error of the steps: at most {100.0 * one.share:.2g} % of a channel's deviation ({name}: {size} rms)"
+    return [f"{line}: WARNING, use at most {one.step:g}" if one.warned else line]
