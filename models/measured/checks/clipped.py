@@ -16,6 +16,8 @@ STUCK = 0.02
 """s: a channel that gives one value for longer stands still, if this is also USUAL times longer than is usual. What is
 not longer than a gap that would be bridged is a doubt."""
 USUAL = 20
+ROUNDED = 1e-9
+"""Of the largest value of its quantity: a channel that changes by less holds rounding and no measurement."""
 
 
 def check(evidence: Evidence) -> list[Finding]:
@@ -33,9 +35,16 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
             "map names another channel. Leave it out or name the right one."
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
-    ends = [_clipped(signal, values, good, end, period) for end in (good.min(), good.max())] if len(good) else []
+    measured = len(good) and np.ptp(good) > ROUNDED * _largest(evidence, signal)
+    ends = [_clipped(signal, values, good, end, period) for end in (good.min(), good.max())] if measured else []
     found = [finding for finding in ends if finding]
     return found or _stuck(signal, values, period)
+
+
+def _largest(evidence: Evidence, signal: Signal) -> float:
+    """Largest value of any channel of the signal's quantity."""
+    alike = [other for other in evidence.recording.signals if other.quantity == signal.quantity]
+    return max(float(np.nanmax(np.abs(evidence.recording.samples(other)), initial=0.0)) for other in alike)
 
 
 def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding | None:

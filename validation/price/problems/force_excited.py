@@ -176,5 +176,19 @@ class PrescribedPitch(ForceExcited):
         return {"enforced moment": run.moment, "state": run.states}
 
 
-problem, noisy, guided = cache(ForceExcited), cache(NoisyForces), cache(PrescribedPitch)
-"""The problems, the reference of each computed once per process."""
+@cache
+def problem(quick: bool) -> ForceExcited:
+    """The problem, its reference computed once per process."""
+    return ForceExcited(quick)
+
+
+@cache
+def noisy(quick: bool) -> NoisyForces:
+    """The same with noise on the forces."""
+    return NoisyForces(quick)
+
+
+@cache
+def guided(quick: bool) -> PrescribedPitch:
+    """The same with a pitch that is prescribed."""
+    return PrescribedPitch(quick)

@@ -163,5 +163,7 @@ class FreeVehicle:
         return apart(self.read(states, self.instants), self._true)
 
 
-problem = cache(FreeVehicle)
-"""The problem, its reference computed once per process."""
+@cache
+def problem(quick: bool) -> FreeVehicle:
+    """The problem, its reference computed once per process."""
+    return FreeVehicle(quick)

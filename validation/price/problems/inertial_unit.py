@@ -162,5 +162,7 @@ class InertialUnit:
         return {"attitude": apart(solution.quaternions, self.true)}
 
 
-problem = cache(InertialUnit)
-"""The problem, its reference computed once per process."""
+@cache
+def problem(quick: bool) -> InertialUnit:
+    """The problem, its reference computed once per process."""
+    return InertialUnit(quick)

@@ -187,5 +187,7 @@ class RoadExcited:
         return {"wheel force": float(np.abs(forces).max()), "state": float(np.abs(off).max())}
 
 
-problem = cache(RoadExcited)
-"""The problem, its reference computed once per process."""
+@cache
+def problem(quick: bool) -> RoadExcited:
+    """The problem, its reference computed once per process."""
+    return RoadExcited(quick)
