@@ -300,20 +300,10 @@ def _finish(
 
 def _judged(summary: dict[str, Any]) -> dict[str, Any]:
     """The summary with the errors and assumptions of the "results" that a study hands over, told at its end."""
-    from models.core.assumptions import broken_of
-    from models.core.discretisation import error_lines
+    from models.core import told
 
     results = summary.pop("results", {})
-    said: dict[str, list[str]] = {}
-    for name, run in results.items():
-        for line in (*error_lines(run), *(one.line() for one in broken_of(run))):
-            said.setdefault(line, []).append(name)
-    summary["errors"] = {name: json.loads(run.data.attrs["error"]) for name, run in results.items()}
-    summary["assumptions"] = {
-        name: {"broken": [], **json.loads(run.data.attrs["assumptions"])} for name, run in results.items()
-    }
-    told = [f"  {', '.join(names)}: {line}" for line, names in said.items()]
-    return summary | {"table": [*summary.get("table", []), *told]}
+    return summary | told.as_json(results) | {"table": [*summary.get("table", []), *told.lines(results)]}
 
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:

@@ -94,7 +94,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
         _differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(results))
-    heading(figure, scene.title)
+    heading(figure, scene.title, results)
     save(figure, path)
 
 

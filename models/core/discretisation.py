@@ -118,9 +118,9 @@ def estimated(run: Result, fine: Series, again: Again, order: float, step: float
     be, half of it over a part tells. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     try:
-        told, how = _by_longer_steps(fine, again, order, step), "runs in twice and, over a part, four times the step"
+        told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, again, order, step), "a part of the run in half the step"
+        told, how = _by_half_steps(fine, again, order, step), "a part in half the step"
     units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
 
@@ -170,17 +170,21 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
         error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
         one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
         told[name] = _rescaled(one, size_of(values), tolerance)
-    return stated(run, told, f"a run with {factor:g} times the tolerance")
+    return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
-def stated(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
-    """The result that says its error, channel by channel, and how that was found; RunFailed as ``with_error``."""
-    run.data.attrs["error"] = json.dumps({"how": how, "channels": {name: asdict(one) for name, one in told.items()}})
+def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:
+    """The result that says its error, channel by channel, and how that was told; ``of``: the unit of steps or cells.
+
+    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    """
+    channels = {name: asdict(one) for name, one in told.items()}
+    run.data.attrs["error"] = json.dumps({"how": how, "of": of, "channels": channels})
     worst = max(told, key=lambda name: told[name].share, default=None)
     if worst is not None and told[worst].refused:
         engine, one = run.data.attrs["engine"], told[worst]
-        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use at most {one.step:g}"
-        failure = RunFailed(engine, f"the steps are too long: {why}")
+        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use at most {one.step:g} {of}".rstrip()
+        failure = RunFailed(engine, f"the steps are too long, this is no answer: {why}")
         failure.partial = run
         raise failure
     return run
@@ -192,13 +196,49 @@ def errors_of(run: Result) -> dict[str, Estimate]:
     return {name: Estimate(**values) for name, values in said.get("channels", {}).items()}
 
 
+def not_estimated(run: Result, why: str) -> Result:
+    """The result that says why no number stands for its error, such as a law whose switches do not repeat."""
+    run.data.attrs["error"] = json.dumps({"why": why})
+    return run
+
+
+def of_chance(run: Result, told: Mapping[str, Estimate], samples: int) -> Result:
+    """The result of an ensemble with the standard errors of its channels, of ``samples`` paths.
+
+    Beside it stands what was said of the steps before.
+    """
+    said = json.loads(run.data.attrs["error"])
+    said["chance"] = {"samples": samples, "channels": {name: asdict(one) for name, one in told.items()}}
+    run.data.attrs["error"] = json.dumps(said)
+    return run
+
+
+def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
+    """A standard error as an estimate; ``step`` is the number of samples that would hold it to WARNED."""
+    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    needed = samples * max(1.0, (share / WARNED) ** 2) if math.isfinite(share) else math.inf
+    return Estimate(error, unit, share, 0.5, float(f"{needed:.2g}") if math.isfinite(needed) else math.inf)
+
+
+def worst_of(run: Result) -> Estimate | None:
+    """The estimate of the largest share; None where none was made."""
+    return max(errors_of(run).values(), key=lambda one: one.share, default=None)
+
+
 def error_lines(run: Result) -> list[str]:
-    """What is printed of a result's error: the worst channel, and a warning with the step to use where one is due."""
-    told = errors_of(run)
-    if not told:
-        reason = json.loads(run.data.attrs.get("error", "{}")).get("why", "")
-        return [f"error not estimated: {reason}"] if reason else []
-    name, one = max(told.items(), key=lambda entry: entry[1].share)
+    """What is printed of a result's error: its worst channel, with a warning and the step to use where one is due."""
+    said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
+    found = [f"error not estimated: {said['why']}"] if "why" in said else []
+    if told:
+        name, one = max(told.items(), key=lambda entry: entry[1].share)
+        line = f"error at most {_size(name, one)}, by {said['how']}"
+        found.append(f"{line}: WARNING, use at most {one.step:g} {said['of']}".rstrip() if one.warned else line)
+    if "chance" in said:
+        name, values = max(said["chance"]["channels"].items(), key=lambda entry: entry[1]["share"])
+        found.append(f"standard error of {said['chance']['samples']} paths at most {_size(name, Estimate(**values))}")
+    return found
+
+
+def _size(name: str, one: Estimate) -> str:
     size = f"{one.error:.2g} {one.unit}".rstrip()
-    line = f"error of the steps: at most {100.0 * one.share:.2g} % of a channel's deviation ({name}: {size} rms)"
-    return [f"{line}: WARNING, use at most {one.step:g}" if one.warned else line]
+    return f"{100.0 * one.share:.2g} % ({name}: {size})"

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.scale import LogScale, register_scale
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
+from models.core.told import Results, remarks
 from models.core.whole_files import whole_file
 
 
@@ -55,9 +56,11 @@ plt.rcParams.update(
 )
 
 
-def heading(figure: Figure, title: str) -> None:
-    """Title of a whole figure, above its left edge."""
+def heading(figure: Figure, title: str, results: Results | None = None) -> None:
+    """Title of a whole figure, above its left edge; below the figure what its results must be doubted for."""
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    if told := remarks(results or {}):
+        figure.supxlabel("\n".join(told), x=0.01, ha="left", fontsize=8, color="#b00020")
 
 
 def save(figure: Figure, path: Path) -> Path:

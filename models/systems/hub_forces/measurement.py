@@ -8,11 +8,12 @@ from models.core.errors import InputError
 from models.core.noise import FORCES, PITCH_SENSOR, normal
 from models.core.signals import Interpolation, sampled
 from models.engines.cut_vehicle import HubModel, HubRun, build
-
-WAVE = 4
 from models.multibody.cut_table import Drive
 from models.road.profile import Profile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
+
+WAVE = 4
+"""Lengths of the road's finest details that a step may pass over: a whole wave."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,73 @@
+"""What readers are told of results: the error of each, and every assumption that was broken."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from models.core.assumptions import Broken, broken_of
+from models.core.discretisation import error_lines, worst_of
+from models.core.result import Result
+
+EACH = 4
+"""Results up to which the error of each has a line."""
+
+Results = Mapping[str, Result]
+"""Results of one command by what tells them apart, such as the engine."""
+
+
+def lines(results: Results) -> list[str]:
+    """Lines for the screen: errors first, then broken assumptions, each once with the names of those that broke it."""
+    return [*_errors(results), *(f"  {names}: {one.line()}" for names, one in breaches(results))]
+
+
+def _errors(results: Results) -> list[str]:
+    if len(results) <= EACH:
+        return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
+    texts: dict[str, list[str]] = {}
+    for name, run in results.items():
+        worst = worst_of(run)
+        for line in error_lines(run) if worst is None or worst.warned else ():
+            texts.setdefault(line, []).append(name)
+    shares = {name: worst.share for name, run in results.items() if (worst := worst_of(run)) is not None}
+    largest = max(shares, key=lambda name: shares[name], default=None)
+    listed = [f"  {_few(names)}: {line}" for line, names in texts.items()]
+    if largest is None or any(largest in names for names in texts.values()):
+        return listed
+    return [f"  {len(shares)} results, the largest error {largest}: {error_lines(results[largest])[0]}", *listed]
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:EACH]) + (f" and {len(names) - EACH} more" if len(names) > EACH else "")
+
+
+def breaches(results: Results) -> list[tuple[str, Broken]]:
+    """Broken assumptions, the worst of each name over all results, with the names of the results that broke it."""
+    where: dict[str, list[str]] = {}
+    worst: dict[str, Broken] = {}
+    for name, run in results.items():
+        for one in broken_of(run):
+            where.setdefault(one.name, []).append(name)
+            if one.name not in worst or one.share > worst[one.name].share:
+                worst[one.name] = one
+    return [(_few(where[name]), one) for name, one in worst.items()]
+
+
+def remarks(results: Results) -> list[str]:
+    """Short lines for figures: warnings of the error, and broken assumptions."""
+    steps = [
+        f"{name}: {error_lines(run)[0]}"
+        for name, run in results.items()
+        if (worst := worst_of(run)) is not None and worst.warned
+    ]
+    return [*steps[:EACH], *(one.brief() for _, one in breaches(results))]
+
+
+def as_json(results: Results) -> dict[str, Any]:
+    """The "errors" and "assumptions" of a summary: what each result says of itself."""
+    return {
+        "errors": {name: json.loads(run.data.attrs["error"]) for name, run in results.items()},
+        "assumptions": {
+            name: {"assumed": [], "broken": [], **json.loads(run.data.attrs["assumptions"])}
+            for name, run in results.items()
+        },
+    }
