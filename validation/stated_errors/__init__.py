@@ -1,0 +1,1 @@
+"""Stated errors of random scenes against truths a hundred times finer."""
