@@ -189,7 +189,7 @@ def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
     circle = hertz["1"]
     rows += [
         at_most(
-            f"contact_simplified.circle.{key}",
+            f"contact_simplified.hertz_circle.{key}",
             SYSTEM,
             f"{key} of a circular contact",
             100.0 * abs(circle[key]),

@@ -161,7 +161,9 @@ def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> 
     if lost is None:
         return []
     how = ", extrapolated by its order" if lost.how == "extrapolated" else ""
-    name = f"price.{measured.key}.default.{p.setting.engine}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
+    shared = [default.setting.engine for default in measured.defaults.values()].count(p.setting.engine) > 1
+    whose = f"{p.setting.engine}.{owner}" if shared else p.setting.engine
+    name = f"price.{measured.key}.default.{whose}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
     told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     bounds = told if kind == "seconds" else "exact"
     what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
