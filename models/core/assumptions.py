@@ -2,7 +2,9 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -97,7 +99,21 @@ def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
+    _NOTED.get()(run)
     return run
+
+
+_NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
+
+
+@contextmanager
+def watching(note: Callable[[Result], None]) -> Iterator[None]:
+    """Tell ``note`` of every result that is judged inside; where watches are nested the inner one alone is told."""
+    before = _NOTED.set(note)
+    try:
+        yield
+    finally:
+        _NOTED.reset(before)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
