@@ -32,7 +32,7 @@ STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 class Estimate:
     """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
 
-    step : longest step (s), or cell, that would hold the share to GOAL.
+    step : longest step (s), or cell, that would hold the share to GOAL; 0 where no step mends it.
     """
 
     error: float
@@ -45,6 +45,10 @@ class Estimate:
     def warned(self) -> bool:
         """Whether a reader must be warned."""
         return not self.share <= WARNED
+
+    def advice(self, of: str) -> str:
+        """What to do about it, ``of`` the unit of steps or cells."""
+        return f"use at most {self.step:g} {of}".rstrip() if self.step else "no shorter step mends it"
 
     @property
     def refused(self) -> bool:
@@ -111,9 +115,12 @@ Again = Callable[[float, float], Series]
 RunFailed where that cannot be."""
 
 
-def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
+def estimated(
+    run: Result, fine: Series, again: Again, order: float, step: float, units: Mapping[str, str] | None = None
+) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
+    units : of these channels, where the result has no channels of their names.
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
     be, half of it over a part tells. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
@@ -121,8 +128,9 @@ def estimated(run: Result, fine: Series, again: Again, order: float, step: float
         told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
     except (InputError, RunFailed):
         told, how = _by_half_steps(fine, again, order, step), "a part in half the step"
-    units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
-    return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
+    known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
+    known |= units or {}
+    return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
 
 
 def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
@@ -183,7 +191,7 @@ def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -
     worst = max(told, key=lambda name: told[name].share, default=None)
     if worst is not None and told[worst].refused:
         engine, one = run.data.attrs["engine"], told[worst]
-        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use at most {one.step:g} {of}".rstrip()
+        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; {one.advice(of)}"
         failure = RunFailed(engine, f"the steps are too long, this is no answer: {why}")
         failure.partial = run
         raise failure
@@ -232,7 +240,7 @@ def error_lines(run: Result) -> list[str]:
     if told:
         name, one = max(told.items(), key=lambda entry: entry[1].share)
         line = f"error at most {_size(name, one)}, by {said['how']}"
-        found.append(f"{line}: WARNING, use at most {one.step:g} {said['of']}".rstrip() if one.warned else line)
+        found.append(f"{line}: WARNING, {one.advice(said['of'])}" if one.warned else line)
     if "chance" in said:
         name, values = max(said["chance"]["channels"].items(), key=lambda entry: entry[1]["share"])
         found.append(f"standard error of {said['chance']['samples']} paths at most {_size(name, Estimate(**values))}")

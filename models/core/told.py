@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
-from models.core.assumptions import Broken, broken_of
-from models.core.discretisation import error_lines, worst_of
+from models.core.assumptions import Broken, assumed_of, broken_of
+from models.core.discretisation import error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
 EACH = 4
@@ -60,6 +61,21 @@ def remarks(results: Results) -> list[str]:
         if (worst := worst_of(run)) is not None and worst.warned
     ]
     return [*steps[:EACH], *(one.brief() for _, one in breaches(results))]
+
+
+def inherited(derived: Result, results: Results, how: str) -> Result:
+    """What was computed of results with their errors, ``how``, the worst of each channel, and what they broke.
+
+    Without estimates in the results it has none.
+    """
+    assumed = [says for run in results.values() for says in assumed_of(run)]
+    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(one) for _, one in breaches(results)]}
+    derived.data.attrs["assumptions"] = json.dumps(told)
+    if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
+        derived.data.attrs["status"] += ", assumptions broken"
+    pairs = [pair for run in results.values() for pair in errors_of(run).items()]
+    worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
+    return stated(derived, worst, how) if worst else derived
 
 
 def as_json(results: Results) -> dict[str, Any]:
