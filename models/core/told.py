@@ -82,11 +82,16 @@ def gathered(whole: Result, parts: Results) -> Result:
 
 
 def as_json(results: Results) -> dict[str, Any]:
-    """The "errors" and "assumptions" of a summary: what each result says of itself."""
+    """The "errors" and "assumptions" of a summary: what each result says of itself; what is no number is None."""
     return {
-        "errors": {name: json.loads(run.data.attrs["error"]) for name, run in results.items()},
+        "errors": {name: _plain(run, "error") for name, run in results.items()},
         "assumptions": {
-            name: {"assumed": [], "broken": [], **json.loads(run.data.attrs["assumptions"])}
-            for name, run in results.items()
+            name: {"assumed": [], "broken": [], **_plain(run, "assumptions")} for name, run in results.items()
         },
     }
+
+
+def _plain(run: Result, key: str) -> dict[str, Any]:
+    """An attribute without NaN and infinity, which JSON does not have."""
+    said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
+    return said
