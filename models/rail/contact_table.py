@@ -153,13 +153,14 @@ class Carried:
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact."""
+    0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
 
     side: Side
     load: float
     speed: float
     friction: float = 0.0
     pair: Pair = Pair()  # noqa: RUF009 - a frozen value
+    coarser: float = 1.0
 
     def at(self, shift: float, yaw: float = 0.0) -> Placed:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
@@ -209,7 +210,9 @@ class Contact:
         patches = [touch.patch for touch in near.touches]
 
         def by_normal(normal: float) -> Carried:
-            shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
+            shares, approach = press_exactly(
+                patches, near.pressed.patches, normal, near.approach, self.pair, self.coarser
+            )
             return replace(near, shares=shares, approach=approach, normal=normal)
 
         return self._balanced(by_normal, near.normal)
@@ -246,7 +249,7 @@ class Contact:
                 forces.append((0.0, 0.0, 0.0))
                 continue
             alone = replace(wheel.pressed, patches=(replace(part, load=load),))
-            creep = roll(alone, self.friction, *creepage, cells=CELLS)
+            creep = roll(alone, self.friction, *creepage, cells=round(CELLS / self.coarser))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
