@@ -1,6 +1,5 @@
 """A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
 
-import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from models.core.assumptions import judged
-from models.core.discretisation import Estimate, Series, by_steps, estimate, stated, summed
+from models.core.discretisation import Estimate, Series, by_steps, rescaled, size_of, stated, summed
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
@@ -31,6 +30,8 @@ ORDER, NET_ORDER = 3.0, 2.0
 """Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
 UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
 """Channels whose error is told."""
+EVERY = 50
+"""Rows from one to the next at which creep forces of several nets are compared."""
 CELL = "of the patch per cell (1 / tyres.cells)"
 """What is told to use where the net errs most."""
 MIDDLE = 0.4
@@ -130,7 +131,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
-    """The result with the error of its motion and of its tyres' forces, by longer steps and by fewer cells.
+    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets.
 
     What is told to use, steps or cells, is what the worst channel errs by.
     """
@@ -148,7 +149,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
     cells = bool(worst) and by_cells[worst].share > by_step[worst].share
     steps = by_cells if cells else by_step
     told = {name: replace(each, unit=UNITS[name], step=steps[name].step) for name, each in both.items()}
-    return stated(run, told, f"{how} and fewer cells", CELL if cells else "s")
+    return stated(run, told, f"{how}, and other nets of the patch", CELL if cells else "s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,20 +184,39 @@ class _Again:
             return self.twice
         run, handling, step = self.drive.run, self.drive.handling, factor * self.step
         first, count = round(MIDDLE * (len(run.times) - 1)), max(2, round(share * (len(run.times) - 1) / factor))
-        model = build(self.engine, _later(handling, run.times[first]))
-        path = model.run(run.positions[first], run.rates[first], count * step, step)
-        return principal(read(handling, path, self.engine), run.times[first])
+        later = _later(handling, run.times[first])
+        path = build(self.engine, later).run(run.positions[first], run.rates[first], count * step, step)
+        return principal(read(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
-        """Errors of the net, by a run in the same steps with half of its cells; ``step`` is 1 / cells."""
+        """Errors of the net, by a run in the same steps with a third of its cells; ``step`` is 1 / cells.
+
+        A net's error does not fall evenly: how many times as large the difference of both runs is as the error, their
+        creep forces at the same states tell, beside those of a net with twice as many cells.
+        """
         cells = self.drive.handling.tyres.cells
-        other = max(3, cells // 2) if cells > 3 else 6
+        other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
         try:
             base, coarse = self.twice, self._with_net(other, 2.0)
         except RunFailed:
             base, coarse = principal(self.drive), self._with_net(other, 1.0)
-        order = math.log2(1.0 + abs((cells / other) ** NET_ORDER - 1.0))
-        return {name: estimate(base.channels[name], coarse.channels[name], order, 1.0 / cells) for name in names}
+        own, fewer, more = (self._creep(count) for count in (cells, other, finer))
+        apart, error = np.linalg.norm(own - fewer), np.linalg.norm(own - more) / (1.0 - 0.5**NET_ORDER)
+        share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
+        for name in names:
+            values = base.channels[name]
+            gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
+            told[name] = rescaled(Estimate(gap, "", 0.0, NET_ORDER, 1.0 / cells), size_of(values), 1.0 / cells)
+        return told
+
+    def _creep(self, cells: int) -> np.ndarray:
+        """Creep forces (m, w, 2) in N at some states of the drive, by a net of so many cells."""
+        run, handling = self.drive.run, self.drive.handling
+        numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
+        times, positions, rates = (np.ascontiguousarray(each[::EVERY]) for each in (run.times, run.positions, run.rates))
+        report = np.empty((len(times), len(handling.vehicle.tyres), at.REPORTED))
+        at.reports(numbers, times, positions, rates, report, np.empty((len(times), at.LEDGER)))
+        return report[:, :, [at.FX, at.FY]]
 
 
 def principal(drive: Drive, since: float = 0.0) -> Series:

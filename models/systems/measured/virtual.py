@@ -26,7 +26,7 @@ from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import in_space
-from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.measurement import travels, truth, two_tracks
 from models.systems.hub_forces.scene import Frame, Road
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
 
@@ -103,8 +103,9 @@ def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, fil
     run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
-    forces, gauged = ([elements.index(name) for name in names] for names in (own.sections, own.travels))
-    checks = [run.elements[:, forces], *([travels(vehicle, run, drive)[:, gauged]] if gauged else [])]
+    moved = travels(vehicle, run) if own.travels else {}
+    checks = [run.elements[:, [elements.index(name)]] for name in own.sections]
+    checks += [moved[name][:, None] for name in own.travels]
     values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), *checks])
     return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
 
@@ -173,13 +174,6 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
             -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch),
         ]
     )
-
-
-def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
-    """Travel (n, elements) from the design position, m (rad of a bar), positive in compression, along a run."""
-    gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
-    model = build("reference", replace(vehicle, elements=gauges), drive, run.times[1], run.times[-1])
-    return model.reported(run.times, run.states).elements
 
 
 def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:
