@@ -13,8 +13,8 @@ LOADED = 2.5
 Dynamics, 4.3); that of the brush grows without end."""
 LEAN = 0.2
 """rad: springs act along the upright of the road's plane, and its cosine is 2 % below 1 here."""
-SLIDING, SLIDES = 4.0, 0.1
-"""m/s from which on measured friction falls (a fifth of 20 m/s), and the share of the weight that may slide faster:
+SLIDING, SLIP, SLIDES = 4.0, 0.2, 0.1
+"""m/s, and share of the speed, beyond which measured friction falls, and the share of the weight that may slide faster:
 friction that is a fifth too large makes 2 % of all forces then."""
 LENGTH, LAG = 0.3, 0.02
 """m that a carcass takes to follow a slip angle, and rad by which the angle may be ahead of it."""
@@ -124,8 +124,8 @@ def _lean(run: Result, handling: Handling) -> Watched:
 
 
 def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
-    """Share of the weight on tyres that slide faster than SLIDING."""
-    fast = np.hypot(run["slip_x"], run["slip_y"]) > SLIDING
+    """Share of the weight on tyres that slide faster than SLIDING and SLIP."""
+    fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING, SLIP * _contact_speed(run))
     weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
     return np.sum(run["load"] * fast, axis=1) / weight
 

@@ -12,7 +12,7 @@ from models.systems.hub_forces.measurement import Angles, travels
 from models.systems.hub_forces.scene import HubScene, Road
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
-_SMOOTHER = "drive over a smoother road, more slowly, or with stiffer springs"
+_SMOOTHER = "take a smoother road.iso8608, a lower road.speed, or stiffer springs: no stop is in the cut vehicle"
 ON_TYRES = "on tyres"
 """In place of a method: the run on the road that gives a virtual measurement."""
 PUSHES = 1.0
@@ -64,16 +64,8 @@ def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str
 
 def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
     """Of linear tyres on two tracks."""
-    lifting = Assumption(
-        "tyres press",
-        "the linear tyres of the measurement stay on the road",
-        "name the effect lift_off, whose tyres only push",
-        lambda run: _at_hubs(run, vehicle, 2),
-        "N",
-        least=-PUSHES,
-    )
     return [
-        *([] if vehicle.whole.lifts else [lifting]),
+        *_pressing(vehicle, PUSHES),
         Assumption(
             "side forces",
             "side forces of the measurement grow with the slip angle",
@@ -95,6 +87,19 @@ def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
             SMALL,
         ),
     ]
+
+
+def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
+    """Of tyres that may pull by so much (N) at their edge; nothing of those that only push."""
+    lifting = Assumption(
+        "tyres press",
+        "the linear tyres of the measurement stay on the road",
+        "name the effect lift_off, whose tyres only push",
+        lambda run: _at_hubs(run, vehicle, 2),
+        "N",
+        least=-pull,
+    )
+    return [] if vehicle.whole.lifts else [lifting]
 
 
 def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:
@@ -134,7 +139,10 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
                 SMALL,
             )
         )
-    return [*listed, _balanced(vehicle) if scene.road is None else _sampled(scene, scene.road)]
+    if scene.road is None:
+        return [*listed, _balanced(vehicle)]
+    noise = 5.0 * scene.forces.force_deviation if scene.forces.noise == "white" else 0.0
+    return [*listed, _sampled(scene, scene.road), *_pressing(vehicle, PUSHES + noise)]
 
 
 def _balanced(vehicle: CutVehicle) -> Assumption:

@@ -30,8 +30,9 @@ from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import Tilt
 
-ORDER = 4
-"""Of the classical Runge-Kutta method."""
+ORDER, LIFTING_ORDER = 4.0, 3.0
+"""Orders that errors are told by: of the classical Runge-Kutta method, and where wheels leave the road and land. Still
+longer steps would tell less than these: waves of the road have few of them."""
 MIDDLE = 0.4
 """Share of a run after which a part of it is repeated, where no longer step can be."""
 LEAST = 1e-3
@@ -142,18 +143,20 @@ def errors_of_steps(
 
     def again(factor: float, share: float) -> Series:
         own, count = factor * step, max(1, int(share * steps / factor + 1e-9))
-        if factor > 1.0 and period and not divides(own, period):
-            raise InputError("", "run.step", own, f"must divide the period of the samples, {period:g} s")
-        first = 0 if factor > 1.0 else round(MIDDLE * steps / factor)  # road and manoeuvre often begin gently
+        if factor > 2.0 or (factor > 1.0 and period and not divides(own, period)):
+            raise InputError("", "run.step", own, "is not taken: longer steps must divide the period of the samples")
+        row = 0 if factor > 1.0 else round(MIDDLE * steps)  # a road begins gently
+        first = round(row / factor)
         inputs = drive(own, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
         part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
-        path = build(engine, vehicle, part, own, count * own).run(run.states[round(first * factor)])
+        path = build(engine, vehicle, part, own, count * own).run(run.states[row])
         return principal(vehicle, path, first * own)
 
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
-    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), again, ORDER, step)
+    order = LIFTING_ORDER if vehicle.whole.lifts else ORDER
+    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), again, order, step)
     return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
 
 
