@@ -23,16 +23,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case
-from validation.hard_cases.setups import (
-    RAISED,
-    REFUSED,
-    exact,
-    largest,
-    run,
-    settings,
-    static_forces,
-    vehicle,
-)
+from validation.hard_cases.setups import RAISED, REFUSED, exact, largest, run, settings, static_forces, vehicle
 
 
 def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: float, step: float) -> float:
@@ -376,7 +367,7 @@ CASES = (
     ),
     Case(
         "step over whole waves of the road",
-        "at 2000 km/h a step of 2 ms goes 1.1 m and sees a wave of 0.5 m as another, longer one; all implementations agree",
+        "at 2000 km/h a step of 2 ms goes 1.1 m and sees a wave of 0.5 m as another one; all implementations agree",
         "a warning, whose steps end it, and the error beside steps of 0.1 ms by the one told",
         "of the error told",
         3.0,

@@ -135,7 +135,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
     What is told to use, steps or cells, is what the worst channel errs by.
     """
-    again, fine = _Again(run.data.attrs["engine"], drive, speed), principal(drive)
+    again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
         name: values
@@ -153,7 +153,7 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
 
 
 @dataclass(frozen=True, eq=False)
-class _Again:
+class Again:
     """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
 
     engine: str
@@ -213,7 +213,9 @@ class _Again:
         """Creep forces (m, w, 2) in N at some states of the drive, by a net of so many cells."""
         run, handling = self.drive.run, self.drive.handling
         numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
-        times, positions, rates = (np.ascontiguousarray(each[::EVERY]) for each in (run.times, run.positions, run.rates))
+        times, positions, rates = (
+            np.ascontiguousarray(each[::EVERY]) for each in (run.times, run.positions, run.rates)
+        )
         report = np.empty((len(times), len(handling.vehicle.tyres), at.REPORTED))
         at.reports(numbers, times, positions, rates, report, np.empty((len(times), at.LEDGER)))
         return report[:, :, [at.FX, at.FY]]

@@ -32,9 +32,7 @@ BALANCE, RISING = 0.05, 0.5
 vertical speed (m/s) that a rough road may leave between the ends of a run."""
 
 
-def assumptions(
-    scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None
-) -> list[Assumption]:
+def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
     """What a run takes for granted that is held by a method, or goes over the road (ON_TYRES).
 
     angles : as measured, beside which a run is judged; None to list only.
@@ -113,7 +111,7 @@ def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles
             "rad",
             -UPRIGHT,
             UPRIGHT,
-        ),
+        )
     ]
     if method == "none" and scene.forces.frame == "inertial":
         listed.append(
@@ -168,7 +166,7 @@ def _sampled(scene: HubScene, road: Road) -> Assumption:
     """Of a virtual measurement."""
     rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
     wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
-    other = " or use forces.interpolation = \"smooth\"," if rule == "linear" else ""
+    other = ' or use forces.interpolation = "smooth",' if rule == "linear" else ""
     return Assumption(
         "samples",
         "samples show every wave of the road",

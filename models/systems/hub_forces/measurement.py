@@ -12,6 +12,7 @@ from models.multibody.cut_table import Drive
 from models.road.profile import Profile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
 
+
 @dataclass(frozen=True)
 class HubForces:
     """Measured hub forces: samples (m, 6 h), N and N m hub by hub, the first at t = 0, ``period`` (s) apart.

@@ -18,7 +18,9 @@ PULL = 0.2
 """Of the load at rest: the weight and inertia of a rim and tyre in the air; whatever pulls more is no road."""
 
 
-def assumptions(scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None) -> list[Assumption]:
+def assumptions(
+    scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None
+) -> list[Assumption]:
     """What the run that is handed on takes for granted; exam : of it, None to list only.
 
     Of the pitch plane (vehicle None) its own system says the rest.
@@ -114,7 +116,8 @@ def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination
         skip = round(exam.outcome.period / exam.recording.period)
         done = exam.outcome.done
         return {
-            s.component: exam.outcome.samples(f"{vehicle.chassis} {s.component}") - exam.recording.samples(s)[::skip][:done]
+            s.component: exam.outcome.samples(f"{vehicle.chassis} {s.component}")
+            - exam.recording.samples(s)[::skip][:done]
             for s in angles
         }
 

@@ -30,8 +30,8 @@ from models.measured.checks.weight import moments
 from models.measured.recording import Progress, Recording, silent
 from models.measured.signal import Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
-from models.systems.measured.clock import record
 from models.systems.measured.assumptions import assumptions
+from models.systems.measured.clock import record
 from models.systems.measured.consequences import Consequence, consequences
 from models.systems.measured.consequences import judged as judged_by_consequences
 from models.systems.measured.errors import errors_of_steps
@@ -373,7 +373,9 @@ def _weighed(exam: Examination, work: Path) -> None:
     if name in exam.runs:
         again, answers = partial(exam.again, name), exam.forces(exam.runs[name])
         exam.consequences = consequences(exam.findings, exam.recording, again, answers, work / "findings")
-        exam.verdicts = {name: judged_by_consequences(verdict, exam.consequences) for name, verdict in exam.verdicts.items()}
+        exam.verdicts = {
+            name: judged_by_consequences(verdict, exam.consequences) for name, verdict in exam.verdicts.items()
+        }
 
 
 def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:

@@ -1,5 +1,8 @@
-"""Random cut vehicles on hub forces of a virtual measurement, in random engines, steps and rates; the truth, measurement
-and run, has steps a twelfth as long: by their order of 4 its errors are a ten-thousandth, on lifting wheels a hundredth."""
+"""Random cut vehicles on hub forces of a virtual measurement, in random engines, steps and rates.
+
+The truth, measurement and run, has steps a twelfth as long: by their order of 4 its errors are a ten-thousandth, and
+where wheels leave the road a hundredth.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
