@@ -16,7 +16,7 @@ COLOURS = plt.get_cmap("viridis")
 def tyre_figure(
     tables: Mapping[str, TyreTable], at: tuple[Sequence[float], float], title: str, path: Path, results: Results
 ) -> None:
-    """A row per table: mu_x and mu_y over slip, and both of them beside each other; at : slip angles (deg), load (N)."""
+    """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
     angles, load = at
     figure, axes = plt.subplots(len(tables), 3, figsize=(12, 3.4 * len(tables)), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):

@@ -151,7 +151,7 @@ def test_steps_that_the_road_is_too_fast_for_are_told():
         of = {"speed": speed, "iso8608": road}
         return {**ALL, "road": of, "run": {"duration": 1.0, "step": step}, "forces": {"sampling_rate": 200.0}}
 
-    with pytest.raises(RunFailed, match="this is no answer: .* use at most") as refusal:
+    with pytest.raises(RunFailed, match=r"this is no answer: .* use at most") as refusal:
         run(scene_of(table(120.0, "F", 5e-3), "s.toml"), "mujoco", error=True)
     advised = min(each.step for each in errors_of(refusal.value.partial).values())
     step = 5e-3 / np.ceil(5e-3 / advised)

@@ -1,4 +1,4 @@
-"""What runs of cut vehicles, of recordings and of tyres' tables say of their error and of what they take for granted."""
+"""What runs of cut vehicles, recordings and tyres' tables say of their error and of what they take for granted."""
 
 from pathlib import Path
 

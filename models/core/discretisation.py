@@ -107,7 +107,7 @@ class Series(NamedTuple):
 
 
 Again = Callable[[float, float], Series]
-"""The same run in steps ``factor`` times as long, over a ``share`` of its time, from the start on where steps are longer;
+"""The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer;
 raises InputError or RunFailed where that cannot be."""
 
 

@@ -62,7 +62,8 @@ class Examination:
     """What there is of a recording, in the order in which it is made; what was not reached is empty.
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
-    seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on. temporary : where all of it lies, None in a user's folder.
+    seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
+    temporary : where all of it lies, None in a user's folder.
     """
 
     scene: MeasuredScene
@@ -158,8 +159,9 @@ def run(
     """Run a recording held as its scene says; the result's detail is the Examination.
 
     folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole : whether
-    the recording is checked, run free, too, and judged, and files are handed on. error : whether the error
-    of the steps is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in the detail, another one raises RunFailed.
+    the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
+    is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in
+    the detail, another one raises RunFailed.
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
