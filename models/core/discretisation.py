@@ -85,7 +85,7 @@ def estimate(
         order = observed_order(_rms((fine - coarse)[window]), _rms(coarse[window] - coarser), declared)
     largest = float(np.abs(fine).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ROUNDING * largest * math.sqrt(len(fine)))
-    return _rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
+    return rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
 
 
 def _rms(values: np.ndarray) -> float:
@@ -145,12 +145,13 @@ def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dic
     told = {}
     for name, values in fine.channels.items():
         one = estimate(finer.channels[name][rows], values[part], order, step)
-        told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
+        told[name] = rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
     return told
 
 
-def _rescaled(one: Estimate, size: float, step: float) -> Estimate:
-    """The estimate with the share and the step that follow from its error and the size of the whole channel."""
+def rescaled(one: Estimate, size: float, step: float) -> Estimate:
+    """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
+    being that of the run."""
     share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
     advised = step * min(1.0, (GOAL / share) ** (1.0 / one.order)) if share > 0.0 else step
     return replace(one, share=share, step=float(f"{advised:.2g}"))
@@ -169,7 +170,7 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
         at = CubicSpline(fine.times, values)(looser.times)
         error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
         one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
-        told[name] = _rescaled(one, size_of(values), tolerance)
+        told[name] = rescaled(one, size_of(values), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
