@@ -38,8 +38,8 @@ SMOOTH = ("none", "slip_pi")
 """Controllers that switch no valves to and fro."""
 ASKED_ONCE = "what stands behind the port answers one run alone"
 SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
-LONGER = "the controller switches at other samples in longer steps, so that the stop does not repeat"
-SHORTER = "the controller is so near to switching otherwise that the stop may not repeat in shorter steps"
+LONGER = "the controller switches at other samples in longer steps; the study braking_ensemble tells the scatter"
+SHORTER = "in shorter steps the controller may switch at other samples; the study braking_ensemble tells the scatter"
 """Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
 distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 45 that did, 7 were near to
 switching otherwise; among them 5 of the 6 whose true pressures were others."""
@@ -74,7 +74,7 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     if steps == 1:
         return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
     if valves and not alike(path, paths[0]):
-        return not_estimated(run, f"{LONGER}{_otherwise(path, paths[0])}")
+        return not_estimated(run, LONGER)
     if valves and near(path, paths[0], other):
         return not_estimated(run, SHORTER)
     return stated(run, _by_fewer(path, steps, paths, step), "runs in longer steps")
@@ -167,14 +167,6 @@ def _by_twice(path: Path, other: Path, step: float) -> dict[str, Estimate]:
         error = _rms(values[part] - finer[name]) * 2.0**CAREFUL / (2.0**CAREFUL - 1.0)
         told[name] = _estimate(name, values, error * size / seen if seen > 0.0 else 0.0, CAREFUL, step)
     return told
-
-
-def _otherwise(path: Path, other: Path) -> str:
-    """By how much a run in longer steps stops otherwise."""
-    if not (path.stands and other.stands):
-        return ""
-    way, longer = (float(Stop(run).way[-1]) for run in (path, other))
-    return f" ({abs(longer - way):.2g} m {'later' if longer > way else 'earlier'})"
 
 
 def _at(times: np.ndarray, path: Path, values: np.ndarray) -> np.ndarray:
