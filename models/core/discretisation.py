@@ -34,7 +34,8 @@ STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 class Estimate:
     """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
 
-    step : longest step (s), or fewest cells, that would hold the share to GOAL. of : CELLS where it is of cells.
+    step : longest step (s), or fewest cells, that would hold the share to GOAL; 0 where no step mends it. of : CELLS
+    where it is of cells.
     """
 
     error: float
@@ -48,6 +49,12 @@ class Estimate:
     def warned(self) -> bool:
         """Whether a reader must be warned."""
         return not self.share <= WARNED
+
+    def advice(self, of: str) -> str:
+        """What to do about it, ``of`` the unit of steps."""
+        if self.of:
+            return f"use at least {self.step:g} {self.of}"
+        return f"use at most {self.step:g} {of}".rstrip() if self.step else "no shorter step mends it"
 
     @property
     def refused(self) -> bool:
@@ -114,14 +121,18 @@ Again = Callable[[float, float], Series]
 raises InputError or RunFailed where that cannot be."""
 
 
-def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
+def estimated(
+    run: Result, fine: Series, again: Again, order: float, step: float, units: Mapping[str, str] | None = None
+) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
-    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    units : of these channels, where the result has no channels of their names. Raises RunFailed, whose ``partial`` is
+    the result, where a channel is no answer.
     """
     told, how = by_steps(fine, again, order, step)
-    units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
-    return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
+    known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
+    known |= units or {}
+    return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
 
 
 def by_steps(fine: Series, again: Again, order: float, step: float) -> tuple[dict[str, Estimate], str]:
@@ -209,17 +220,12 @@ def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -
     worst = max(told, key=lambda name: told[name].share, default=None)
     if worst is not None and told[worst].refused:
         engine, one = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
-        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use {_advised(one, of)}"
-        fault = "cells are too few" if one.of else "steps are too long"
+        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; {one.advice(of)}"
+        fault = "cells are too few" if one.of else "steps are too long" if one.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
         failure.partial = run
         raise failure
     return run
-
-
-def _advised(one: Estimate, of: str) -> str:
-    """The step or the cells to use, in words."""
-    return f"at least {one.step:g} {one.of}" if one.of else f"at most {one.step:g} {of}".rstrip()
 
 
 def errors_of(run: Result) -> dict[str, Estimate]:
@@ -277,7 +283,7 @@ def error_lines(run: Result) -> list[str]:
     worst = {told[name].of: name for name in shares}
     for name in sorted(worst.values(), key=lambda name: -shares[name]):
         line = f"error at most {_size(name, told[name])}, by {said['how']}"
-        found.append(f"{line}: WARNING, use {_advised(told[name], said['of'])}" if told[name].warned else line)
+        found.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
     for kind, words in (("theory", "error of the theory"), ("chance", "standard error of {samples} paths")):
         if kind in said:
             name, values = max(said[kind]["channels"].items(), key=lambda entry: entry[1]["share"])

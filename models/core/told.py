@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from models.core.assumptions import Broken, assumed_of, broken_of
-from models.core.discretisation import error_lines, worst_of
+from models.core.discretisation import error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
 EACH = 4
@@ -79,6 +79,21 @@ def gathered(whole: Result, parts: Results) -> Result:
     broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
     whole.data.attrs["status"] = next(broke, whole.data.attrs["status"])
     return whole
+
+
+def inherited(derived: Result, results: Results, how: str) -> Result:
+    """What was computed of results with their errors, ``how``, the worst of each channel, and what they broke.
+
+    Without estimates in the results it has none.
+    """
+    assumed = [says for run in results.values() for says in assumed_of(run)]
+    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(one) for _, one in breaches(results)]}
+    derived.data.attrs["assumptions"] = json.dumps(told)
+    if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
+        derived.data.attrs["status"] += ", assumptions broken"
+    pairs = [pair for run in results.values() for pair in errors_of(run).items()]
+    worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
+    return stated(derived, worst, how) if worst else derived
 
 
 def as_json(results: Results) -> dict[str, Any]:
