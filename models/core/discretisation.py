@@ -20,10 +20,14 @@ from models.core.result import Result
 
 WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
 """Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
-WINDOW, FINE_WINDOW = 0.4, 0.2
+WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
+STEEPEST = 4.0
+"""Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
+FALL = 0.75
+"""Power of the tolerance with which the error of an adaptive method is taken to fall; it is from 0.7 to 1.1."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
@@ -111,16 +115,28 @@ Again = Callable[[float, float], Series]
 RunFailed where that cannot be."""
 
 
-def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
+def estimated(
+    run: Result,
+    fine: Series,
+    again: Again,
+    order: float,
+    step: float,
+    growth: float = 1.0,
+    sizes: Mapping[str, float] | None = None,
+) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    be, half of it over a part tells. growth : factor on what a part tells, where errors grow faster than by a power of
+    time; sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
+    ``partial`` is the result, where a channel is no answer.
     """
     try:
         told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, again, order, step), "a part in half the step"
+        told, how = _by_half_steps(fine, again, order, step, growth), "a part in half the step"
+    for name, size in (sizes or {}).items():
+        told[name] = _rescaled(told[name], size, step)
     units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
 
@@ -137,28 +153,54 @@ def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> d
     }
 
 
-def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
-    """The error of the finer run, times what its order makes of twice the step."""
+def _by_half_steps(fine: Series, again: Again, order: float, step: float, growth: float) -> dict[str, Estimate]:
+    """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
     finer = again(0.5, FINE_WINDOW)
     part = fine.times <= finer.times[-1] * (1.0 + 1e-9)
     rows = rows_at(finer.times, fine.times[part])
     told = {}
     for name, values in fine.channels.items():
         one = estimate(finer.channels[name][rows], values[part], order, step)
-        told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
+        later = growth * _later(values[part] - finer.channels[name][rows], values)
+        told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order * later), size_of(values), step)
     return told
+
+
+def _later(gap: np.ndarray, values: np.ndarray) -> float:
+    """Rms of an error over a whole run by that over its first rows, of which ``gap`` (k, ...) is the difference.
+
+    Errors go on to grow with the power of time that they have there, or as the channel (n, ...) gets rougher.
+    """
+    if len(gap) < 4:
+        return 1.0
+    first, second = _rms(gap[: len(gap) // 2]), _rms(gap[len(gap) // 2 :])
+    power = 0.5 * (math.log2(1.0 + (second / first) ** 2) - 1.0) if first > 0.0 else 0.0
+    bends = np.diff(values, 2, axis=0)
+    before, over_all = _rms(bends[: len(gap) - 2]), _rms(bends)
+    rougher = over_all / before if before > 0.0 else 1.0
+    return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST))
 
 
 def _rescaled(one: Estimate, size: float, step: float) -> Estimate:
     """The estimate with the share and the step that follow from its error and the size of the whole channel."""
     share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
-    advised = step * min(1.0, (GOAL / share) ** (1.0 / one.order)) if share > 0.0 else step
-    return replace(one, share=share, step=float(f"{advised:.2g}"))
+    wanted = (share / GOAL) ** (1.0 / one.order) if share < math.inf else 1.0
+    return replace(one, share=share, step=step / _parts(wanted))
 
 
-def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, tolerance: float) -> Result:
+def _parts(wanted: float) -> int:
+    """Least whole number from ``wanted`` on whose part of a step is a short decimal, so that it divides what the step
+    divides."""
+    powers = (2**i * 5**j for i in range(30) for j in range(12))
+    return min((number for number in powers if number >= wanted), default=1)
+
+
+def of_tolerance(
+    run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
+) -> Result:
     """The result of an adaptive method with the errors of its channels, by a run whose tolerance is ``factor`` times
-    as large: its error is taken to be larger by the root of that only, so that what is told is rather too large.
+    as large: its error is taken to be larger by the power FALL of that only, so that what is told is rather too large.
+    ``sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -166,10 +208,12 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
 
     told = {}
     for name, values in fine.channels.items():
-        at = CubicSpline(fine.times, values)(looser.times)
-        error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
-        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
-        told[name] = _rescaled(one, size_of(values), tolerance)
+        same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
+        at = values if same else CubicSpline(fine.times, values)(looser.times)
+        rounding = ROUNDING * float(np.abs(values).max(initial=0.0)) * math.sqrt(len(values))
+        error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), rounding)
+        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
+        told[name] = _rescaled(one, (sizes or {}).get(name, size_of(values)), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
