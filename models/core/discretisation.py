@@ -26,8 +26,9 @@ STEEPEST = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
-FALL = 0.75
-"""Power of the tolerance with which the error of an adaptive method is taken to fall; it is from 0.7 to 1.1."""
+FALL, FLOOR = 0.75, 0.03
+"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.7 to 1.1, and
+share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
@@ -121,20 +122,20 @@ def estimated(
     again: Again,
     order: float,
     step: float,
-    growth: float = 1.0,
+    growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. growth : factor on what a part tells, where errors grow faster than by a power of
-    time; sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
+    be, half of it over a part tells. growth : by channel, least factor on what a part tells, where errors grow faster
+    than by a power of time; sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
     ``partial`` is the result, where a channel is no answer.
     """
     try:
         told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, again, order, step, growth), "a part in half the step"
+        told, how = _by_half_steps(fine, again, order, step, growth or {}), "a part in half the step"
     for name, size in (sizes or {}).items():
         told[name] = _rescaled(told[name], size, step)
     units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
@@ -153,7 +154,9 @@ def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> d
     }
 
 
-def _by_half_steps(fine: Series, again: Again, order: float, step: float, growth: float) -> dict[str, Estimate]:
+def _by_half_steps(
+    fine: Series, again: Again, order: float, step: float, growth: Mapping[str, float]
+) -> dict[str, Estimate]:
     """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
     finer = again(0.5, FINE_WINDOW)
     part = fine.times <= finer.times[-1] * (1.0 + 1e-9)
@@ -161,7 +164,7 @@ def _by_half_steps(fine: Series, again: Again, order: float, step: float, growth
     told = {}
     for name, values in fine.channels.items():
         one = estimate(finer.channels[name][rows], values[part], order, step)
-        later = growth * _later(values[part] - finer.channels[name][rows], values)
+        later = max(_later(values[part] - finer.channels[name][rows], values), growth.get(name, 1.0))
         told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order * later), size_of(values), step)
     return told
 
@@ -210,8 +213,7 @@ def of_tolerance(
     for name, values in fine.channels.items():
         same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
         at = values if same else CubicSpline(fine.times, values)(looser.times)
-        rounding = ROUNDING * float(np.abs(values).max(initial=0.0)) * math.sqrt(len(values))
-        error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), rounding)
+        error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), FLOOR * tolerance * size_of(values))
         one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
         told[name] = _rescaled(one, (sizes or {}).get(name, size_of(values)), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")

@@ -1,5 +1,6 @@
 """What the equations of the pitch-plane vehicle take for granted; an effect says in its own file what it adds."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -35,8 +36,7 @@ def assumptions(assembly: Assembly) -> list[Assumption]:
         remedy = 'use vehicle.geometry = "exact"'
         says = "the pitch is so small that its sine is itself"
         listed.append(Assumption("small angles", says, remedy, _pitch, "rad", -SMALL, SMALL))
-    says = "the chassis pitches less than any road does, as wheels only move vertically"
-    listed.append(Assumption("upright", says, _upright(assembly), _pitch, "rad", -STEEPEST, STEEPEST))
+    listed.append(upright(_remedy(assembly), _pitch))
     if assembly.vehicle.pitch_springs or assembly.guided:
         listed.append(_artificial(assembly))
     return [*listed, *assembly.assumptions]
@@ -85,9 +85,11 @@ def _deflections(p: Parameters, run: Result) -> Watched:
 
 def _springs(assembly: Assembly, lifts: bool) -> Assumption:
     """No vehicle's spring pulls; what its droop stop would do is not in the equations."""
-    gentler = "no effect adds a droop stop: start lower, or excite it less"
-    linear = assembly.mode in ("free", "road") and not lifts
-    remedy = f"name the effect lift_off, whose tyres do not pull the wheels down; else {gentler}" if linear else gentler
+    remedy = "no effect adds a droop stop: start lower, or excite it less"
+    if assembly.mode not in ("free", "road"):
+        remedy = f"take wheel forces of tyres that only push (lift_off on a road); {remedy}"
+    elif not lifts:
+        remedy = f"name the effect lift_off, whose tyres do not pull the wheels down; else {remedy}"
     return Assumption(
         "springs compressed",
         "no suspension droops beyond its spring's free length",
@@ -107,7 +109,13 @@ def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
     }
 
 
-def _upright(assembly: Assembly) -> str:
+def upright(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
+    """The pitch is one of a vehicle on a road."""
+    says = "the chassis pitches less than any road does, as wheels only move vertically"
+    return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST, STEEPEST)
+
+
+def _remedy(assembly: Assembly) -> str:
     """What keeps the pitch small."""
     if assembly.guided:
         return "no effect lifts it: check the file of the prescribed pitch, and its unit"

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.core.assumptions import judged
 from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
-from models.core.errors import InputError
+from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.engines.assembly import Assembly, Channels, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE, OUTSIDE
@@ -66,6 +66,16 @@ def run(
     return _with_error(labelled, assembly, settings, channels) if error else labelled
 
 
+def run_away(scene: Scene, engine: str, error: bool = False) -> Result:
+    """``run`` of what may drift off: a run whose error is as large as itself is returned with it, and not refused."""
+    try:
+        return run(scene, engine, error=error)
+    except RunFailed as failure:
+        if failure.partial is None:
+            raise
+        return failure.partial
+
+
 def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: Channels) -> Result:
     """The result with the error of its principal channels, at all steps and not at the saved rows alone."""
     engine, names = run.data.attrs["engine"], principal(assembly)
@@ -100,24 +110,18 @@ def _sizes(assembly: Assembly, channels: Channels) -> dict[str, float]:
     return sizes
 
 
-def _growth(assembly: Assembly) -> float:
-    """How much more an error grows over a whole run than by a power of time from its first part: a free vehicle
-    under wheel forces tilts ever faster."""
+def _growth(assembly: Assembly) -> dict[str, float]:
+    """Rms of an error of the pitch over a whole run by that over its first part: a free vehicle under wheel forces
+    tilts ever faster."""
     if assembly.mode != "force" or assembly.vehicle.geometry == "linear" or assembly.vehicle.pitch_springs:
-        return 1.0
+        return {}
     from models.drift.growth import pitch_variance
     from models.systems.pitch_plane.trust import growth
 
     forces = growth(assembly)
-    grown, plain = (
-        np.sqrt(pitch_variance(forces.times, rates, 1.0)) for rates in (forces.until, np.zeros(len(forces.until)))
-    )
-    part = slice(0, max(2, round(FINE_WINDOW * len(forces.times))))
-    return max(1.0, _ratio(grown, part) / _ratio(plain, part))
-
-
-def _ratio(values: np.ndarray, part: slice) -> float:
-    return float(np.sqrt(np.mean(values**2) / np.mean(values[part] ** 2)))
+    grown = np.asarray(pitch_variance(forces.times, forces.until, 1.0))
+    part = max(2, round(FINE_WINDOW * len(grown)))
+    return {"pitch": float(np.sqrt(np.mean(grown) / np.mean(grown[:part])))}
 
 
 def _other(settings: Settings, times: float, share: float) -> Settings:
