@@ -93,7 +93,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
     def longer(times: float, share: float) -> Series:
         return again(_other(settings, times, share))
 
-    return estimated(run, fine, longer, method.order, settings.step, _growth(assembly), sizes)
+    return estimated(run, fine, longer, method.order, settings.step, growth=_growth(assembly), sizes=sizes)
 
 
 def _series(times: np.ndarray, channels: Channels, names: tuple[str, ...]) -> Series:
