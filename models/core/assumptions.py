@@ -54,14 +54,14 @@ class Broken:
 
     def brief(self) -> str:
         """A few words for a figure."""
-        time = "once" if math.isnan(self.first) else f"{100.0 * self.share:.2g} % of the time"
+        time = "once" if math.isnan(self.first) else f"{100.0 * self.share:.3g} % of the time"
         return f"assumption broken: {self.says}; {self.where}, {time}, worst {self.worst:.4g} {self.unit}".rstrip()
 
     def line(self) -> str:
         """A sentence for readers."""
         unit = f" {self.unit}" if self.unit else ""
         time = (
-            "once" if math.isnan(self.first) else f"{100.0 * self.share:.2g} % of the time, first at {self.first:.4g} s"
+            "once" if math.isnan(self.first) else f"{100.0 * self.share:.3g} % of the time, first at {self.first:.4g} s"
         )
         return (
             f"assumption broken: {self.says}; {self.where}: {time}, worst {self.worst:.4g}{unit} "
