@@ -88,7 +88,7 @@ def estimate(
         order = observed_order(_rms((fine - coarse)[window]), _rms(coarse[window] - coarser), declared)
     largest = float(np.abs(fine).max(initial=0.0))
     error = max(gap / (2.0**order - 1.0), ROUNDING * largest * math.sqrt(len(fine)))
-    return _rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
+    return rescaled(Estimate(error, unit, 0.0, order, step), size_of(fine), step)
 
 
 def _rms(values: np.ndarray) -> float:
@@ -110,22 +110,30 @@ class Series(NamedTuple):
 
 
 Again = Callable[[float, float], Series]
-"""The same run in steps ``factor`` times as long, over a ``share`` of its time from the start on; raises InputError or
-RunFailed where that cannot be."""
+"""The same run in steps ``factor`` times as long over a ``share`` of its time, from the start on where they are longer;
+raises InputError or RunFailed where that cannot be."""
 
 
 def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
-    Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    try:
-        told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
-    except (InputError, RunFailed):
-        told, how = _by_half_steps(fine, again, order, step), "a part in half the step"
+    told, how = by_steps(fine, again, order, step)
     units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
+
+
+def by_steps(fine: Series, again: Again, order: float, step: float) -> tuple[dict[str, Estimate], str]:
+    """Errors of the channels of ``fine``, without units, and how they were told.
+
+    Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
+    be, half of it over a part tells.
+    """
+    try:
+        return _by_longer_steps(fine, again, order, step), "runs in longer steps"
+    except (InputError, RunFailed):
+        return _by_half_steps(fine, again, order, step), "a part in half the step"
 
 
 def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
@@ -143,17 +151,19 @@ def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> d
 def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
     """The error of the finer run, times what its order makes of twice the step."""
     finer = again(0.5, FINE_WINDOW)
-    part = fine.times <= finer.times[-1] * (1.0 + 1e-9)
+    slack = 1e-9 * finer.times[-1]
+    part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
     rows = rows_at(finer.times, fine.times[part])
     told = {}
     for name, values in fine.channels.items():
         one = estimate(finer.channels[name][rows], values[part], order, step)
-        told[name] = _rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
+        told[name] = rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
     return told
 
 
-def _rescaled(one: Estimate, size: float, step: float) -> Estimate:
-    """The estimate with the share and the step that follow from its error and the size of the whole channel."""
+def rescaled(one: Estimate, size: float, step: float) -> Estimate:
+    """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
+    being that of the run."""
     share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
     advised = step * min(1.0, (GOAL / share) ** (1.0 / one.order)) if share > 0.0 else step
     return replace(one, share=share, step=float(f"{advised:.2g}"))
@@ -172,7 +182,7 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
         at = CubicSpline(fine.times, values)(looser.times)
         error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
         one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
-        told[name] = _rescaled(one, size_of(values), tolerance)
+        told[name] = rescaled(one, size_of(values), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
@@ -181,6 +191,12 @@ def by_cells(error: float, size: float, unit: str, cells: int, order: float, mos
     share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
     needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
     return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
+
+
+def summed(one: Estimate, other: Estimate) -> Estimate:
+    """An error on top of another, as that of an input on top of that of the run which it drives."""
+    order, step = min(one.order, other.order), min(one.step, other.step)
+    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step)
 
 
 def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:
