@@ -81,7 +81,7 @@ class Broken:
     def _time(self) -> str:
         if math.isnan(self.first) and not self.law:
             return "once"
-        return f"{100.0 * self.share:.2g} % of the time" + self.law
+        return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
         """A sentence for readers."""
