@@ -24,6 +24,8 @@ WINDOW, FINE_WINDOW = 0.4, 0.2
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
+CELLS = "cells along each axis"
+"""What an estimate is of that a coarser grid told."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
@@ -32,7 +34,8 @@ STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 class Estimate:
     """Error of a channel: ``error`` in its unit, ``share`` of its deviation, ``order`` that it falls with.
 
-    step : longest step (s), or cell, that would hold the share to GOAL.
+    step : longest step (s), or fewest cells, that would hold the share to GOAL; 0 where no step mends it. of : CELLS
+    where it is of cells.
     """
 
     error: float
@@ -40,11 +43,18 @@ class Estimate:
     share: float
     order: float
     step: float
+    of: str = ""
 
     @property
     def warned(self) -> bool:
         """Whether a reader must be warned."""
         return not self.share <= WARNED
+
+    def advice(self, of: str) -> str:
+        """What to do about it, ``of`` the unit of steps."""
+        if self.of:
+            return f"use at least {self.step:g} {self.of}"
+        return f"use at most {self.step:g} {of}".rstrip() if self.step else "no shorter step mends it"
 
     @property
     def refused(self) -> bool:
@@ -111,14 +121,18 @@ Again = Callable[[float, float], Series]
 raises InputError or RunFailed where that cannot be."""
 
 
-def estimated(run: Result, fine: Series, again: Again, order: float, step: float) -> Result:
+def estimated(
+    run: Result, fine: Series, again: Again, order: float, step: float, units: Mapping[str, str] | None = None
+) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
-    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    units : of these channels, where the result has no channels of their names. Raises RunFailed, whose ``partial`` is
+    the result, where a channel is no answer.
     """
     told, how = by_steps(fine, again, order, step)
-    units = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
-    return stated(run, {name: replace(one, unit=units.get(name, "")) for name, one in told.items()}, how)
+    known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
+    known |= units or {}
+    return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
 
 
 def by_steps(fine: Series, again: Again, order: float, step: float) -> tuple[dict[str, Estimate], str]:
@@ -183,6 +197,13 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
+def by_cells(error: float, size: float, unit: str, cells: int, order: float, most: int) -> Estimate:
+    """What a grid of ``cells`` leaves, as an estimate; ``step`` is the number of cells, at most so many, for GOAL."""
+    share = error / size if size > 0.0 else (0.0 if error == 0.0 else math.inf)
+    needed = cells * max(1.0, (min(share, 1.0) / GOAL) ** (1.0 / order))
+    return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
+
+
 def summed(one: Estimate, other: Estimate) -> Estimate:
     """An error on top of another, as that of an input on top of that of the run which it drives."""
     order, step = min(one.order, other.order), min(one.step, other.step)
@@ -198,9 +219,10 @@ def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -
     run.data.attrs["error"] = json.dumps({"how": how, "of": of, "channels": channels})
     worst = max(told, key=lambda name: told[name].share, default=None)
     if worst is not None and told[worst].refused:
-        engine, one = run.data.attrs["engine"], told[worst]
-        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; use at most {one.step:g} {of}".rstrip()
-        failure = RunFailed(engine, f"the steps are too long, this is no answer: {why}")
+        engine, one = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
+        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; {one.advice(of)}"
+        fault = "cells are too few" if one.of else "steps are too long" if one.step else "error is too large"
+        failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
         failure.partial = run
         raise failure
     return run
@@ -215,6 +237,17 @@ def errors_of(run: Result) -> dict[str, Estimate]:
 def not_estimated(run: Result, why: str) -> Result:
     """The result that says why no number stands for its error, such as a law whose switches do not repeat."""
     run.data.attrs["error"] = json.dumps({"why": why})
+    return run
+
+
+def of_theory(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
+    """The result with what a theory itself leaves, beside what was said of its cells; ``how``: words that say whence.
+
+    No grid lessens it, so that it is neither warned of nor refused.
+    """
+    said = json.loads(run.data.attrs["error"])
+    said["theory"] = {"how": how, "channels": {name: asdict(one) for name, one in told.items()}}
+    run.data.attrs["error"] = json.dumps(said)
     return run
 
 
@@ -242,16 +275,20 @@ def worst_of(run: Result) -> Estimate | None:
 
 
 def error_lines(run: Result) -> list[str]:
-    """What is printed of a result's error: its worst channel, with a warning and the step to use where one is due."""
+    """What is printed of a result's error: the worst channel of steps and of cells, the worst of both first, with a
+    warning and what to use where one is due; then what its theory and its sample leave."""
     said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
     found = [f"error not estimated: {said['why']}"] if "why" in said else []
-    if told:
-        name, one = max(told.items(), key=lambda entry: entry[1].share)
-        line = f"error at most {_size(name, one)}, by {said['how']}"
-        found.append(f"{line}: WARNING, use at most {one.step:g} {said['of']}".rstrip() if one.warned else line)
-    if "chance" in said:
-        name, values = max(said["chance"]["channels"].items(), key=lambda entry: entry[1]["share"])
-        found.append(f"standard error of {said['chance']['samples']} paths at most {_size(name, Estimate(**values))}")
+    shares = {name: one.share for name, one in sorted(told.items(), key=lambda entry: entry[1].share)}
+    worst = {told[name].of: name for name in shares}
+    for name in sorted(worst.values(), key=lambda name: -shares[name]):
+        line = f"error at most {_size(name, told[name])}, by {said['how']}"
+        found.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
+    for kind, words in (("theory", "error of the theory"), ("chance", "standard error of {samples} paths")):
+        if kind in said:
+            name, values = max(said[kind]["channels"].items(), key=lambda entry: entry[1]["share"])
+            line = f"{words.format(**said[kind])} at most {_size(name, Estimate(**values))}"
+            found.append(f"{line}, {said[kind]['how']}" if "how" in said[kind] else line)
     return found
 
 
