@@ -259,9 +259,14 @@ def by_cells(error: float, size: float, unit: str, cells: int, order: float, mos
 
 
 def summed(one: Estimate, other: Estimate) -> Estimate:
-    """An error on top of another, as that of an input on top of that of the run which it drives."""
-    order, step = min(one.order, other.order), min(one.step, other.step)
-    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step)
+    """An error on top of another, as that of an input on top of that of the run which it drives.
+
+    What mends it is told of the larger one where that is of cells and the other of steps.
+    """
+    larger = one if one.share >= other.share else other
+    step = min(one.step, other.step) if one.of == other.of == "" else larger.step
+    order = min(one.order, other.order)
+    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step, larger.of)
 
 
 def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:

@@ -97,9 +97,7 @@ Alone = Callable[[int], np.ndarray]
 """Deviations (time, outputs) as if each speed had always been driven, by every so many of the speeds that are known."""
 
 
-def with_error_of_drive(
-    run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone
-) -> Result:
+def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
     """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
     fewer speeds between which the quasi-stationary ones are straight."""
     assert scene.drive is not None

@@ -50,7 +50,13 @@ def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **table
         "corner_roll": float(rng.uniform(0.6, 3.0)),
     }
     road |= {"cutoff": float(rng.uniform(8.0, 40.0))} if rng.random() < 0.5 else {}
-    table = {"title": "a sample", "system": "ride", "vehicle": {"file": file, "operating_point": point}, "road": road, **tables}
+    table = {
+        "title": "a sample",
+        "system": "ride",
+        "vehicle": {"file": file, "operating_point": point},
+        "road": road,
+        **tables,
+    }
     return build(table, "sample.toml")
 
 
@@ -71,7 +77,10 @@ def _of(result: Result, name: str, engine: str, true: Mapping[str, float], calls
 
 def _swept(rng: np.random.Generator, number: int) -> Sample:
     """Deviations of a linear vehicle at five speeds, beside the same in extended precision."""
-    file, engine = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"])), str(rng.choice(["reference", *ENGINES]))
+    file, engine = (
+        str(rng.choice(["quarter_car", "half_car", "seven_freedoms"])),
+        str(rng.choice(["reference", *ENGINES])),
+    )
     scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
     vehicle = _varied(rng, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
