@@ -191,9 +191,8 @@ def _of_gains(
 ) -> dict[str, Estimate]:
     """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
     beside = [(replaced[speed], each) for speed, each in copies.items()]
-    true, gains = (
-        np.array([pair[i].deviation if i else pair[0].covariance.deviation for pair in beside]) for i in (1, 0)
-    )
+    true = np.array([each.deviation for _, each in beside])
+    gains = np.array([gained.covariance.deviation for gained, _ in beside])
     scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])
     left = np.array([each.left_out for each, _ in beside])
     errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))

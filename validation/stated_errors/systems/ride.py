@@ -105,7 +105,8 @@ def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
     )
     C += linear.read.acceleration @ (A - system.A)[n : 2 * n]
     met = hits(system)
-    before, Q = np.zeros_like(met.B[0]), np.zeros_like(A)
+    before: np.ndarray = np.zeros_like(met.B[0])
+    Q = np.zeros_like(A)
     for j, b in enumerate(met.B):
         if j and not met.independent:
             before = _exponential(A * (met.delays[j] - met.delays[j - 1])) @ (before + met.B[j - 1])
