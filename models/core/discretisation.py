@@ -26,8 +26,8 @@ STEEPEST = 4.0
 """Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
-FALL, FLOOR = 0.75, 0.03
-"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.7 to 1.1, and
+FALL, FLOOR = 0.6, 0.03
+"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
 share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
@@ -129,8 +129,9 @@ def estimated(
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
     be, half of it over a part tells. growth : by channel, least factor on what a part tells, where errors grow faster
-    than by a power of time; sizes : what shares are of, by channel, where that is not its own deviation. Raises RunFailed, whose
-    ``partial`` is the result, where a channel is no answer.
+    than by a power of time; sizes : what shares are of, by channel, where that is not its own deviation.
+
+    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     try:
         told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
