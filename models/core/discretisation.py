@@ -28,8 +28,8 @@ LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
 CELLS = "cells along each axis"
 """What an estimate is of that a coarser grid told."""
-FALL, FLOOR = 0.75, 0.03
-"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.7 to 1.1, and
+FALL, FLOOR = 0.6, 0.03
+"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
 share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""

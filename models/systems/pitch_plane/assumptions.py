@@ -132,17 +132,19 @@ def _artificial(assembly: Assembly) -> Assumption:
         "little artificial",
         "what holds the chassis does little beside its own inertia",
         moved if assembly.guided else soft,
-        partial(_shares, assembly.parameters),
+        partial(_shares, assembly.parameters, assembly.mode == "heave-pitch"),
         "",
         most=ARTIFICIAL,
     )
 
 
-def _shares(p: Parameters, run: Result) -> Watched:
-    """Artificial moment and force up to 15 Hz by the inertia's; nothing where the rows are too few or too far apart."""
+def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
+    """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
+    are too few or too far apart."""
     from models.drift.score import own_figures
 
     with suppress(InputError):
         own = own_figures(run, p)
-        return {"moment": np.array([own.moment_share_band]), "force": np.array([own.force_share_band])}
+        force = {"force": np.array([own.force_share_band])} if heave else {}
+        return {"moment": np.array([own.moment_share_band]), **force}
     return {}
