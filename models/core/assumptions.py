@@ -18,7 +18,7 @@ RARE = 0.00135
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Values of known mean and standard deviation (rows,); ``rows``: what tells them apart, as "at 20 m/s"."""
+    """Values of which mean and standard deviation (rows,) are known; ``rows`` tells them apart, as "at 20 m/s"."""
 
     mean: np.ndarray
     deviation: np.ndarray

@@ -63,8 +63,8 @@ class Estimate:
 
     @property
     def refused(self) -> bool:
-        """Whether the channel is no answer."""
-        return not self.share <= REFUSED
+        """Whether the channel is no answer; what no step mends is told, and not refused."""
+        return not self.share <= REFUSED and self.step != 0.0
 
 
 def size_of(values: np.ndarray) -> float:

@@ -74,7 +74,7 @@ def with_error_of_sweep(
         known = np.isfinite(own[..., i]) & np.isfinite(again[..., i])
         size = _rms(own[..., i][known])
         if size > 0.0:
-            error = max(SAFETY * _rms((again - own)[..., i][known]), DIGIT / 4.0 * size)
+            error = max(SAFETY * _rms(again[..., i][known] - own[..., i][known]), DIGIT / 4.0 * size)
             told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return stated(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
@@ -191,8 +191,8 @@ def _of_gains(
 ) -> dict[str, Estimate]:
     """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
     beside = [(replaced[speed], each) for speed, each in copies.items()]
+    gains = np.array([each.covariance.deviation for each, _ in beside])
     true = np.array([each.deviation for _, each in beside])
-    gains = np.array([gained.covariance.deviation for gained, _ in beside])
     scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])
     left = np.array([each.left_out for each, _ in beside])
     errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))
