@@ -2,7 +2,9 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -79,7 +81,7 @@ class Broken:
     def _time(self) -> str:
         if math.isnan(self.first) and not self.law:
             return "once"
-        return f"{100.0 * self.share:.2g} % of the time" + self.law
+        return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
         """A sentence for readers."""
@@ -141,7 +143,21 @@ def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
+    _NOTED.get()(run)
     return run
+
+
+_NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
+
+
+@contextmanager
+def watching(note: Callable[[Result], None]) -> Iterator[None]:
+    """Tell ``note`` of every result that is judged inside; where watches are nested the inner one alone is told."""
+    before = _NOTED.set(note)
+    try:
+        yield
+    finally:
+        _NOTED.reset(before)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:

@@ -102,7 +102,7 @@ def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
         if j and not met.independent:
             before = _exponential(A * (met.delays[j] - met.delays[j - 1])) @ (before + met.B[j - 1])
         Q += b @ b.T + before @ b.T + b @ before.T
-    P = np.zeros_like(A)
+    P: np.ndarray = np.zeros_like(A)
     for _ in range(8):
         half = A @ P
         P += lyap(system.A, (half + half.T + Q).astype(float), method="scipy")
