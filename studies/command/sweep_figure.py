@@ -1,6 +1,7 @@
 """Figures of a sweep: every number that changes over the key, with marks where a result must be doubted."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ class Swept:
     values: tuple[Any, ...]
     columns: Columns
     failures: list[dict[str, str]]
-    results: list[Results]
+    results: Sequence[Results]
 
     def broken(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
