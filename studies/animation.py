@@ -43,6 +43,7 @@ def run(scene: PictureScene, engines: tuple[str, ...], folder: Path, progress: P
         "folder": str(folder),
         "failed": {},
         "frames": film.frames,
+        "results": {motion.engine: motion.run for motion in motions if motion.run is not None},
         "table": [f"  {line}" for line in table if line],
     }
 

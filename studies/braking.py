@@ -36,13 +36,14 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     failed, table, answer = dict[str, str](), list[str](), dict[str, dict[str, Any]]()
+    every = dict[str, Result]()
     engines = engines_of(scene, engines)
     for i, name in enumerate(scene.procedures):
         results = dict[str, Result]()
         for j, engine in enumerate(engines):
             progress(f"{name}, {engine}", (i * len(engines) + j) / (len(scene.procedures) * len(engines)))
             try:
-                result: Result | None = drive(scene, engine, procedure=name)
+                result: Result | None = drive(scene, engine, procedure=name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"], result = str(error), error.partial
             if result is not None and len(result.times) > 2:
@@ -52,14 +53,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
             if not any(place.startswith(f"{name}, ") for place in failed):
                 table.append(f"  {name}: stands within two samples of {scene.run.sample:g} s: it has no figures")
             continue
+        every |= {name if len(engines) == 1 else f"{name}, {engine}": stop for engine, stop in results.items()}
         stop = Stop(next(iter(results.values())).detail)
         radius = plane_of(scene).radius
         measured, rims = measured_of(scene, name, radius.size), stop.path.turning * radius
         write_pressures(folder / f"{name}_pressures.csv", stop.times, stop.path.pressures, rims)
-        stop_figure(scene, name, stop, folder / f"{name}.png", measured)
-        told, remarks = dict[str, float](), list[str]()
+        stop_figure(scene, name, results, folder / f"{name}.png", measured)
+        figures, remarks = dict[str, float](), list[str]()
         try:
-            told = merits(scene, name, stop) if options.adhesion else {}
+            figures = merits(scene, name, stop) if options.adhesion else {}
         except NoAdhesion as error:
             remarks = [f"    {error}"]
         except RunFailed as error:
@@ -67,9 +69,15 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: File, progress: P
         train = stop.of_hitch() if scene.trailer is not None else {}
         remarks += [f"    {key:<40}{value:>10.2f}" for key, value in train.items()]
         wheels = stop.of_wheels() | beside(measured, stop, rims)
-        answer[name] = {**stop.of_vehicle(), **{key: value.tolist() for key, value in wheels.items()}, **told, **train}
-        table += lines(name, stop, told, wheels) + remarks + ended(measured, stop) + compared(results)
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": table}
+        answer[name] = {
+            **stop.of_vehicle(),
+            **{key: value.tolist() for key, value in wheels.items()},
+            **figures,
+            **train,
+        }
+        table += lines(name, stop, figures, wheels) + remarks + ended(measured, stop) + compared(results)
+    told = {"failed": failed, "results": every, "answer": answer, "table": table}
+    return {"scene": scene.title, "folder": str(folder), **told}
 
 
 def beside(measured: MeasuredPressures | None, stop: Stop, rims: np.ndarray) -> dict[str, np.ndarray]:

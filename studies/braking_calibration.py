@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.discretisation import of_chance
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
@@ -19,8 +20,7 @@ from models.ensemble.workers import processes
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene
-from models.systems.braking.stop_report import Stop
-from models.systems.braking.stops import Scatter, Stops, scatter
+from models.systems.braking.stops import Scatter, Stops, chances, scatter
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -91,17 +91,19 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         scatters = _means(last, options, options.last, pool, options.seed + 1)
     columns = zip(ROUNDS.items(), np.array(steps).T, strict=True)
     rounds = {name: Channel("round", values, unit) for (name, unit), values in columns}
-    result(scene, rounds, {}, engine="reference").save(folder / "rounds.nc")
+    by_rounds = of_chance(result(scene, rounds, {}, engine="reference"), chances(means), options.runs)
+    by_rounds.save(folder / "rounds.nc")
     heads = (f"{name} [{unit}]" if unit else name for name, unit in ROUNDS.items())
     rows = [",".join(heads), *(",".join(f"{value:.9g}" for value in step) for step in steps)]
     write_whole(folder / "calibration.csv", "\n".join(rows) + "\n")
-    stop = drive(last, procedure=options.procedure)
+    stop = drive(last, procedure=options.procedure, error=scene.error)
     stop.save(folder / "calibration.nc")
-    stop_figure(last, options.procedure, Stop(stop.detail), folder / "calibration.png")
+    stop_figure(last, options.procedure, {"as fitted": stop}, folder / "calibration.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": {"rounds": by_rounds, "as fitted": stop},
         "table": table(options, scale, steer, scatters),
         "answer": {"scale": scale, "steer": steer, **{key: figure.mean for key, figure in scatters.items()}},
     }

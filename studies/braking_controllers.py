@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import RunFailed
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
+from models.core.told import Results, gathered
 from models.core.whole_files import write_whole
 from models.systems.braking.plan import check as check_scene
 from models.systems.braking.plan import check_reference
@@ -93,11 +94,13 @@ def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Drive all; saves ``controllers.nc``, ``controllers.csv`` and ``controllers.png``."""
     every, answer, failed, estimated = cases(scene), list[dict[str, Any]](), dict[str, str](), False
+    results = dict[str, Result]()
     for i, (labels, alone) in enumerate(every.items()):
         name = ", ".join(labels)
         progress(name, i / len(every))
         try:
-            stop = Stop(drive(alone).detail)
+            results[name] = drive(alone, error=scene.error)
+            stop = Stop(results[name].detail)
         except RunFailed as error:
             failed[name] = str(error)
             continue
@@ -107,10 +110,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
         values, estimated = stop.of_vehicle(), estimated or not alone.controller.true_speed
         shown = {head: values[quantity] for head, quantity in SHOWN.items()}
         answer.append(dict(zip(LABELS, labels, strict=True)) | shown | {LOCKED: float(stop.locks().time.max())})
-    _save(scene, answer, folder)
-    _figure(scene, answer, folder / "controllers.png")
-    lines = table(answer) + [ESTIMATED] * estimated
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": lines}
+    _save(scene, answer, folder, results)
+    _figure(scene, answer, folder / "controllers.png", results)
+    told = {"results": results, "answer": answer, "table": table(answer) + [ESTIMATED] * estimated}
+    return {"scene": scene.title, "folder": str(folder), "failed": failed, **told}
 
 
 def table(stops: list[dict[str, Any]]) -> list[str]:
@@ -123,8 +126,8 @@ def table(stops: list[dict[str, Any]]) -> list[str]:
     return [*lines, "  locked: longest of the wheels, above 15 km/h"]
 
 
-def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path) -> None:
-    """A stop per line, or along the axis of the result."""
+def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, results: Results) -> None:
+    """A stop per line, or along the axis of the result, which says what all of them say of themselves."""
     heads = [*SHOWN, LOCKED] if stops else []
     texts = {name: Channel("stop", [stop[name] for stop in stops]) for name in LABELS}
     columns = {head: np.array([stop[head] for stop in stops]) for head in heads}
@@ -132,7 +135,8 @@ def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path) -> Non
         head.partition(" [")[0].replace("/", " by "): Channel("stop", column, head.partition(" [")[2][:-1])
         for head, column in columns.items()
     }
-    result(scene, channels, texts, engine="reference").save(folder / "controllers.nc")
+    whole = result(scene, channels, texts, engine="reference")
+    (gathered(whole, results) if results else whole).save(folder / "controllers.nc")
     rows = [(*(stop[name] for name in LABELS), *(f"{stop[head]:.17g}" for head in heads)) for stop in stops]
     write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABELS, *heads), *rows]))
 
@@ -140,9 +144,9 @@ def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path) -> Non
 PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}
 
 
-def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path) -> None:
+def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
@@ -152,7 +156,7 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path) -> Non
     )
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
-        for row, (key, heading) in enumerate(PANELS.items()):
+        for row, (key, quantity) in enumerate(PANELS.items()):
             axis = axes[row, column]
             for k, kind in enumerate(kinds):
                 bars = {
@@ -171,12 +175,12 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path) -> Non
                 )
             axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
             axis.set(
-                title=f"{heading} on {surface}; split: {options.surfaces[surface]} on the right",
+                title=f"{quantity} on {surface}; split: {options.surfaces[surface]} on the right",
                 ylabel=key.replace("^2", "²") if column == 0 else "",
             )
     if stops:
         axes[0, 0].legend(fontsize=8)
-    figure.suptitle(f"{scene.title}, each procedure from its speed to a stop", x=0.01, ha="left", fontweight="bold")
+    heading(figure, f"{scene.title}, each procedure from its speed to a stop", results)
     save(figure, file)
 
 

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.discretisation import of_chance
 from models.core.errors import InputError
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
+from models.core.told import Results, gathered
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
@@ -18,7 +20,7 @@ from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
 from models.systems.braking.scene import BrakingScene, build
-from models.systems.braking.stops import KEPT, Scatter, Stops, Welch, scatter, welch
+from models.systems.braking.stops import KEPT, Scatter, Stops, Welch, chances, scatter, welch
 
 SYSTEM = "braking"
 Progress = Callable[[str, float], None]
@@ -56,9 +58,10 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
     check(scene, engines)
     options = read(Options, scene.options, scene.file, "options")
     tables = [scene.table(), merged(scene.table(), options.other)][: 2 if options.other else 1]
-    ensembles = []
-    progress("loading", 0.0)
-    drive(scene, procedure=options.procedure)  # compiles what is not compiled yet, once and not in every worker
+    ensembles, results = [], dict[str, Result]()
+    progress("loading", 0.0)  # compiles what is not compiled yet, once and not in every worker
+    scenes = [build(table, scene.file, Path(scene.folder)) for table in tables]
+    singles = [drive(each, procedure=options.procedure, error=scene.error) for each in scenes]
     with processes(options.workers) if options.workers > 1 else nullcontext() as pool:
         for i, table in enumerate(tables):
             job = Stops(table, scene.file, scene.folder, options.procedure, options.speed_spread, options.seed + i)
@@ -67,19 +70,21 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
                 progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
 
             ensembles.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
-    for name, table, arrays in zip(options.names, tables, ensembles, strict=False):
-        units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
+    units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
+    scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]
+    for name, each, single, arrays, means in zip(options.names, scenes, singles, ensembles, scatters, strict=False):
         channels = {key: Channel("stop", arrays[key], unit) for key, unit in units.items()}
-        stops = result(build(table, scene.file, Path(scene.folder)), channels, {}, engine="reference")
+        stops = gathered(result(each, channels, {}, engine="reference"), {"one stop": single})
+        results[name] = of_chance(stops, chances(means), options.runs)
         stops.save(folder / f"{name}.nc")
         stops.save_table(folder / f"{name}.csv")
-    scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]
     tests = {key: welch(scatters[0][key], scatters[1][key]) for key in KEPT} if len(ensembles) > 1 else {}
-    _figure(scene, options, ensembles, scatters, tests, folder)
+    _figure(scene, options, ensembles, scatters, tests, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": results,
         "table": table_of(options, scatters, tests),
         "answer": {
             "means": [{key: means[key].mean for key in KEPT} for means in scatters],
@@ -119,9 +124,10 @@ def _figure(
     ensembles: list[dict[str, np.ndarray]],
     scatters: list[dict[str, Scatter]],
     tests: dict[str, Welch],
+    results: Results,
     folder: Path,
 ) -> None:
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
@@ -144,7 +150,7 @@ def _figure(
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="They scatter by more than the speed")
     histogram.legend(fontsize=8)
     cloud.legend(fontsize=8)
-    figure.suptitle(f"{scene.title}: {options.runs} stops each{said}", x=0.01, ha="left", fontweight="bold")
+    heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
     save(figure, folder / "ensemble.png")
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from models.brake.plane_chain import place_of
 from models.brake.plane_step import LOAD, SLIP
 from models.brake.plane_vehicle import Plane
-from models.drawing.figures import save
+from models.core.told import Results
+from models.drawing.figures import heading, save
 from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, sides, vehicle_of
 from models.systems.braking.plan import behind
@@ -24,22 +25,21 @@ OVERHANG, BESIDE = 1.2, 1.1
 
 
 def stop_figure(
-    scene: BrakingScene, name: str, stop: Stop, file: File, measured: MeasuredPressures | None = None
+    scene: BrakingScene, name: str, results: Results, file: File, measured: MeasuredPressures | None = None
 ) -> File:
-    """Six panels: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension also its body's
-    lean, and loads."""
-    procedure = scene.procedures[name]
+    """Six panels of the first result: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension
+    also its body's lean, and loads."""
+    procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
     lean = stop.lean
     columns = 3 if lean is None else 4
     figure, axes = plt.subplots(2, columns, figsize=(14 * columns / 3, 7.2))
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
-    figure.suptitle(
+    heading(
+        figure,
         f"{scene.title}: {name.replace('_', ' ')} from {procedure.speed:g} m/s, "
         f"{behind(scene).replace('{procedure}', name)}; {ended}",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
+        results,
     )
     _speeds(axes[0, 0], stop, stop.path.turning * plane_of(scene).radius, measured)
     slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)

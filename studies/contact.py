@@ -1,7 +1,7 @@
 """What one contact of wheel and rail does: area, pressure, forces and how far they are off, at one creepage or many."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.contact.accuracy import Error
 from models.contact.theories import Contact, ExactOnEllipse, Fastsim, OnEllipse
 from models.core.errors import InputError
 from models.core.result import Result
@@ -40,7 +41,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Press the bodies, roll them; saves forces and fields as CSV and netCDF, and figures."""
     check(scene, engines)
-    forces = run_scene(scene, fields=True, progress=progress)
+    forces = run_scene(scene, error=scene.error, fields=True, progress=progress)
     rolls: Rolls = forces.detail
     for name, saved in (("forces", forces), ("fields", cells_of(scene, rolls))):
         if saved is not None:
@@ -51,8 +52,14 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
     body, doubts = rolls.contact, json.loads(forces.data.attrs["doubts"])
     rows = forces.data.to_dataframe().to_dict("records")
     answer = asdict(body.pressing) | {"friction": body.friction, "forces": rows, "doubt": "".join(doubts)}
-    table = [*_table(scene, forces), *(f"  warning: {doubt}" for doubt in doubts)]
-    return {"scene": scene.title, "folder": str(folder), "failed": {}, "answer": answer, "table": table}
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": {},
+        "answer": answer,
+        "results": {"forces": forces},
+        "table": _table(scene, forces),
+    }
 
 
 def _table(scene: ContactScene, forces: Result) -> list[str]:
@@ -65,21 +72,29 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
         f"  normal load {p.load:,.0f} N, approach {1e6 * p.approach:.2f} um, {size}area {1e6 * p.area:.2f} mm^2, "
         f"largest pressure {1e-6 * p.peak:,.0f} MPa",
         *_places(scene),
-        f"  pressed in {duration(rolls.pressing)} once, rolled in {cost(rolls.rolling)} at each creepage, errors "
-        "included",
+        f"  pressed in {duration(rolls.pressing)} once, rolled in {cost(rolls.rolling)} at each creepage"
+        + ", errors included" * bool(rolls.errors),
         f"  forces on the wheel by {theory(scene.method)}; mu N = {limit:,.0f} N",
         f"    {'xi_x [-]':>10}{'xi_y [-]':>10}{'spin [1/m]':>11}{'Fx [N]':>10}{'Fy [N]':>10}{'Mz [N m]':>10}"
-        f"{'stick':>7}{'loss [N]':>10}   errors: of cells, of theory [% of mu N], of Mz [N m]",
+        f"{'stick':>7}{'loss [N]':>10}"
+        + "   errors: of cells, of theory [% of mu N], of Mz [N m]"
+        * bool(rolls.errors),
     ]
     step = max(1, (len(rolls.motions) - 1) // ROWS)
-    for motion, force, error in list(zip(rolls.motions, rolls.rolled, rolls.errors, strict=True))[::step]:
+    errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
+    for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"
             f"{round(force.fy):>10,}{force.mz:>10.3f}{force.stick:>7.0%}{force.dissipation:>10.3g}"
-            f"   {_percent(error.cells, limit):>6}{_percent(error.theory, limit):>8}"
-            f"{error.moment:>9.2g}"
+            + ("" if error is None else _errors(error, limit))
         )
-    return [*lines, "  loss: power by the rolling speed; errors are of the force, that of Mz has both together"]
+    loss = "  loss: power by the rolling speed"
+    return [*lines, loss + "; errors are of the force, that of Mz has both together" * bool(rolls.errors)]
+
+
+def _errors(error: Error, limit: float) -> str:
+    cells, theory = (_percent(part, limit) for part in (error.cells, error.theory))
+    return f"   {cells:>6}{theory:>8}{error.moment:>9.2g}"
 
 
 NAMES = {
@@ -123,7 +138,7 @@ def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
             f"by {NAMES[scene.method.name]}"
         )
         friction = rolls.contact.friction
-        contact_figure(list(last.fields), friction, title, _pressure(rolls.contact), folder / "contact.png")
+        contact_figure(list(last.fields), friction, title, _pressure(rolls.contact), forces, folder / "contact.png")
     if sweep is not None:
         others = "".join(
             f"; {symbol} = {value:.3g}{unit}"

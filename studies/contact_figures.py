@@ -11,7 +11,7 @@ from models.contact.fields import Fields
 from models.contact.inputs import Array
 from models.contact.theories import Rolled
 from models.core.result import Result
-from models.drawing.figures import plt, save
+from models.drawing.figures import heading, plt, save
 from models.systems.contact.scene import Sweep
 from models.systems.contact.work_precision import TARGETS, Point
 
@@ -21,8 +21,13 @@ ARROWS = 17
 """Arrows across the longer side of a contact area, about."""
 
 
-def contact_figure(patches: list[Fields], friction: float, title: str, pressure: str, path: Path) -> None:
-    """Pressure (a word or two tell of which kind) over the contact area beside its tractions, all patches to scale."""
+def contact_figure(
+    patches: list[Fields], friction: float, title: str, pressure: str, forces: Result, path: Path
+) -> None:
+    """Pressure (a word or two tell of which kind) over the contact area beside its tractions, all patches to scale.
+
+    forces : the result whose last motion is shown.
+    """
     length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
     size = 10.5, float(np.clip(4.0 * width / length + 1.7, 3.6, 8.5))
     figure, axes = plt.subplots(1, 2, figsize=size, sharex=True, sharey=True)
@@ -33,7 +38,7 @@ def contact_figure(patches: list[Fields], friction: float, title: str, pressure:
         axis.grid(visible=False)
     axes[0].set_ylabel("y, to the right [mm]")
     axes[0].invert_yaxis()  # as seen from above, where x is ahead
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(figure, title, {"forces": forces})
     save(figure, path)
 
 
@@ -102,8 +107,9 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
     limit = 1e-3 * body.friction * body.pressing.load
-    error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"])
-    turned = forces["moment_error_of_cells"] + forces["moment_error_of_theory"]
+    stated, none = "error_of_cells" in forces.data, 0.0 * values
+    error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"]) if stated else none
+    turned = forces["moment_error_of_cells"] + forces["moment_error_of_theory"] if stated else none
     for axis, name, label, scale, off, most in (
         (left, "fx", "$F_x$", 1e-3, error, limit),
         (left, "fy", "$F_y$", 1e-3, error, limit),
@@ -122,11 +128,12 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
     for axis in (left, right):
         axis.set_xlabel(LABELS[sweep.of])
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
-    left.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error of cells and theory")
+    if stated:
+        left.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error of cells and theory")
     if checks:
         left.plot([], [], "o", color="#444444", markerfacecolor="white", markersize=5, label="exact theory")
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(figure, title, {"forces": forces})
     save(figure, path)
 
 
@@ -146,9 +153,10 @@ TOP = 60.0
 """Largest error (%) that the figure shows."""
 
 
-def price_figure(points: list[Point], title: str) -> Figure:
+def price_figure(price: Result, title: str) -> Figure:
     """Error of every theory over its time and over its cells, both logarithmic; thin lines: 95 of 100 contacts."""
     figure, axes = plt.subplots(1, 2, figsize=(11.5, 5.2), sharey=True)
+    points: list[Point] = price.detail
     for name, (colour, marker) in STYLES.items():
         line = [point for point in points if point.name == name]
         error, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))
@@ -166,5 +174,5 @@ def price_figure(points: list[Point], title: str) -> Figure:
     axes[0].set_title("thick: mean of all contacts; thin: 95 of 100 are better")
     axes[1].set(title="dotted: 5, 2, 1 and 0.5 %", xlim=(30.0, None))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(figure, title, {"price": price})
     return figure

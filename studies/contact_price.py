@@ -54,11 +54,12 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
 
     a, b = (1e3 * price.data.attrs[axis] for axis in "ab")
     title = f"What accuracy costs: a = {a:.2f} mm, b = {b:.2f} mm, {uncertain.size} contacts"
-    save(price_figure(points, title), folder / "price.png")
+    save(price_figure(price, title), folder / "price.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": {"price": price},
         "points": [asdict(point) for point in points],
         "table": table,
     }

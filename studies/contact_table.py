@@ -25,7 +25,7 @@ def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
 def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Answer every row into ``forces.csv``; saves the first ones and sizes of all as ``forces.nc``."""
     check(scene, engines)
-    rows = run_scene(scene, answers=folder / "forces.csv", progress=progress)
+    rows = run_scene(scene, error=scene.error, answers=folder / "forces.csv", progress=progress)
     rows.save(folder / "forces.nc")
     counts = rows.counts()
     return {
@@ -34,21 +34,23 @@ def run(scene: ContactScene, engines: tuple[str, ...], folder: Path, progress: P
         "failed": {},
         "rows": counts,
         "answer": json.loads(rows.data.attrs["sizes"]),
+        "results": {"forces": rows},
         "seconds": rows.seconds,
-        "table": told(counts["rows"], counts["wrong"], scene.cases_file().name, rows.seconds),
+        "table": told(counts["rows"], counts["wrong"], scene.cases_file().name, rows.seconds, scene.error),
     }
 
 
-def told(rows: int, wrong: int, name: str, seconds: float) -> list[str]:
+def told(rows: int, wrong: int, name: str, seconds: float, errors: bool = True) -> list[str]:
     """What is printed of ``rows`` rows, of which some are wrong, from the file ``name``."""
     if rows == 0:
         return [f"  no rows in {name}"]
     sound = ", all of them sound" if rows > 1 else ", sound"
     state = f"; {wrong:,} of them wrong, see their status" if wrong else sound
     each = f", {duration(seconds / rows)} a row" if rows > 1 else ""
+    twice = " twice for the error of cells" if errors else ""
     return [
         f"  {rows:,} row{'s' * (rows > 1)} of {name}{state}",
-        f"  {duration(seconds)}{each}, once: reading, forces twice for the error of cells, writing",
+        f"  {duration(seconds)}{each}, once: reading, forces{twice}, writing",
     ]
 
 

@@ -20,26 +20,33 @@ def run(scene: HandlingScene, engines: tuple[str, ...], folder: Path, progress: 
     """Drive every manoeuvre in every engine; saves NAME.nc and NAME.png of each, by the first engine that ended."""
     from studies.handling_figures import manoeuvre_figure
 
-    failed, lines, answer = {}, [], {}
+    failed, lines, answer, results = dict[str, str](), list[str](), dict[str, Any](), dict[str, Result]()
     for i, name in enumerate(scene.manoeuvres):
         runs = dict[str, Result]()
         for j, engine in enumerate(engines):
             progress(f"{name}, {engine}", (i + j / len(engines)) / len(scene.manoeuvres))
             try:
-                runs[engine] = run_scene(scene, engine, name)
+                runs[engine] = run_scene(scene, engine, name, error=scene.error)
             except RunFailed as error:
                 failed[f"{name}, {engine}"] = str(error)
         if runs:
             joined(runs, "engine").save(folder / f"{name}.nc")
-            drive = next(iter(runs.values())).detail
-            manoeuvre_figure(drive, name.replace("_", " "), folder / f"{name}.png")
+            manoeuvre_figure(runs, name.replace("_", " "), folder / f"{name}.png")
+            results |= {f"{name}, {engine}": run for engine, run in runs.items()}
             answer[name] = _answer(runs)
             lines.append(_line(name, answer[name]))
     head = (
         f"    {'':<16}{'largest':>26}{'least':>12}{'friction':>10}{'engines':>10}\n"
         f"    {'':<16}{'yaw rate':>12}{'lateral acc.':>14}{'load':>12}{'used':>10}{'differ':>10}"
     )
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [head, *lines]}
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "answer": answer,
+        "results": results,
+        "table": [head, *lines],
+    }
 
 
 def _answer(runs: dict[str, Result]) -> dict[str, float]:

@@ -6,26 +6,29 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.drawing.figures import save
+from models.core.told import Results
+from models.drawing.figures import heading, save
 from models.systems.handling.run import Drive
 
 TYRES = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00")
 
 
-def manoeuvre_figure(drive: Drive, title: str, path: Path) -> Path:
-    """Six panels over time, or over the path; one colour for each tyre."""
+def manoeuvre_figure(runs: Results, title: str, path: Path) -> Path:
+    """Six panels over time, or over the path, of the first run; one colour for each tyre."""
+    drive: Drive = next(iter(runs.values())).detail
     figure, axes = plt.subplots(2, 3, figsize=(13, 7))
-    figure.suptitle(f"{title}: from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}")
+    start = f"from {drive.velocity()[0, 0]:g} m/s, friction {drive.handling.tyres.friction:g}"
+    heading(figure, f"{title}: {start}", runs)
     _path(axes[0, 0], drive)
     _motion(axes[0, 1], drive)
-    for axis, values, label, heading in (
+    for axis, values, label, name in (
         (axes[0, 2], np.degrees(drive.slip_angles()), "slip angle [deg]", "Slip angles"),
         (axes[1, 0], drive["load"] / 1e3, "load [kN]", "Wheel loads"),
         (axes[1, 1], drive["mz"], "moment [N m]", "Aligning moments"),
     ):
         for i, tyre in enumerate(drive.handling.vehicle.tyres):
             axis.plot(drive.run.times, values[:, i], color=TYRES[i % 4], label=tyre.name)
-        axis.set(xlabel="time [s]", ylabel=label, title=heading)
+        axis.set(xlabel="time [s]", ylabel=label, title=name)
     axes[0, 2].legend(ncols=2)
     _circle(axes[1, 2], drive)
     return save(figure, path)

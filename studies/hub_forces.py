@@ -37,6 +37,7 @@ def run(scene: HubScene, engines: tuple[str, ...], folder: Path, progress: Progr
         "folder": str(folder),
         "failed": {},
         "answer": comparison.answer(),
+        "results": comparison.results,
         "doubts": list(comparison.measurement.tilt.doubts),
         "table": _table(scene, comparison),
     }
@@ -81,7 +82,7 @@ def save(comparison: Comparison, folder: Path) -> None:
     ]
     _write(folder / "hub_forces.csv", names, measurement.forces)
     _write(folder / "angles.csv", [(name, next(iter(units))) for name, units in ANGLES.items()], measurement.angles)
-    runs = {**({"true": comparison.truth} if comparison.truth else {}), **comparison.runs}
+    runs = comparison.results
     angles, places = list(MOTION)[:3], list(MOTION)[3:]
     columns = {
         f"{name}: {channel}": (MOTION[channel][1], path[channel])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drawing.figures import plt, save
+from models.drawing.figures import heading, plt, save
 from models.systems.hub_forces.comparison import Comparison
 
 COLOURS = {"free": "#d55e00", "filter": "#0072b2", "prescribed": "#009e73"}
@@ -34,7 +34,7 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
         axis.set_xlabel("time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
     frame = comparison.measurement.forces.frame
-    figure.suptitle(f"{title}\nThe chassis on forces in the frame '{frame}'", fontsize=11)
+    heading(figure, f"{title}\nThe chassis on forces in the frame '{frame}'", comparison.results)
     save(figure, path)
 
 
@@ -54,5 +54,6 @@ def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     axis.set_ylabel("damage / true damage [1]" if comparison.truth else "damage / that with the filter [1]")
     axis.legend(fontsize=8)
     frame = comparison.measurement.forces.frame
-    axis.set_title(f"{title}\nSection forces in the chassis' axes, slope 5: forces in the frame '{frame}'")
+    text = f"{title}\nSection forces in the chassis' axes, slope 5: forces in the frame '{frame}'"
+    heading(figure, text, comparison.results)
     save(figure, path)

@@ -45,20 +45,20 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import branch_figure, cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    found = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)))
+    found = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error)
     orbits, notes = found.detail, json.loads(found.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
     progress(f"cycle at {speed:g} m/s", 0.6)
-    results, failed = cycles(scene, engines, speed)
+    results, failed = cycles(scene, engines, speed, error=scene.error)
     by_engine: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     for engine, result in results.items():
         result.save(folder / f"cycle_{engine}.nc")
     if orbits:
         found.save(folder / "branch.nc")
         found.save_table(folder / "branch.csv", *ORBIT)
-        branch_figure(orbits, wheelset_of(scene), scene.title, folder / "branch.png")
+        branch_figure(found, wheelset_of(scene), scene.title, folder / "branch.png")
     if by_engine:
-        cycle_figure(by_engine, scene.title, folder / "cycle.png")
+        cycle_figure(results, scene.title, folder / "cycle.png")
     else:
         notes.append(f"at {speed:g} m/s a motion from {1e3 * scene.run.displacement:g} mm dies out: no cycle")
     return {
@@ -72,6 +72,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
                 for engine, orbit in by_engine.items()
             },
         },
+        "results": {**({"branch": found} if orbits else {}), **results},
         "table": [*_branch_lines(orbits), *_cycle_lines(by_engine), *(f"  {note}" for note in notes)],
     }
 

@@ -53,7 +53,7 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     """Every case at every position; saves each as a result and as CSV of positions and of patches, and a figure."""
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
-        found = results[name] = system.run(scene, case=name, told=partial(_told, progress, scene, k))
+        found = results[name] = system.run(scene, case=name, told=partial(_told, progress, scene, k), error=scene.error)
         contacts = found.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
@@ -63,7 +63,14 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     if drawn := {name: found for name, found in results.items() if found.detail.placed}:
         _figure(scene, drawn, folder / "manchester.png")
     answer = {name: [numbers(placed) for placed in found.detail.placed] for name, found in results.items()}
-    return {"scene": scene.title, "folder": str(folder), "failed": failed, "answer": answer, "table": [*table, *NOTES]}
+    return {
+        "scene": scene.title,
+        "folder": str(folder),
+        "failed": failed,
+        "answer": answer,
+        "results": results,
+        "table": [*table, *NOTES],
+    }
 
 
 def _told(progress: Progress, scene: WheelRailScene, k: int, shift: float, share: float) -> None:
@@ -88,7 +95,7 @@ def _save(name: str, found: Result, folder: Path) -> None:
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
     """A column for each wheel; the bars in the first row are the patches' widths."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     drawn, axes = plt.subplots(len(PANELS), 2, figsize=(10.5, 12.5), sharex=True, sharey="row")
     for column, wheel in enumerate(WHEELS[::-1]):
@@ -115,7 +122,7 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
         axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
     drawn.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     title = f"{scene.title}\nevery patch: bars in the first row are its width"
-    drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(drawn, title, results)
     save(drawn, path)
 
 

@@ -29,15 +29,16 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
     """Do all of it; the page is written even where errors in the recording stop the run."""
     from studies.recording_page import write
 
-    result = run_scene(scene, engines[-1], folder, progress, whole=True)
+    result = run_scene(scene, engines[-1], folder, progress, whole=True, error=scene.error)
     exam: Examination = result.detail
     result.save(folder / "recording.nc")
-    page = write(exam, folder / "recording.html")
+    page = write(exam, folder / "recording.html", result)
     return {
         "scene": exam.scene.title,
         "folder": str(folder),
         "failed": _failed(exam),
         "page": str(page),
+        "results": {exam.chosen: result},
         "verdicts": {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()},
         "effects": [str(consequence) for consequence in exam.consequences],
         "findings": queries(finding for finding in exam.findings if finding.weight != "note"),

@@ -9,6 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from models.core.assumptions import assumed_of, broken_of
+from models.core.discretisation import error_lines
+from models.core.result import Result
 from models.core.whole_files import write_whole
 from models.fatigue.damage import SLOPE
 from models.systems.measured.consequences import DAMAGE, FORCE
@@ -25,16 +28,16 @@ DRAWN = 6
 """Section forces drawn at the most; all of them are in the table and in the files."""
 
 
-def write(exam: Examination, path: Path) -> Path:
-    """Write the page, whole or not at all; returns its path."""
+def write(exam: Examination, path: Path, result: Result) -> Path:
+    """Write the page of a result, whole or not at all; returns its path."""
     with TemporaryDirectory() as folder:
-        text = page(exam, Path(folder))
+        text = page(exam, Path(folder), result)
     write_whole(path, text)
     return path
 
 
-def page(exam: Examination, folder: Path) -> str:
-    """The page as text; figures pass through ``folder``."""
+def page(exam: Examination, folder: Path, result: Result) -> str:
+    """The page as text, with what the result says of its error and assumptions; figures pass through ``folder``."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -49,6 +52,9 @@ def page(exam: Examination, folder: Path) -> str:
     return environment.get_template(TEMPLATE).render(
         exam=exam,
         names=NAMES,
+        errors=error_lines(result),
+        breaches=[one.line() for one in broken_of(result)],
+        assumed=assumed_of(result),
         free=FREE,
         weights=[finding.weight for finding in exam.findings],
         used=[(signal, exam.put_in(signal)) for signal in exam.recording.signals],

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import judged
+from models.core.discretisation import not_estimated
 from models.core.errors import InputError
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
 from models.core.tables import write_table
 from models.systems.braking.of_scene import tables_of
 from models.systems.braking.plan import check_reference
 from models.systems.braking.scene import BrakingScene
+from models.tyre.assumptions import assumptions
 from models.tyre.tyre_table import TyreTable
 
 SYSTEM = "braking"
@@ -43,15 +46,18 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
 
     options = read(Options, scene.options, scene.file, "options")
     tables = tables_of(scene)
-    tyre_figure(tables, options.slip_angles, options.load, scene.title, folder / "tyre.png")
     answer = {name: table.figures(options.load) for name, table in tables.items()}
-    for name, table in tables.items():
-        save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+    results = {
+        name: save(scene, table, options, folder / f"{name.replace('/', '_').replace(' ', '_')}.csv")
+        for name, table in tables.items()
+    }
+    tyre_figure(tables, (options.slip_angles, options.load), scene.title, folder / "tyre.png", results)
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
         "answer": answer,
+        "results": results,
         "table": lines(answer, options.load),
     }
 
@@ -66,17 +72,22 @@ def lines(answer: dict[str, dict[str, float]], load: float) -> list[str]:
     ]
 
 
-def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> None:
+def save(scene: BrakingScene, table: TyreTable, options: Options, path: Path) -> Result:
     """Friction at the slip angles of the figure and at none, at all slips of the table: as netCDF, and as a CSV."""
     angles, axes = np.unique([0.0, *options.slip_angles]), ("slip_angle", "slip")
     x, y = table.friction(np.deg2rad(angles), table.slips, options.load)
     channels = {"mu_x": Channel(axes, x, "-", "along the wheel"), "mu_y": Channel(axes, y, "-", "across it")}
     nodes = {"slip_angle": Channel("slip_angle", angles, "deg"), "slip": Channel("slip", table.slips, "-")}
-    result(scene, channels, nodes, load=options.load).save(path.with_suffix(".nc"))
+    read_off = result(scene, channels, nodes, load=options.load)
+    judged(read_off, assumptions(table, options.load))
+    not_estimated(read_off, "a table has no steps: it is read at its nodes, and linear between").save(
+        path.with_suffix(".nc")
+    )
     angle, slip = (axis.ravel() for axis in np.meshgrid(angles, table.slips, indexing="ij"))
     write_table(
         path, {"slip angle": ("deg", angle), "slip": ("-", slip), "mu_x": ("-", x.ravel()), "mu_y": ("-", y.ravel())}
     )
+    return read_off
 
 
 if __name__ == "__main__":

@@ -5,15 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drawing.figures import plt, save
+from models.core.told import Results
+from models.drawing.figures import heading, plt, save
 from models.tyre.tyre_table import TyreTable
 
 SLIPS = np.linspace(0.0, 1.0, 1001)
 COLOURS = plt.get_cmap("viridis")
 
 
-def tyre_figure(tables: Mapping[str, TyreTable], angles: Sequence[float], load: float, title: str, path: Path) -> None:
-    """A row per table: mu_x and mu_y over slip at slip angles (deg), and both of them beside each other; load in N."""
+def tyre_figure(
+    tables: Mapping[str, TyreTable], at: tuple[Sequence[float], float], title: str, path: Path, results: Results
+) -> None:
+    """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
+    angles, load = at
     figure, axes = plt.subplots(len(tables), 3, figsize=(12, 3.4 * len(tables)), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), SLIPS, load)
@@ -40,5 +44,5 @@ def tyre_figure(tables: Mapping[str, TyreTable], angles: Sequence[float], load: 
             loc="center left",
             bbox_to_anchor=(1.0, 0.5),
         )
-    figure.suptitle(f"{title}: friction under {load / 1e3:.4g} kN", fontsize=11)
+    heading(figure, f"{title}: friction under {load / 1e3:.4g} kN", results)
     save(figure, path)

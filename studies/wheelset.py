@@ -1,6 +1,5 @@
 """A wheelset on straight track: Klingel's wave, where it becomes unstable, and how it moves below and above."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result, joined
 from models.core.tables import write_table
+from models.core.told import gathered
 from models.rail.energy import ledger
 from models.rail.equations import Path as Motion
 from models.rail.equations import Y
@@ -17,7 +17,7 @@ from models.rail.limit_cycle import maxima
 from models.rail.linear import critical_or_why, kinematic_wavelength, klingel
 from models.rail.wheelset import Wheelset
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
-from models.systems.wheelset.run import Linear, linearised, over_speeds
+from models.systems.wheelset.run import Linear, at_speeds, linearised, over_speeds
 from models.systems.wheelset.run import run as run_path
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -35,28 +35,33 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     for i, engine in enumerate(engines):
         try:
             progress(f"eigenvalues of {engine}", i / len(engines))
-            eigenvalues[engine] = linearised(scene, engine)
+            eigenvalues[engine] = linearised(scene, engine, error=scene.error)
             progress(f"paths of {engine}", (i + 0.5) / len(engines))
-            paths[engine] = {speed: run_path(scene, engine, speed) for speed in path_speeds(scene)}
+            paths[engine] = {speed: run_path(scene, engine, speed, error=scene.error) for speed in path_speeds(scene)}
         except RunFailed as error:
             failed[engine] = str(error)
     linear = {engine: result.detail for engine, result in eigenvalues.items()}
-    motions = {engine: {speed: path.detail for speed, path in own.items()} for engine, own in paths.items()}
     if linear:
-        joined(eigenvalues, "engine").save(folder / "eigenvalues.nc")
+        gathered(joined(eigenvalues, "engine"), eigenvalues).save(folder / "eigenvalues.nc")
         _save_table(linear, folder)
-        stability_figure(linear, wheelset, scene.title, folder / "stability.png")
+        stability_figure(eigenvalues, wheelset, scene.title, folder / "stability.png")
     if paths:
         over_speeds(paths).save(folder / "paths.nc")
-        paths_figure(motions, scene.title, folder / "paths.png")
-        creep_figure(next(iter(motions.values())), scene.title, folder / "creep.png")
+        paths_figure(paths, scene.title, folder / "paths.png")
+        creep_figure(next(iter(paths.values())), scene.title, folder / "creep.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
         "answer": _answer(wheelset, linear, paths),
+        "results": {**_results(paths), **{f"{engine}, eigenvalues": one for engine, one in eigenvalues.items()}},
         "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)],
     }
+
+
+def _results(paths: Paths) -> dict[str, Result]:
+    """Paths by engine and speed, in words."""
+    return {f"{engine}, {at}": path for engine, own in paths.items() for at, path in at_speeds(own).items()}
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
@@ -105,8 +110,6 @@ def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
     ]
-    if wheelset.friction == 0.0:
-        lines.append("    DOUBT: without friction nothing creeps: what follows from creep forces is no wheelset's")
     first = next((one.critical for one in linear.values()), None)
     return lines + [
         f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
@@ -121,7 +124,7 @@ def _speed(critical: float | None, why: str, first: float | None = None) -> str:
 
 
 def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
-    """How each path ends, how far the implementations are apart, what is in doubt, and where the energy goes."""
+    """How each path ends, how far the implementations are apart, and where the energy goes."""
     if not paths:
         return []
     (name, first), *others = paths.items()
@@ -133,7 +136,6 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
         lines += [
             f"    {speed:g} m/s: {_ending(motion)}",
             *(f"      {engine}: within {gap:.1e} of {name} (m, rad, s)" for engine, gap in gaps.items()),
-            *(f"      DOUBT: {doubt}" for doubt in json.loads(path.data.attrs["doubts"])),
             f"      power of the creep forces: from {power.min():,.3g} to {power.max():.3g} W at a patch; "
             f"together they take {book.creep[-1]:,.4g} J",
             f"      energy: the drive gives {book.drive[-1]:,.4g} J, dampers take {book.dampers[-1]:,.4g} J; "

@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from models.drawing.figures import COLOURS, LABELS, plt, save
+from models.core.result import Result
+from models.drawing.figures import COLOURS, LABELS, heading, plt, save
 from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import Orbit
 from models.rail.linear import klingel
 from models.rail.wheelset import Wheelset
-from models.systems.wheelset.run import Linear
+from models.systems.wheelset.run import Linear, at_speeds
 
 MARKS = {"reference": "-", "exudyn": "x", "mujoco": "+"}
 """The reference as a line, both engines as marks upon it."""
@@ -33,8 +34,9 @@ def _wheels(contacts: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
     yield "left wheel", "#d55e00", contacts[:, each:].sum(axis=1)
 
 
-def stability_figure(linear: Mapping[str, Linear], wheelset: Wheelset, title: str, path: Path) -> None:
+def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
+    linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.2))
     for engine, one in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
@@ -60,12 +62,15 @@ def stability_figure(linear: Mapping[str, Linear], wheelset: Wheelset, title: st
     right.margins(x=0.2)
     middle.margins(y=0.2)
     left.legend()
-    figure.suptitle(f"{title}\nlinear creep, all motions of the wheelset", fontsize=11)
+    heading(figure, f"{title}\nlinear creep, all motions of the wheelset", eigenvalues)
     save(figure, path)
 
 
-def paths_figure(paths: Mapping[str, Mapping[float, Motion]], title: str, path: Path) -> None:
+def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
     """Lateral displacement over time, a panel per speed; below, how far the engines are from the first one."""
+    paths: dict[str, dict[float, Motion]] = {
+        engine: {speed: result.detail for speed, result in own.items()} for engine, own in results.items()
+    }
     name, first = next(iter(paths.items()))
     figure, axes = plt.subplots(
         2, len(first), figsize=(6.2 * len(first), 5.6), squeeze=False, sharex="col", height_ratios=(2, 1)
@@ -85,12 +90,14 @@ def paths_figure(paths: Mapping[str, Mapping[float, Motion]], title: str, path: 
     axes[0, 0].legend(loc="upper right", ncols=3)
     if len(paths) > 1:
         axes[1, 0].legend(loc="lower right", ncols=2)
-    figure.suptitle(f"{title}: the same path in every implementation", fontsize=11)
+    told = {f"{engine}, {at}": run for engine, own in results.items() for at, run in at_speeds(own).items()}
+    heading(figure, f"{title}: the same path in every implementation", told)
     save(figure, path)
 
 
-def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
+def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
     """Creep forces on each wheel and their power in the last second of every path."""
+    paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = plt.subplots(3, len(paths), figsize=(6.2 * len(paths), 7.0), squeeze=False, sharex="col")
     for k, (speed, own) in enumerate(paths.items()):
         last = own.times >= own.times[-1] - SHOWN
@@ -104,12 +111,13 @@ def creep_figure(paths: Mapping[float, Motion], title: str, path: Path) -> None:
     axes[0, 0].legend(loc="upper right", ncols=2)
     largest = max(float(own.contacts[:, :, wf.POWER].max()) for own in paths.values())
     told = f"creep forces on the wheels and their power, at any time {largest:.3g} W or less"
-    figure.suptitle(f"{title}\n{told}", fontsize=11)
+    heading(figure, f"{title}\n{told}", at_speeds(results))
     save(figure, path)
 
 
-def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path: Path) -> None:
+def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
+    orbits: Sequence[Orbit] = branch.detail
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.4))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
@@ -135,12 +143,13 @@ def branch_figure(orbits: Sequence[Orbit], wheelset: Wheelset, title: str, path:
     right.set(ylabel="frequency [Hz]", title="Frequency")
     left.legend(loc="lower right")
     right.legend()
-    figure.suptitle(title, fontsize=11)
+    heading(figure, title, {"branch": branch})
     save(figure, path)
 
 
-def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
+def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
+    cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
@@ -158,5 +167,5 @@ def cycle_figure(cycles: Mapping[str, Orbit], title: str, path: Path) -> None:
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
     right.legend(fontsize=8, loc="center", bbox_to_anchor=(0.5, -0.24), ncols=2)
-    figure.suptitle(title, fontsize=11)
+    heading(figure, title, results)
     save(figure, path)

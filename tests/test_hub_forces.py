@@ -1,19 +1,19 @@
 """A vehicle cut at its wheels: engines, closed forms of its drift, the filter, scenes and their faults."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from models.core.discretisation import WARNED, errors_of
 from models.core.errors import InputError, Refused, RunFailed
 from models.core.result import load
-from models.engines.cut_vehicle import HubRun, build
+from models.engines.cut_vehicle import build
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
-from models.systems.hub_forces.run import check_halved, measure, with_angles
+from models.systems.hub_forces.run import run, with_angles
 from models.systems.hub_forces.scene import build as scene_of
 from models.systems.hub_forces.tilt_filter import estimate, pulled
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
@@ -144,18 +144,21 @@ def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told
 
 
 def test_steps_that_the_road_is_too_fast_for_are_told():
-    """Steps of 4 ms at 60 m/s on class F mistake the bushes' forces by a tenth, on class C at 20 m/s by nothing."""
-    for road, held_true in (({}, True), ({"speed": 60.0, "iso8608": "F"}, False)):
-        own = scene_of(
-            {**ALL, "road": road, "run": {"duration": 1.0, "step": 4e-3}, "forces": {"sampling_rate": 250.0}}, "s.toml"
-        )
-        with nullcontext() if held_true else pytest.raises(RunFailed, match=r"bush' by 0\.1 of its largest"):
-            measure(own, "mujoco")
+    """Steps of 5 ms at 120 m/s on class F see a wave of 0.35 m less than once: refused with the step to use, which is
+    taken; on class C at 20 m/s steps of 4 ms are told to be right."""
 
+    def table(speed: float, road: str, step: float) -> dict:
+        of = {"speed": speed, "iso8608": road}
+        return {**ALL, "road": of, "run": {"duration": 1.0, "step": step}, "forces": {"sampling_rate": 200.0}}
 
-def test_no_step_is_too_long_for_a_vehicle_without_springs():
-    run = HubRun(np.arange(3.0), np.zeros((3, 12)), np.empty((3, 0)), np.zeros((3, 4, 6)), np.zeros((3, 2)))
-    check_halved("mujoco", run, [], lambda step, steps: run)
+    with pytest.raises(RunFailed, match=r"this is no answer: .* use at most") as refusal:
+        run(scene_of(table(120.0, "F", 5e-3), "s.toml"), "mujoco", error=True)
+    advised = min(each.step for each in errors_of(refusal.value.partial).values())
+    step = 5e-3 / np.ceil(5e-3 / advised)
+    cured = run(scene_of(table(120.0, "F", step), "s.toml"), "mujoco", error=True)
+    assert max(each.share for each in errors_of(cured).values()) < WARNED
+    usual = run(scene_of(table(20.0, "C", 2.5e-3), "s.toml"), "mujoco", error=True)
+    assert max(each.share for each in errors_of(usual).values()) < WARNED
 
 
 def test_a_file_of_ones_own(tmp_path, measured):

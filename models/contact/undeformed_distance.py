@@ -45,6 +45,15 @@ class Distance:
         """Spacing of the nodes along y (m)."""
         return float(self.y[-1] - self.y[0]) / (self.y.size - 1)
 
+    @property
+    def curvatures(self) -> tuple[float, float]:
+        """Second derivatives (1/m) in the middle of x and y, over four nodes, along and across."""
+        found = []
+        for x, y in ((4.0 * self.dx, 0.0), (0.0, 4.0 * self.dy)):
+            low, here, high = self.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
+            found.append(float((low - 2.0 * here + high) / (x + y) ** 2))
+        return found[0], found[1]
+
     @cached_property
     def padded(self) -> Array:
         """Heights with one more node on every side, continued by the parabola through the last three."""

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass
@@ -12,7 +12,20 @@ import numpy as np
 
 from models.core.result import Result
 
-Watched = Mapping[str, np.ndarray]
+RARE = 0.00135
+"""Share of the time for which a Gaussian may lie beyond a limit: that of three standard deviations."""
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Values of which mean and standard deviation (rows,) are known; ``rows`` tells them apart, as "at 20 m/s"."""
+
+    mean: np.ndarray
+    deviation: np.ndarray
+    rows: Sequence[str] = ()
+
+
+Watched = Mapping[str, np.ndarray | Gaussian]
 """Values at every row of a run, by the name of the part (wheel, strut, joint) that they are of."""
 
 
@@ -42,7 +55,10 @@ class Assumption:
 
 @dataclass(frozen=True)
 class Broken:
-    """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value."""
+    """An assumption that a run broke: ``where``, for which share of the time, first when (s), and the worst value.
+
+    law : by which the share is told where no values over time are known; the worst value then is three deviations off.
+    """
 
     name: str
     says: str
@@ -53,20 +69,26 @@ class Broken:
     unit: str
     allowed: str
     remedy: str
+    law: str = ""
 
     def brief(self) -> str:
         """A few words for a figure."""
-        time = "once" if math.isnan(self.first) else f"{100.0 * self.share:.2g} % of the time"
-        return f"assumption broken: {self.says}; {self.where}, {time}, worst {self.worst:.4g} {self.unit}".rstrip()
+        return (
+            f"assumption broken: {self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
+        )
+
+    @property
+    def _time(self) -> str:
+        if math.isnan(self.first) and not self.law:
+            return "once"
+        return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
         """A sentence for readers."""
         unit = f" {self.unit}" if self.unit else ""
-        time = (
-            "once" if math.isnan(self.first) else f"{100.0 * self.share:.2g} % of the time, first at {self.first:.4g} s"
-        )
+        first = "" if math.isnan(self.first) else f", first at {self.first:.4g} s"
         return (
-            f"assumption broken: {self.says}; {self.where}: {time}, worst {self.worst:.4g}{unit} "
+            f"assumption broken: {self.says}; {self.where}: {self._time}{first}, worst {self.worst:.4g}{unit} "
             f"(allowed {self.allowed}); {self.remedy}"
         )
 
@@ -74,7 +96,10 @@ class Broken:
 def broken(run: Result, assumption: Assumption) -> Broken | None:
     """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
     found = [
-        _broken(run, assumption, where, np.asarray(values, float)) for where, values in assumption.watched(run).items()
+        _rarely(run, assumption, where, values)
+        if isinstance(values, Gaussian)
+        else _broken(run, assumption, where, np.asarray(values, float))
+        for where, values in assumption.watched(run).items()
     ]
     return max((one for one in found if one is not None), key=lambda one: one.share, default=None)
 
@@ -88,6 +113,25 @@ def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broke
     first = float(run.times[np.argmax(beyond)]) if timed else math.nan
     worst, share = float(values[np.argmax(excess)]), float(np.mean(beyond))
     return Broken(a.name, a.says, where, share, first, worst, a.unit, a.allowed, a.remedy)
+
+
+def _rarely(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken | None:
+    """Where a Gaussian lies beyond a limit for more than RARE of the time, by the row where that is for longest."""
+    from scipy.special import ndtr
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = np.array([a.least - values.mean, values.mean - a.most]) / values.deviation
+    known = np.isfinite(values.deviation) & (values.deviation > 0.0)
+    shares = np.where(known, ndtr(np.where(known, sides, -np.inf)), 0.0)
+    if not (shares > RARE).any():
+        return None
+    side, row = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
+    timed = "time" in run.data.coords and len(values.mean) == len(run.times)
+    first = float(run.times[np.argmax((shares > RARE).any(axis=0))]) if timed else math.nan
+    worst = float(values.mean[row] + (-3.0, 3.0)[side] * values.deviation[row])
+    place = f"{where} {values.rows[row]}" if values.rows else where
+    share, law = float(shares[side, row]), " by the normal law"
+    return Broken(a.name, a.says, place, share, first, worst, a.unit, a.allowed, a.remedy, law)
 
 
 def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:

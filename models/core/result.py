@@ -145,7 +145,7 @@ def result(
 def joined(results: Mapping[str, Result], axis: str) -> Result:
     """Results with the same channels as one, along a new first axis whose places have the mapping's names.
 
-    The attributes are those of the first; counts and seconds stand by name.
+    The attributes are those of the first; counts, seconds, errors and assumptions stand by name.
     """
     import xarray as xr
 
@@ -153,6 +153,8 @@ def joined(results: Mapping[str, Result], axis: str) -> Result:
     data = xr.concat(parts, xr.Variable(axis, list(results)), combine_attrs="override")
     data.attrs["engine"] = ", ".join(part.attrs["engine"] for part in parts)
     data.attrs["counts"] = json.dumps({name: result.counts() for name, result in results.items()})
+    for said in ("error", "assumptions"):
+        data.attrs[said] = json.dumps({name: json.loads(result.data.attrs[said]) for name, result in results.items()})
     data.attrs["seconds"] = sum(result.seconds for result in results.values())
     return Result(data)
 

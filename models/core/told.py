@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict, replace
 from typing import Any
 
-from models.core.assumptions import Broken, broken_of
-from models.core.discretisation import WARNED, error_lines, worst_of
+from models.core.assumptions import Broken, assumed_of, broken_of
+from models.core.discretisation import WARNED, error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
 EACH = 4
@@ -66,15 +67,53 @@ def remarks(results: Results) -> list[str]:
     return [*steps[:EACH], *(one.brief() for _, one in breaches(results))]
 
 
+def gathered(whole: Result, parts: Results) -> Result:
+    """A result that joins others, with what each of them says of its error and all assumptions that any broke."""
+    said = {name: json.loads(run.data.attrs["error"]) for name, run in parts.items()}
+    first = next(iter(said.values()))
+    channels = {
+        f"{name}, {channel}": values
+        for name, each in said.items()
+        for channel, values in each.get("channels", {}).items()
+    }
+    whole.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
+    assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
+    kept = [replace(one, where=f"{names}, {one.where}") for names, one in breaches(parts)]
+    whole.data.attrs["assumptions"] = json.dumps({"assumed": list(assumed), "broken": [asdict(one) for one in kept]})
+    broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
+    whole.data.attrs["status"] = next(broke, whole.data.attrs["status"])
+    return whole
+
+
+def inherited(derived: Result, results: Results, how: str) -> Result:
+    """What was computed of results with their errors, ``how``, the worst of each channel, and what they broke.
+
+    Without estimates in the results it has none.
+    """
+    assumed = [says for run in results.values() for says in assumed_of(run)]
+    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(one) for _, one in breaches(results)]}
+    derived.data.attrs["assumptions"] = json.dumps(told)
+    if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
+        derived.data.attrs["status"] += ", assumptions broken"
+    pairs = [pair for run in results.values() for pair in errors_of(run).items()]
+    worst = dict(sorted(pairs, key=lambda pair: pair[1].share))
+    return stated(derived, worst, how) if worst else derived
+
+
 def as_json(results: Results) -> dict[str, Any]:
-    """The "errors" and "assumptions" of a summary: what each result says of itself."""
+    """The "errors" and "assumptions" of a summary: what each result says of itself; what is no number is None."""
     return {
-        "errors": {name: json.loads(run.data.attrs["error"]) for name, run in results.items()},
+        "errors": {name: _plain(run, "error") for name, run in results.items()},
         "assumptions": {
-            name: {"assumed": [], "broken": [], **json.loads(run.data.attrs["assumptions"])}
-            for name, run in results.items()
+            name: {"assumed": [], "broken": [], **_plain(run, "assumptions")} for name, run in results.items()
         },
     }
+
+
+def _plain(run: Result, key: str) -> dict[str, Any]:
+    """An attribute without NaN and infinity, which JSON does not have."""
+    said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
+    return said
 
 
 SAID = ("engine", "error", "assumptions")

@@ -48,7 +48,7 @@ class OnSprings:
         self._known, self._allowed = np.empty((wheels, KNOWN)), set[float]()
 
     @cached_property
-    def _liveliness(self) -> float:
+    def liveliness(self) -> float:
         """Largest rate (m/s^2) at which side forces of slope 1 at a speed of 1 m/s damp a motion; g of a point mass.
 
         A body that rolls lets its contacts go sideways more easily than its mass would.
@@ -79,7 +79,7 @@ class OnSprings:
             go, by_steps = native.advance, native.by_steps
         table = self._model.numbers
         rows = table[-ROW * wheels :].reshape(wheels, ROW)
-        return OnEngine(table, rows, np.zeros(wheels), self._liveliness, engine or self._model), go, by_steps
+        return OnEngine(table, rows, np.zeros(wheels), self.liveliness, engine or self._model), go, by_steps
 
     def advance(
         self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, *rest: Any

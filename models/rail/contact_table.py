@@ -24,7 +24,6 @@ from scipy.optimize import brentq
 from models.contact.inputs import Array, quantity
 from models.contact.material import Pair
 from models.contact.simplified_theory import NormalContact, PatchPressure, press, roll
-from models.contact.undeformed_distance import Distance
 from models.contact.wheel_on_rail import Pose, Side, Touch, placed, touches_of
 from models.core.errors import RunFailed
 from models.rail.joined_patches import Share, press_exactly
@@ -154,13 +153,14 @@ class Carried:
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Wheelset and track in touch. side : the right wheel on its rail. load : N on each wheel. speed : m/s. friction :
-    0 for a smooth contact."""
+    0 for a smooth contact. coarser : how many times as large as usual cells are, which tells their error."""
 
     side: Side
     load: float
     speed: float
     friction: float = 0.0
     pair: Pair = Pair()  # noqa: RUF009 - a frozen value
+    coarser: float = 1.0
 
     def at(self, shift: float, yaw: float = 0.0) -> Placed:
         """Contact at a lateral displacement (m) to the right and a yaw (rad).
@@ -210,7 +210,9 @@ class Contact:
         patches = [touch.patch for touch in near.touches]
 
         def by_normal(normal: float) -> Carried:
-            shares, approach = press_exactly(patches, near.pressed.patches, normal, near.approach, self.pair)
+            shares, approach = press_exactly(
+                patches, near.pressed.patches, normal, near.approach, self.pair, self.coarser
+            )
             return replace(near, shares=shares, approach=approach, normal=normal)
 
         return self._balanced(by_normal, near.normal)
@@ -247,7 +249,7 @@ class Contact:
                 forces.append((0.0, 0.0, 0.0))
                 continue
             alone = replace(wheel.pressed, patches=(replace(part, load=load),))
-            creep = roll(alone, self.friction, *creepage, cells=CELLS)
+            creep = roll(alone, self.friction, *creepage, cells=round(CELLS / self.coarser))
             forces.append((creep.fx, creep.fy, creep.mz))
         pairs, axle = list(zip(wheel.touches, forces, strict=True)), wheel.pose.turn[:, 1]
         lifted = sum(force[1] * math.sin(touch.angle) for touch, force in pairs)
@@ -309,7 +311,7 @@ class Contact:
             math.atan(float(side.rail.curve(y, 1))),
             self._radius(touch),
             float(side.wheel.z.max() - side.wheel.curve(touch.wheel_y)),
-            *_curvatures(touch.patch.distance),
+            *touch.patch.distance.curvatures,
             float(loads.sum()),
             sum(share.load * math.cos(patch.angle) for patch, _, _, share in rows),
             fx,
@@ -353,12 +355,3 @@ def _moments(lever: Array, touch: Touch, force: Triple) -> Array:
     """Moment (3,) of a patch's creep forces and moment about a point from which the patch is at ``lever`` (m)."""
     across, into = _axes(touch)
     return np.cross(lever, force[0] * np.array([1.0, 0.0, 0.0]) + force[1] * across) + force[2] * into
-
-
-def _curvatures(distance: Distance) -> tuple[float, float]:
-    """Second derivatives (1/m) of the distance at first touch, along and across."""
-    found = []
-    for x, y in ((4.0 * distance.dx, 0.0), (0.0, 4.0 * distance.dy)):
-        low, here, high = distance.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
-        found.append(float((low - 2.0 * here + high) / (x + y) ** 2))
-    return found[0], found[1]

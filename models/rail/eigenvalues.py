@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from models.rail.equations import Equations
+from models.rail.equations import Equations, slopes
 from models.rail.wheelset import Wheelset
 
 SLOW = 0.2
@@ -26,6 +26,13 @@ def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
 def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
     """Eigenvalues (9,) in 1/s at a speed (m/s)."""
     return np.linalg.eigvals(kind(wheelset, speed, "linear").state_matrix)
+
+
+def uncertainty(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:
+    """Change (1/s) of the hunting eigenvalue by slopes over twice the way; NaN without one."""
+    equations = kind(wheelset, speed, "linear")
+    wide = np.linalg.eigvals(slopes(equations.rates, equations.rest, 2.0))
+    return float(abs(hunting(wide) - hunting(np.linalg.eigvals(equations.state_matrix))))
 
 
 def growth(kind: type[Equations], wheelset: Wheelset, speed: float) -> float:

@@ -322,10 +322,11 @@ class Equations:
         return count
 
 
-def slopes(rates: Callable[[Array], Array], state: Array) -> Array:
-    """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order."""
-    columns = []
+def slopes(rates: Callable[[Array], Array], state: Array, wide: float = 1.0) -> Array:
+    """Slopes (9, 9) of the rates about a state, the angle of spin left out, by central differences of fourth order over
+    so many times the usual way."""
+    columns, moved = [], wide * MOVED
     for k in range(STATES):
-        a, b, c, d = (rates(state + part * MOVED[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
-        columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * MOVED[k]))
+        a, b, c, d = (rates(state + part * moved[k] * np.eye(STATES)[k]) for part in (-2.0, -1.0, 1.0, 2.0))
+        columns.append((a - 8.0 * b + 8.0 * c - d) / (12.0 * moved[k]))
     return np.delete(np.delete(np.array(columns).T, ANGLE, 0), ANGLE, 1)

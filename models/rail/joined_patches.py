@@ -47,25 +47,37 @@ class Share:
 
 
 def press_exactly(
-    patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair
+    patches: Sequence[Patch],
+    near: Sequence[PatchPressure],
+    load: float,
+    approach: float,
+    pair: Pair,
+    coarser: float = 1.0,
 ) -> tuple[list[Share], float]:
     """The patches' shares under a vertical load (N), and the vertical approach (m).
 
-    near : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs (m). Raises
-    InputError if the contact reaches the edge of the grid.
+    near : the patches in contact by the simplified theory, whose areas place the grid; approach : theirs (m);
+    coarser : how many times as large as usual the cells are. Raises InputError if the contact reaches the edge of the
+    grid.
     """
     for margin in MARGINS[:-1]:
         try:
-            return _pressed(patches, near, load, approach, pair, margin)
+            return _pressed(patches, near, load, approach, pair, margin, coarser)
         except InputError:  # the contact reaches the edge of the grid
             continue
-    return _pressed(patches, near, load, approach, pair, MARGINS[-1])
+    return _pressed(patches, near, load, approach, pair, MARGINS[-1], coarser)
 
 
 def _pressed(
-    patches: Sequence[Patch], near: Sequence[PatchPressure], load: float, approach: float, pair: Pair, margin: float
+    patches: Sequence[Patch],
+    near: Sequence[PatchPressure],
+    load: float,
+    approach: float,
+    pair: Pair,
+    margin: float,
+    coarser: float,
 ) -> tuple[list[Share], float]:
-    x, y = _grid(near, margin)
+    x, y = _grid(near, margin, coarser)
     cosines = np.cos([patch.lean for patch in patches])
     heights = np.array([_height(patch, x, y) for patch in patches])
     leading = float(np.cos(max(near, key=lambda part: part.load).patch.lean))
@@ -88,15 +100,16 @@ def _pressed(
     raise RunFailed("joined patches", "the patches' shares of the load were not found")
 
 
-def _grid(near: Sequence[PatchPressure], margin: float) -> tuple[Array, Array]:
+def _grid(near: Sequence[PatchPressure], margin: float, coarser: float) -> tuple[Array, Array]:
     """Centres (m) of the cells along x and along the contour."""
     x0, x1 = min(part.box[0] for part in near), max(part.box[1] for part in near)
     y0 = min(part.box[2] + part.patch.place for part in near)
     y1 = max(part.box[3] + part.patch.place for part in near)
     high = margin * (y1 - y0)
     narrowest = min(part.box[3] - part.box[2] for part in near)
-    rows = min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y)
-    along = (x0 + x1) / 2.0 + centres(CELLS_X, margin * (x1 - x0) / CELLS_X)
+    rows = round(min(round(CELLS_Y * high / narrowest), MOST_CELLS_Y) / coarser)
+    columns = round(CELLS_X / coarser)
+    along = (x0 + x1) / 2.0 + centres(columns, margin * (x1 - x0) / columns)
     return along, (y0 + y1) / 2.0 + centres(rows, high / rows)
 
 

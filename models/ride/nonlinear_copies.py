@@ -6,13 +6,14 @@ classical Runge-Kutta method reads the road at half steps; these laws have corne
 of the step.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.ride.copies_kernel import POWERS, Laws, march
-from models.ride.road_path import check_rates, road_path
+from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import bent, statistically_linear
 from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle, poles
@@ -36,13 +37,14 @@ HELD = 1e-6
 class Copies:
     """Outputs of the copies in time: per copy (copies, p) the means of y, y^2, y^3 and y^4 over the counted time.
 
-    step (s) of the runs, ``duration`` (s) that counts.
+    step (s) of the runs, ``duration`` (s) that counts after ``settling`` steps.
     """
 
     names: tuple[str, ...]
     moments: np.ndarray
     step: float
     duration: float
+    settling: int
 
     @property
     def mean(self) -> np.ndarray:
@@ -57,12 +59,12 @@ class Copies:
     @property
     def variance(self) -> np.ndarray:
         """Variances (p,) about the means."""
-        return self._own().mean(axis=0)
+        return self.about_mean().mean(axis=0)
 
     @property
     def error(self) -> np.ndarray:
         """Their standard errors (p,), likewise."""
-        return self._own().std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
+        return self.about_mean().std(axis=0, ddof=1) / len(self.moments[0]) ** 0.5
 
     @property
     def deviation(self) -> np.ndarray:
@@ -80,7 +82,7 @@ class Copies:
         """How many standard errors (p,) the variance lies above that of these standard deviations (p,)."""
         return (self.variance - deviation**2) / self.error
 
-    def _own(self) -> np.ndarray:
+    def about_mean(self) -> np.ndarray:
         """Each copy's mean square about the mean of all (copies, p)."""
         first, second = self.moments[:2]
         return second - 2 * self.mean * first + self.mean**2
@@ -111,9 +113,32 @@ def copies_in_time(
         march.over(portion[: 2 * left + 1], _first(settling, number * BLOCK))
         if left <= BLOCK:
             break
-    return Copies(
-        march.plain.names, march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY)), road.step, counted * road.step
-    )
+    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, EVERY))
+    return Copies(march.plain.names, moments, road.step, counted * road.step, settling)
+
+
+AGAIN = 0.5
+"""Share of the copies that run again in longer steps."""
+
+
+def coarser_variances(
+    vehicle: SpatialVehicle, excitation: Excitation, speed: float, fine: Copies, times: int, seed: int
+) -> np.ndarray:
+    """Variances (k, p) about the means of the first copies, on their own roads in steps 2 or 4 ``times`` as long."""
+    copies = len(fine.moments[0])
+    kept, road = max(1, math.ceil(AGAIN * copies)), RoadPath(excitation, speed, fine.step / 2.0)
+    settling, counted = fine.settling // times, round(fine.duration / fine.step) // times
+    block, every = BLOCK // times, EVERY // times
+    march = March(vehicle, speed, times * fine.step, kept)
+    for number, portion in enumerate(road.blocks(BLOCK, copies, seed)):
+        left = settling + counted - number * block
+        march.over(
+            portion[: 2 * times * left + 1 : times, :, :kept].copy(), _first(settling, number * block, every), every
+        )
+        if left <= block:
+            break
+    moments = march.sums.swapaxes(1, 2) / len(range(0, counted, every))
+    return replace(fine, moments=moments).about_mean()
 
 
 class March:
@@ -151,9 +176,9 @@ def followed(vehicle: SpatialVehicle, speed: float) -> float:
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _first(settling: int, done: int) -> int:
+def _first(settling: int, done: int, every: int = EVERY) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
-    return settling - done if done <= settling else (settling - done) % EVERY
+    return settling - done if done <= settling else (settling - done) % every
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:

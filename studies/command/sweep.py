@@ -228,7 +228,7 @@ def _swept(job: Points, records: list[Record]) -> Swept:
     quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
-    results = [told.speaking(record["results"]) for record in records]
+    results: list[told.Results] = [told.speaking(record["results"]) for record in records]
     return Swept(job.scene, job.key, job.values, columns, failures, results)
 
 

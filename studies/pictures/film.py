@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from models.core.result import Result
 from studies.pictures.camera import Camera
 from studies.pictures.shapes import Colour, Surface
 
@@ -27,13 +28,17 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Poses from one engine at times (f,) in s: places (f, 3) and turns (f, 3, 3) of each body, space from body."""
+    """Poses from one engine at times (f,) in s: places (f, 3) and turns (f, 3, 3) of each body, space from body.
+
+    run : the result that is drawn, where its system has one.
+    """
 
     engine: str
     times: np.ndarray
     places: dict[str, np.ndarray]
     turns: dict[str, np.ndarray]
     arrows: tuple[Arrow, ...] = ()
+    run: Result | None = None
 
 
 @dataclass(frozen=True)

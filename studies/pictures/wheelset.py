@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from models.core.discretisation import not_estimated
 from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
 from models.rail.equations import ROLL, YAW, Path, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
 from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
 from models.rail.wheelset import CHOSEN, Wheelset
-from models.systems.wheelset.of_scene import implementation
+from models.systems.wheelset.of_scene import started
+from models.systems.wheelset.run import run as simulate
+from models.systems.wheelset.scene import build
 from studies.pictures.camera import Camera
 from studies.pictures.film import Arrow, Curve, Kind, Motion, Stage, of_exudyn, of_mujoco
 from studies.pictures.shapes import Colour, Surface, box, extruded, floor, revolved
@@ -37,8 +40,18 @@ def filmed(duration: float, times: np.ndarray, engines: tuple[str, ...]) -> tupl
 
 
 def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
-    equations: Any = implementation(engine)(CHOSEN, SPEED, "fastsim", CELLS)
-    path = equations.run(equations.displaced(SHIFT), duration, STEP)
+    scene = build(
+        {
+            "title": "wheelset",
+            "system": "wheelset",
+            "contact": {"cells": CELLS},
+            "speeds": {"values": [SPEED]},
+            "run": {"duration": duration, "step": STEP, "displacement": SHIFT, "speeds": [SPEED]},
+        }
+    )
+    equations: Any = started(scene, engine, SPEED)[0]
+    run = not_estimated(simulate(scene, engine, SPEED), "a film shows the path, and the study wheelset its error")
+    path: Path = run.detail
     rows = np.rint(times / STEP).astype(int)
     kept = Path(path.times[rows], path.states[rows], path.contacts[rows])
     joints = to_joints(kept.states)[:, :JOINTS]
@@ -52,7 +65,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)
-    return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept))
+    return Motion(engine, kept.times, *poses, arrows(CHOSEN, kept), run)
 
 
 def arrows(w: Wheelset, path: Path) -> tuple[Arrow, ...]:

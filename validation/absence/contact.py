@@ -29,7 +29,7 @@ def seen(scene: ContactScene, engine: str) -> tuple[dict[str, int], bytes]:
 
     coarse = scene.model_copy(update={"method": scene.method.model_copy(update={"cells": 7})})
     with mock.patch.object(run, "touches", wraps=run.touches) as searched:
-        forces = run.run(coarse, errors=False)
+        forces = run.run(coarse, error=False)
     body = forces.detail.contact
     counts = {
         "bounded": int(not isinstance(body, Linear)),

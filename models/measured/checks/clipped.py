@@ -36,8 +36,7 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
     measured = len(good) and np.ptp(good) > ROUNDED * _largest(evidence, signal)
-    ends = [_clipped(signal, values, good, end, period) for end in (good.min(), good.max())] if measured else []
-    found = [finding for finding in ends if finding]
+    found = [_clipped(signal, values, good, end, period) for end in ends(values)] if measured else []
     return found or _stuck(signal, values, period)
 
 
@@ -47,15 +46,25 @@ def _largest(evidence: Evidence, signal: Signal) -> float:
     return max(float(np.nanmax(np.abs(evidence.recording.samples(other)), initial=0.0)) for other in alike)
 
 
-def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding | None:
-    at = int(np.count_nonzero(good == end))
-    others = good[good != end]
+def ends(values: np.ndarray) -> list[float]:
+    """Extremes of a channel (n,), NaN where nothing was measured, at which it is clipped: where values pile up."""
+    good = values[np.isfinite(values)]
+    if not len(good) or good.min() == good.max():
+        return []
+    return [float(end) for end in (good.min(), good.max()) if _piled(values, good, end)]
+
+
+def _piled(values: np.ndarray, good: np.ndarray, end: float) -> bool:
+    at, others = int(np.count_nonzero(good == end)), good[good != end]
     next_to = others[np.argmin(np.abs(others - end))]
     if at < LEAST or at < PILE * np.count_nonzero(good == next_to):
-        return None
+        return False
     own = runs(values == end)
-    if np.max(own[:, 1] - own[:, 0]) < 2:
-        return None
+    return bool(np.max(own[:, 1] - own[:, 0]) >= 2)
+
+
+def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding:
+    at, own = int(np.count_nonzero(good == end)), runs(values == end)
     share, first = 100 * at / len(good), float(period * own[0, 0])
     text = (
         f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(own)} runs, "

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 
 from models.brake.plane_vehicle import Truck
 from models.brake.port.setup import BEHIND, check_port
+from models.core.assumptions import Assumption, assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
+from models.systems.braking.assumptions import assumptions
 from models.systems.braking.of_scene import braked, controller_of, sprung_of, surfaces_of, vehicle_of
 from models.systems.braking.procedures import check_engine, engines_of, port_of, ready
 from models.systems.braking.scene import BrakingScene
@@ -117,7 +119,12 @@ def describe(scene: BrakingScene) -> str:
         lines.append(_line(name, f"{PROCEDURES[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
-    return "\n".join([scene.title, *lines, *effect_lines(scene)])
+    assumed = {one.says: one for name in scene.procedures for one in _assumed(scene, name)}
+    return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
+
+
+def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:
+    return assumptions(scene, name, braked(scene, scene.procedures[name]))
 
 
 def user_code(scene: BrakingScene) -> str:

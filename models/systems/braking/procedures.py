@@ -1,13 +1,14 @@
 """The driver's part of a test: straight braking, split friction, braking in a turn, J-turn, steered without looking."""
 
 import json
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path as Folder
 
 import numpy as np
 from scipy.optimize import root
 
-from models.brake.controller import Pressures
+from models.brake.controller import Pressures, Sample
 from models.brake.plane_step import REPORTED, step_on
 from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
@@ -89,6 +90,23 @@ def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine
     with opened(scene.port, port_of(scene, name, vehicle, engine), usual) as (controller, clock):
         path = vehicle.run(controller, start, scene.run.duration)
     return path if clock is None else replace(path, clock=clock.report())
+
+
+def answers(
+    scene: BrakingScene, name: str, vehicle: Braked, times: np.ndarray, rims: np.ndarray, speeds: np.ndarray
+) -> np.ndarray:
+    """What the controller of a run, or what stands behind its port, says to speeds of rims (n, W) and of the vehicle
+    (n,), in m/s at times (n,) in s, though nothing moves: valves or pressures (n, W)."""
+    usual, supply = controller_of(scene, vehicle.plane.wheels, name), vehicle.chambers.supply
+    with ExitStack() as stack:
+        if scene.port is not None:
+            usual, _ = stack.enter_context(opened(scene.port, port_of(scene, name, vehicle, "reference"), usual))
+        known = speeds if vehicle.speed_given else np.full(speeds.shape, np.nan)
+        commands = [
+            usual.sample(Sample(k, round(time * 1e9), rims[k], True, supply, float(known[k])))
+            for k, time in enumerate(times)
+        ]
+    return np.array([one.valves if one.pressures is None else one.pressures for one in commands])
 
 
 def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run:

@@ -6,11 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
+from models.core.assumptions import judged
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
-from models.systems.braking.march import Path
+from models.systems.braking.assumptions import assumptions
+from models.systems.braking.errors import OtherRuns, with_error
+from models.systems.braking.march import Braked, Path, Start
 from models.systems.braking.of_scene import on_springs
-from models.systems.braking.procedures import check_engine, engines_of, looped, ready
+from models.systems.braking.procedures import answers, check_engine, engines_of, looped, ready
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import WHEELS
 
@@ -24,10 +27,11 @@ REPORTS = {
 """Channels of what wheels report of the last step of every sample: column and unit."""
 
 
-def run(scene: BrakingScene, engine: str = "", *, procedure: str = "") -> Result:
+def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bool = False) -> Result:
     """Drive a procedure, the first of the scene's if none is named, whatever stands behind the port.
 
-    engine : the usual one of such a vehicle if none is named. The result's detail is its ``Path``. Raises InputError,
+    engine : the usual one of such a vehicle if none is named; error : whether that of the steps is estimated, by
+    further runs. What the run assumes is judged always. The result's detail is its ``Path``. Raises InputError,
     Refused, or RunFailed, whose ``partial`` is the result until then, None where nothing was recorded.
     """
     name = procedure or next(iter(scene.procedures))
@@ -40,14 +44,32 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "") -> Result
         from models.engines.braking import Carried
 
         vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
-    begun = time.perf_counter()
+    assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
         path = looped(scene, name, vehicle, start, engine)
-    except RunFailed as error:
-        if error.partial is not None:
-            error.partial = _labelled(scene, name, engine, error.partial, time.perf_counter() - begun)
+    except RunFailed as failure:
+        if failure.partial is not None:
+            seconds = time.perf_counter() - begun
+            failure.partial = judged(_labelled(scene, name, engine, failure.partial, seconds), assumed)
         raise
-    return _labelled(scene, name, engine, path, time.perf_counter() - begun)
+    stop = judged(_labelled(scene, name, engine, path, time.perf_counter() - begun), assumed)
+
+    return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
+
+
+def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str) -> OtherRuns:
+    """The procedure in other steps, none of which is written to a log."""
+    if scene.port is not None:
+        scene = scene.model_copy(update={"port": scene.port.model_copy(update={"log": None})})
+
+    def again(steps: int, until: float) -> Path:
+        shorter = scene.model_copy(update={"run": scene.run.model_copy(update={"duration": until})})
+        return looped(shorter, name, replace(vehicle, substeps=steps), start, engine)
+
+    def answered(path: Path, turning: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+        return answers(scene, name, vehicle, path.times[:-1], np.abs(turning) * vehicle.plane.radius, speeds)
+
+    return OtherRuns(again, answered)
 
 
 def _labelled(scene: BrakingScene, name: str, engine: str, path: Path, seconds: float) -> Result:

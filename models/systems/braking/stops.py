@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
+from models.core.discretisation import Estimate, by_chance
 from models.core.errors import RunFailed
 from models.core.noise import SPEED, normal
 from models.ensemble.runner import PathFailed
@@ -24,6 +25,8 @@ KEPT = {
     "yaw": "final yaw [deg]",
 }
 """Names of arrays, and the quantities of every stop that they hold."""
+COURSE = {"aside": 1.0, "yaw": 5.0}
+"""m, deg: standard errors of a mean course that is less are shares of this."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,16 @@ class Scatter:
 def scatter(values: np.ndarray) -> Scatter:
     """Of values (n,), n at least 2."""
     return Scatter(values.size, float(values.mean()), float(values.std(ddof=1)))
+
+
+def chances(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
+    """Standard errors of the means, as shares of these or of a course that is told apart."""
+    units = {key: label.partition("[")[2][:-1] for key, label in KEPT.items()}
+    return {
+        key: by_chance(one.error, max(abs(one.mean), COURSE.get(key, 0.0)), units[key], one.count)
+        for key, one in scatters.items()
+        if key in units
+    }
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,10 @@ HEADER = (
     "moment_error_of_theory [N m]",
     "status",
 )
-SOUND = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g},{:.4g},{:.4g},{:.4g},{:.4g},ok\n"
-ANSWERS = 9
-"""Columns of numbers behind the line."""
+SOUND = "{},{:.9g},{:.9g},{:.9g},{:.6g},{:.9g}", ",{:.4g},{:.4g},{:.4g},{:.4g}", ",ok\n"
+"""A row: numbers, errors if they are asked for, status."""
+ERRORS = slice(6, 10)
+"""Columns of errors."""
 BLOCK = 10_000
 """Rows of an answer that are read at once, and those that a result keeps."""
 Build = Callable[[Array, Array], Any]
@@ -49,20 +50,29 @@ Build = Callable[[Array, Array], Any]
 
 
 def answer(
-    path: Path, out: Path, built: Build, method: Method, progress: Callable[[int], None] = lambda rows: None
+    path: Path,
+    out: Path,
+    built: Build,
+    method: Method,
+    progress: Callable[[int], None] = lambda rows: None,
+    *,
+    errors: bool = True,
 ) -> dict[str, int]:
     """Answer the table at ``path`` into ``out``; returns how many rows there are and how many were wrong.
 
-    Raises InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
+    errors : whether the answer has columns of errors, which take the forces again on half the cells. Raises
+    InputError for a file or a header that cannot be used; a wrong row gets a status and stops nothing.
     """
     built(np.ones(1), np.ones(1)).pair.require_likeness()  # the scene's mistake, not that of every row
     counts = {"rows": 0, "wrong": 0}
     reading = blocks(path, (BY_AXES, BY_CURVATURES))
     first = list(islice(reading, 1))  # before the answer's file is made, so that a wrong header leaves none
     with whole_file(out) as part, part.open("w") as file:
-        file.write(",".join(HEADER) + "\n")
+        heads = HEADER if errors else tuple(head for head in HEADER if head not in HEADER[ERRORS])
+        file.write(",".join(heads) + "\n")
         for block in chain(first, reading):
-            answers, wrong = _answered(block, partial(_forces, built=built, method=method))
+            solve = partial(_forces, built=built, method=method, errors=errors)
+            answers, wrong = _answered(block, solve, len(heads) - 2)
             rows = enumerate(zip(block.lines, answers.tolist(), strict=True))
             file.writelines(_line(line, row, wrong.get(i)) for i, (line, row) in rows)
             counts["rows"] += len(block.lines)
@@ -77,34 +87,36 @@ def compile_first(built: Build, method: Method) -> None:
     _forces({"A": unit, "B": unit, **dict.fromkeys(MOTION, unit)}, built, method)
 
 
-def _answered(block: Block, solve: Callable[[dict[str, Any]], Array]) -> tuple[Array, dict[int, str]]:
-    """Answers (rows, ANSWERS), NaN where a row is wrong, and what is wrong there."""
-    answers, wrong = np.full((len(block.lines), ANSWERS), np.nan), dict(block.wrong)
+def _answered(block: Block, solve: Callable[[dict[str, Any]], Array], columns: int) -> tuple[Array, dict[int, str]]:
+    """Answers (rows, columns), NaN where a row is wrong, and what is wrong there."""
+    answers, wrong = np.full((len(block.lines), columns), np.nan), dict(block.wrong)
     good = np.array([i for i in range(len(block.lines)) if i not in wrong], dtype=int)
-    answers[good], refused = _sound({name: column[good] for name, column in block.values.items()}, solve)
+    answers[good], refused = _sound({name: column[good] for name, column in block.values.items()}, solve, columns)
     return answers, wrong | {int(good[i]): text for i, text in refused.items()}
 
 
-def _sound(values: dict[str, Array], solve: Callable[[dict[str, Any]], Array]) -> tuple[Array, dict[int, str]]:
+def _sound(
+    values: dict[str, Array], solve: Callable[[dict[str, Any]], Array], columns: int
+) -> tuple[Array, dict[int, str]]:
     """Answers of all rows; rows that are refused are found by halving, and the others answered without them."""
     count = len(next(iter(values.values())))
     if count == 0:
-        return np.empty((0, ANSWERS)), {}
+        return np.empty((0, columns)), {}
     try:
         return solve(values), {}
     except InputError as error:
         if count == 1:
-            return np.full((1, ANSWERS), np.nan), {0: str(error).replace("[0]", "")}
+            return np.full((1, columns), np.nan), {0: str(error).replace("[0]", "")}
     half = count // 2
     (low, wrong), (high, others) = (
-        _sound({name: column[rows] for name, column in values.items()}, solve)
+        _sound({name: column[rows] for name, column in values.items()}, solve, columns)
         for rows in (slice(half), slice(half, None))
     )
     return np.concatenate([low, high]), wrong | {half + i: text for i, text in others.items()}
 
 
-def _forces(values: dict[str, Any], built: Build, method: Method) -> Array:
-    """Answers (rows, ANSWERS); raises InputError if a row is out of what the theory takes."""
+def _forces(values: dict[str, Any], built: Build, method: Method, errors: bool = True) -> Array:
+    """Answers (rows, columns); raises InputError if a row is out of what the theory takes."""
     load, friction, xi_x, xi_y, spin = (values[name] for name in MOTION)
     touching = built(friction, load)
     load, friction, pair = touching.load, touching.friction, touching.pair
@@ -116,13 +128,20 @@ def _forces(values: dict[str, Any], built: Build, method: Method) -> Array:
     else:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
-    fine, coarse = (
-        fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=n, **choices)
-        for n in (method.cells, halved(method.cells))
-    )
-    limit = friction * np.maximum(load, 0.0)
-    a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
-    most, share = limit * np.maximum(a, b), spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
+    fine = fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=method.cells, **choices)
+    forces = [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation]
+    if errors:
+        coarse = fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=halved(method.cells), **choices)
+        limit = friction * np.maximum(load, 0.0)
+        a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
+        share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)
+        forces += _errors(fine, coarse, limit, a, b, share, method)
+    return np.column_stack(forces) + 0.0
+
+
+def _errors(fine: Any, coarse: Any, limit: Array, a: Array, b: Array, share: Array, method: Method) -> list[Array]:
+    """Errors of cells and of theory, of the forces (N) and of the moments (N m); limit : mu N; share : of spin."""
+    most = limit * np.maximum(a, b)
     relative, other = (
         np.divide([creep.fx, creep.fy, creep.mz], [limit, limit, most], out=np.zeros((3, limit.size)), where=limit > 0)
         for creep in (fine, coarse)
@@ -131,16 +150,16 @@ def _forces(values: dict[str, Any], built: Build, method: Method) -> Array:
     used, wider = np.hypot(relative[0], relative[1]), slenderness(a, b)
     theory = wider * limit * band(method.band, used, share)
     moment = wider * most * moment_band(method.band, used_with_moment(used, relative[2]), share)
-    forces = fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation
-    return np.column_stack([*forces, limit * left, theory, most * left, moment]) + 0.0
+    return [limit * left, theory, most * left, moment]
 
 
 def _line(line: int, row: list[float], wrong: str | None) -> str:
     """A row of the answer's file; text that says what is wrong stands within quotation marks."""
     if wrong is None:
-        return SOUND.format(line, *row)
+        numbers, errors, status = SOUND
+        return (numbers + (errors if len(row) > ERRORS.start else "") + status).format(line, *row)
     text = wrong.replace('"', "'")
-    return f'{line}{"," * (ANSWERS + 1)}"{text}"\n'
+    return f'{line}{"," * (len(row) + 1)}"{text}"\n'
 
 
 def sizes(path: Path) -> dict[str, dict[str, Any]]:

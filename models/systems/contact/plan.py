@@ -1,5 +1,10 @@
 """What a contact scene will compute: printed by ``twinrig show``, checked before any run."""
 
+from contextlib import suppress
+
+from models.contact.limits import HALF_SPACE
+from models.core.assumptions import Assumption, assumption_lines
+from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.systems.contact.scene import ContactScene
@@ -10,9 +15,6 @@ THEORIES = {
     "simplified": "Kalker's simplified theory for an undeformed distance (1983)",
     "exact": "half-spaces with Coulomb friction, the theory that the others approximate",
 }
-
-SMALL = 0.3
-"""Of a body's radius, that the semi-axis of the contact may be: half-spaces stand for bodies that are much larger."""
 
 
 def check(scene: ContactScene, engines: tuple[str, ...]) -> None:
@@ -30,10 +32,10 @@ def findings(scene: ContactScene) -> tuple[Finding, ...]:
     out = list[Finding]()
     for name, radius in scene.radii:
         axis = float(area.a if name.endswith("x") else area.b)
-        if radius is not None and axis > SMALL * abs(radius):
+        if radius is not None and axis > HALF_SPACE * abs(radius):
             text = (
                 f"radii.{name}: {radius:.4g} m, where the contact is {axis:.4g} m long to either side; its theory "
-                f"needs radii of at least {axis / SMALL:.3g} m. Radii are in m, loads in N."
+                f"needs radii of at least {axis / HALF_SPACE:.3g} m. Radii are in m, loads in N."
             )
             out.append(Finding("size", "doubt", f"radii.{name}", text, radius, "m"))
     return tuple(out)
@@ -60,7 +62,21 @@ def describe(scene: ContactScene) -> str:
         heads["sweep"] = _values(scene.sweep)
     method = _values(scene.method, {"name", *scene.method.unread()})
     heads["theory"] = THEORIES[scene.method.name] + (f"; {method}" if method else "")
-    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)])
+    lines = [scene.title, *(f"  {head:<10} {text}" for head, text in heads.items()), *effect_lines(scene)]
+    return "\n".join([*lines, *assumption_lines(_assumed(scene))])
+
+
+def _assumed(scene: ContactScene) -> list[Assumption]:
+    """What the scene's contact takes for granted, nothing where it cannot be pressed."""
+    from models.systems.contact.assumptions import assumptions, of_rows
+
+    with suppress(InputError, RunFailed):
+        if scene.cases is not None:
+            return of_rows(scene.cases_file())
+        from models.systems.contact.run import contact
+
+        return assumptions(scene, contact(scene))
+    return []
 
 
 def _values(table: object, left_out: frozenset[str] | set[str] = frozenset()) -> str:

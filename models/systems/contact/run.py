@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -31,14 +31,18 @@ from models.contact.theories import (
 )
 from models.contact.undeformed_distance import quadratic
 from models.contact.wheel_on_rail import Touch, Track, Wheelset, wheel_on_rail
+from models.core.assumptions import judged
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.scene_effects import extended
+from models.systems.contact.assumptions import assumptions, of_rows
 from models.systems.contact.cases_table import answer, compile_first, kept_rows, sizes
 from models.systems.contact.scene import ContactScene
+from models.systems.contact.stated_error import with_error, with_error_of_rows
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 FORCES = attrgetter("fx", "fy", "mz", "stick", "dissipation")
+ERRORS = attrgetter("cells", "theory", "moment_cells", "moment_theory")
 CHANNELS = {
     "xi_x": ("-", "longitudinal creepage"),
     "xi_y": ("-", "lateral creepage"),
@@ -53,7 +57,7 @@ CHANNELS = {
     "moment_error_of_cells": ("N m", "error of the moment that the cells leave"),
     "moment_error_of_theory": ("N m", "error of the moment that the theory has"),
 }
-"""Units and meanings of a motion, of its forces (``FORCES``) and of their errors (``Error``), in this order."""
+"""Units and meanings of a motion, of its forces (``FORCES``) and of their errors (``ERRORS``), in this order."""
 FIELDS = {"x": "m", "y": "m", "dx": "m", "dy": "m", "pressure": "Pa", "px": "Pa", "py": "Pa", "slips": "-"}
 POWERS = {"linear": None, "fastsim": 2, "simplified": 2, "exact": 4}
 """By theory, of the cells along an axis: what a call goes through. Of a half-space every cell feels every other."""
@@ -96,14 +100,15 @@ def run(
     scene: ContactScene,
     engine: str = "",
     *,
-    errors: bool = True,
+    error: bool = True,
     fields: bool = False,
     answers: Path | None = None,
     progress: Progress = lambda stage, share: None,
 ) -> Result:
     """Forces of a scene at every creepage, with ``Rolls`` as detail; or of its table of cases.
 
-    errors : whether to state how far forces are off, which takes another evaluation of each. fields : whether the
+    error : whether to state how far forces are off, which takes another evaluation of each on half the cells; what is
+    assumed is judged always. fields : whether the
     last motion shows its cells; everything is then compiled before times are taken. answers : the CSV into which a
     table of cases is answered block by block; the result has its first rows, and sizes of all. There are no engines.
     Raises InputError, or RunFailed where the exact theory is not solved.
@@ -111,7 +116,7 @@ def run(
     if scene.cases is not None:
         if answers is None:
             raise InputError(scene.file, "cases", None, "is a table of contacts, which is answered into a file")
-        return _of_table(scene, answers, progress)
+        return _of_table(scene, answers, progress, error)
     motions, cells = creepages(scene), scene.method.cells
     progress("loading", 0.0)
     shown = rolled(contact(scene), motions[-1], cells, fields=True) if fields else None
@@ -120,19 +125,20 @@ def run(
     steps, marks = list[tuple[Rolled, Error | None]](), [time.perf_counter()]
     for i, motion in enumerate(motions):
         progress("rolling", i / len(motions))
-        steps.append(rolled(body, motion, cells) if errors else (body.roll(motion, cells), None))
+        steps.append(rolled(body, motion, cells) if error else (body.roll(motion, cells), None))
         marks.append(time.perf_counter())
     seconds = time.process_time() - begun
     if shown is not None:
         steps[-1] = shown
     forces, off = zip(*steps, strict=True)
-    rolls = Rolls(body, motions, forces, off if errors else (), marks[0] - start, np.diff(marks))
-    return _result(scene, rolls, seconds)
+    rolls = Rolls(body, motions, forces, off if error else (), marks[0] - start, np.diff(marks))
+    labelled = judged(_result(scene, rolls, seconds), assumptions(scene, body))
+    return with_error(labelled, scene, body, off) if error else labelled
 
 
 def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
     body, count, power = rolls.contact, len(rolls.motions), POWERS[scene.method.name]
-    errors = [astuple(error) for error in rolls.errors] or [()] * count
+    errors: list[tuple[float, ...]] = [ERRORS(error) for error in rolls.errors] or [()] * count
     rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
     doubt = ""
@@ -168,15 +174,22 @@ def cells_of(scene: ContactScene, rolls: Rolls) -> Result | None:
     return result(scene, columns, {}, motion=list(rolls.motions[-1]))
 
 
-def _of_table(scene: ContactScene, answers: Path, progress: Progress) -> Result:
+def _of_table(scene: ContactScene, answers: Path, progress: Progress, error: bool) -> Result:
     """The first rows of the answers, which the file has in full."""
     built = partial(_of_rows, scene)
     compile_first(built, scene.method)  # no part of the time below
     start = time.perf_counter()
-    counts = answer(scene.cases_file(), answers, built, scene.method, lambda rows: progress(f"{rows:,} rows", 0.0))
+    count = partial(_count, progress)
+    counts = answer(scene.cases_file(), answers, built, scene.method, count, errors=error)
     seconds = time.perf_counter() - start
     rows = {name: Channel("row", values, unit) for name, (unit, values) in kept_rows(answers).items()}
-    return result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
+    table = result(scene, rows, {}, counts=counts, seconds=seconds, sizes=json.dumps(sizes(answers)))
+    judged(table, of_rows(scene.cases_file()))
+    return with_error_of_rows(table, scene) if error else table
+
+
+def _count(progress: Progress, rows: int) -> None:
+    progress(f"{rows:,} rows", 0.0)
 
 
 def _of_rows(scene: ContactScene, friction: Any, load: Any) -> Built:

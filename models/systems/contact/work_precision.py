@@ -19,11 +19,15 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.material import Pair
 from models.contact.theories import ExactOnEllipse, Linear, Motion, OnEllipse, Simplified
+from models.core.assumptions import judged
+from models.core.discretisation import by_cells, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
 from models.machine.seconds import cost
+from models.systems.contact.assumptions import of_pressing
 from models.systems.contact.run import Progress, built_of, hertz_of, interpenetrating
 from models.systems.contact.scene import ContactScene
+from models.systems.contact.stated_error import MOST_CELLS, rms
 
 Parts = tuple[float, float, float]
 KINDS: dict[str, Parts] = {
@@ -261,7 +265,10 @@ def priced(scene: ContactScene, levels: tuple[float, ...], progress: Progress) -
         "seconds": Channel("point", [point.seconds for point in points], "s", "of an evaluation, median of contacts"),
         "uncertainty": Channel("contact", [case.error for case in known], "mu N", "of the exact force"),
     }
-    return result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
+    price = result(scene, channels, {}, a=float(hertz.a), b=float(hertz.b), detail=points)
+    judged(price, of_pressing(scene, cases[0].contact(ExactOnEllipse)))
+    left = by_cells(rms(price["uncertainty"]), 1.0, "mu N", max(FINEST), 1.0, MOST_CELLS)
+    return stated(price, {"exact force": left}, "three grids of the exact theory")
 
 
 TARGETS = (0.05, 0.02, 0.01, 0.005)

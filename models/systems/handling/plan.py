@@ -1,7 +1,9 @@
 """What a scene of handling will compute: printed by ``twinrig show``, checked before any run."""
 
+from models.core.assumptions import assumption_lines
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
+from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
 from models.vehicles.plausible import plausible
 
@@ -40,7 +42,8 @@ def describe(scene: HandlingScene) -> str:
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
     ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
-    return "\n".join([*lines, *effect_lines(scene, 18), _line("never", never)])
+    assumed = assumption_lines(assumptions(first), 18)
+    return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

@@ -1,10 +1,13 @@
 """A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from models.core.assumptions import judged
+from models.core.discretisation import Estimate, Series, by_cells, by_steps, size_of, stated, summed
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
@@ -12,7 +15,8 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.spatial_protocol import SpatialRun
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
-from models.multibody.numbers import GRAVITY, Handling
+from models.multibody.numbers import GRAVITY, Control, Handling
+from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
@@ -22,6 +26,18 @@ LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
 UPRIGHT = 0.5
 """Roll and pitch (rad) beyond which the car turns over: its suspension moves along the upright of the road's plane."""
+ORDER, NET_ORDER = 3.0, 2.0
+"""Orders that errors are told by: of the steps, of a method of order 4 across wheels that lock and land; of the net."""
+UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", "fx": "N", "fy": "N"}
+"""Channels whose error is told."""
+EVERY = 50
+"""Rows from one to the next at which creep forces of several nets are compared."""
+MOST_CELLS, CELLS = 200, "tyres.cells"
+"""Most cells per strip, and the key that they are set by."""
+MIDDLE = 0.4
+"""Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
+STILL = 1e-6
+"""Share of the load at rest, and of the speed at the start, below which a force or a speed is rounding."""
 REPORTS = {
     "load": (at.PRESS, "N", "of the tyre on the road"),
     "fx": (at.FX, "N", "creep force along the wheel"),
@@ -88,10 +104,10 @@ class Drive:
         return power + self["power"].sum(axis=1)
 
 
-def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None) -> Result:
+def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
     """A manoeuvre, the first where none is named, in "exudyn" or "mujoco"; the result's detail is the Drive.
 
-    Raises RunFailed where it does not end well.
+    error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
     asked, handling = scene.manoeuvres[name], scene.handling(name)
@@ -107,7 +123,115 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None) -> Resu
         "tyre": Channel("tyre", [tyre.name for tyre in handling.vehicle.tyres]),
     }
     counts, seconds = drive.run.counts, drive.seconds
-    return result(scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=name)
+    labelled = result(
+        scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=name
+    )
+    judged(labelled, assumptions(handling))
+    return _with_error(labelled, drive, asked.speed) if error else labelled
+
+
+def _with_error(run: Result, drive: Drive, speed: float) -> Result:
+    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
+    again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
+    still = {"N": STILL * max(drive.handling.held.tyres.values())}
+    moving = {
+        name: values
+        for name, values in fine.channels.items()
+        if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
+    }
+    by_step, how = by_steps(Series(fine.times, moving), again, ORDER, again.step)
+    by_net = again.by_cells(list(moving))
+    told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
+    return stated(run, told, f"{how}, and other nets of the patch")
+
+
+@dataclass(frozen=True, eq=False)
+class Again:
+    """A drive in an engine from a speed (m/s), made again in other steps or with another net of the patch."""
+
+    engine: str
+    drive: Drive
+    speed: float
+
+    @property
+    def step(self) -> float:
+        """s."""
+        return float(self.drive.run.times[1])
+
+    @cached_property
+    def twice(self) -> Series:
+        """In twice the step; raises RunFailed."""
+        return self._with_net(self.drive.handling.tyres.cells, 2.0)
+
+    def _with_net(self, cells: int, factor: float) -> Series:
+        handling, steps = self.drive.handling, int((len(self.drive.run.times) - 1) / factor)
+        changed = handling.changed(tyres=replace(handling.tyres, cells=cells))
+        step = factor * self.step
+        return principal(driven(self.engine, changed, self.speed, steps * step, step))
+
+    def __call__(self, factor: float, share: float) -> Series:
+        """As ``models.core.discretisation.Again``: in twice the step, or a part from the middle on in half of it."""
+        if factor > 2.0:
+            raise RunFailed(self.engine, "still longer steps are left out: fewer cells tell more")
+        if factor > 1.0:
+            return self.twice
+        run, handling, step = self.drive.run, self.drive.handling, factor * self.step
+        first, count = round(MIDDLE * (len(run.times) - 1)), max(2, round(share * (len(run.times) - 1) / factor))
+        later = _later(handling, run.times[first])
+        path = build(self.engine, later).run(run.positions[first], run.rates[first], count * step, step)
+        return principal(read(later, path, self.engine), run.times[first])
+
+    def by_cells(self, names: list[str]) -> dict[str, Estimate]:
+        """Errors of the net, by a run in the same steps with a third of its cells.
+
+        A net's error does not fall evenly: how many times as large the difference of both runs is as the error, their
+        creep forces at the same states tell, beside those of a net with twice as many cells.
+        """
+        cells = self.drive.handling.tyres.cells
+        other, finer = max(3, cells // 3) if cells > 3 else 6, 2 * cells
+        try:
+            base, coarse = self.twice, self._with_net(other, 2.0)
+        except RunFailed:
+            base, coarse = principal(self.drive), self._with_net(other, 1.0)
+        own, fewer, more = (self._creep(count) for count in (cells, other, finer))
+        apart, error = np.linalg.norm(own - fewer), np.linalg.norm(own - more) / (1.0 - 0.5**NET_ORDER)
+        share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
+        for name in names:
+            values = base.channels[name]
+            gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
+            net = by_cells(gap, size_of(values), UNITS[name], cells, NET_ORDER, MOST_CELLS)
+            told[name] = replace(net, of=CELLS)
+        return told
+
+    def _creep(self, cells: int) -> np.ndarray:
+        """Creep forces (m, w, 2) in N at some states of the drive, by a net of so many cells."""
+        run, handling = self.drive.run, self.drive.handling
+        numbers = handling.changed(tyres=replace(handling.tyres, cells=cells)).numbers
+        times, positions, rates = (
+            np.ascontiguousarray(each[::EVERY]) for each in (run.times, run.positions, run.rates)
+        )
+        report = np.empty((len(times), len(handling.vehicle.tyres), at.REPORTED))
+        at.reports(numbers, times, positions, rates, report, np.empty((len(times), at.LEDGER)))
+        return report[:, :, [at.FX, at.FY]]
+
+
+def principal(drive: Drive, since: float = 0.0) -> Series:
+    """Channels whose error is told, of a drive that begins at a time (s)."""
+    motion = dict(zip(UNITS, drive.velocity().T, strict=False))
+    return Series(since + drive.run.times, motion | {name: drive[name] for name in UNITS if name in REPORTS})
+
+
+def _later(handling: Handling, since: float) -> Handling:
+    """The same from a time (s) on."""
+
+    def moved(control: Control) -> Control:
+        return tuple((time - since, value) for time, value in control)
+
+    own = handling.controls
+    controls = replace(own, steer=moved(own.steer), brake=moved(own.brake), drive=moved(own.drive))
+    return handling.changed(
+        controls=controls, pushes=tuple(replace(push, size=moved(push.size)) for push in handling.pushes)
+    )
 
 
 def build(engine: str, handling: Handling) -> FreeModel:

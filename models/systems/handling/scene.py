@@ -14,7 +14,7 @@ from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
-from models.road.plane_waves import SHORTEST, plane_waves
+from models.road.plane_waves import plane_waves
 from models.vehicles.vehicle_file import load_vehicle
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -112,7 +112,6 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         _check_times(scene, place, manoeuvre)
         for control, limits in LIMITS.items():
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
-        _check_way(scene, place, manoeuvre)
     return with_own(scene)
 
 
@@ -137,14 +136,3 @@ def _check_knots(scene: HandlingScene, place: str, knots: list[Pair], low: float
     if shortest < step * (1.0 - 1e-9):
         allowed = f"changes within {shortest:.3g} s, which steps of {step:g} s do not see: run.step must not be longer"
         raise InputError(file, place, None, allowed)
-
-
-def _check_way(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
-    """Refuse steps within which a rough road has whole waves."""
-    way, fastest = manoeuvre.speed * scene.run.step, SHORTEST / scene.run.step
-    if manoeuvre.rough and way > SHORTEST:
-        allowed = (
-            f"goes {way:.3g} m in a step, over whole waves of the road, the shortest of {SHORTEST:g} m: at "
-            f"most {fastest:.4g} m/s, or a smaller run.step"
-        )
-        raise InputError(scene.file, f"{place}.speed", manoeuvre.speed, allowed)

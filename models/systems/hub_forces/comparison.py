@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from models.core.discretisation import stated
 from models.core.errors import RunFailed
 from models.core.result import Result
-from models.engines.cut_vehicle import build
 from models.fatigue.damage import damage_ratio
-from models.systems.hub_forces.run import MOTION, Measurement, check_halved, labelled, measure
+from models.systems.hub_forces.run import MOTION, Measurement, labelled, measure
 from models.systems.hub_forces.run import run as run_scene
 from models.systems.hub_forces.scene import HubScene, Method
 
@@ -35,6 +35,11 @@ class Comparison:
     def beside(self) -> str:
         """What errors and damages are taken against."""
         return "the true run" if self.truth is not None else "the run with the filter; the true one is not known"
+
+    @property
+    def results(self) -> dict[str, Result]:
+        """The true run, where it is known, and all others, by their names."""
+        return {**({"true": self.truth} if self.truth else {}), **self.runs}
 
     def errors(self, run: Result) -> np.ndarray:
         """Errors (m, 6) of roll, pitch, heading (rad), x, y, z (m) against the true run.
@@ -88,26 +93,27 @@ def compare(scene: HubScene, engines: tuple[str, ...], progress: Progress = lamb
     """
     last, planned = engines[-1], planned_runs(scene, engines)
     progress("virtual measurement", 0.05)
-    measurement = measure(scene, last)
+    measurement = measure(scene, last, scene.error)
     progress("Kalman filter", 0.2)
     measurement.tilt  # noqa: B018
     runs, failed = dict[str, Result](), dict[str, str]()
     for i, (name, (method, engine)) in enumerate(planned.items()):
         progress(name, 0.3 + 0.6 * i / len(planned))
         try:
-            runs[name] = run_scene(scene, engine, method, measurement)
+            runs[name] = run_scene(scene, engine, method, measurement, scene.error)
         except RunFailed as error:
             if name == FILTER:  # what the others are compared with
                 raise
             failed[name] = str(error)
-    vehicle, true = measurement.vehicle, measurement.truth
-    check_halved(
-        last,
-        runs[FILTER].detail,
-        [element.name for element in vehicle.elements],
-        lambda step, steps: build(last, vehicle, measurement.drive("kalman", step, steps), step, step * steps).run(),
-    )
-    return Comparison(measurement, runs, failed, labelled(measurement, true, last) if true is not None else None)
+    return Comparison(measurement, runs, failed, _true(measurement, last))
+
+
+def _true(measurement: Measurement, engine: str) -> Result | None:
+    """The labelled run that gave a virtual measurement, with the error that was told of it."""
+    if measurement.truth is None:
+        return None
+    run = labelled(measurement, measurement.truth, engine)
+    return stated(run, measurement.errors, "runs in longer steps") if measurement.errors else run
 
 
 def planned_runs(scene: HubScene, engines: tuple[str, ...]) -> dict[str, tuple[Method, str]]:

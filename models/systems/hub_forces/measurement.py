@@ -4,16 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.core.errors import InputError
 from models.core.noise import FORCES, PITCH_SENSOR, normal
 from models.core.signals import Interpolation, sampled
 from models.engines.cut_vehicle import HubModel, HubRun, build
+from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.road.profile import Profile
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle
-
-WAVE = 4
-"""Lengths of the road's finest details that a step may pass over: a whole wave."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +50,7 @@ class Angles:
 
 
 def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float, step: float, steps: int) -> Drive:
-    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later.
-
-    Raises InputError for a speed at which a step passes whole waves of the road.
-    """
-    shortest = WAVE * min(left.finest, right.finest)
-    if speed * step > shortest * (1 + 1e-9):
-        allowed = (
-            f"goes {speed * step:.3g} m in a step of {step:g} s, over whole waves of the road, the shortest of "
-            f"{shortest:.3g} m: at most {shortest / step:.4g} m/s, or a smaller step"
-        )
-        raise InputError("", "road.speed", speed, allowed)
+    """The road under the wheels at half steps: the front axle at s = v t, those behind it their distance later."""
     times, front = 0.5 * step * np.arange(2 * steps + 1), max(vehicle.whole.axles)
     heights, rates = [], []
     for tyre in vehicle.whole.tyres:
@@ -77,6 +64,16 @@ def two_tracks(vehicle: CutVehicle, left: Profile, right: Profile, speed: float,
 def truth(engine: str, vehicle: CutVehicle, road: Drive, frame: str, step: float, duration: float) -> HubRun:
     """The vehicle on its tyres, its hub forces in a frame."""
     return build(engine, vehicle, replace(road, frame=frame), step, duration).run()
+
+
+def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
+    """Travel (m,) of every spring, mount and bar from the design position by name, m (rad of a bar), positive in
+    compression, along a run."""
+    gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
+    still = Drive(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
+    model = build("reference", replace(vehicle, elements=gauges), still, run.times[1], run.times[-1])
+    values = model.reported(run.times, run.states).elements
+    return {element.name: column for element, column in zip(vehicle.elements, values.T, strict=True)}
 
 
 def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:

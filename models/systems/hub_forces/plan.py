@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding, gathered
 from models.core.scene_effects import lines as effect_lines
 from models.engines.cut_vehicle import check_step
 from models.measured.signal import UNITS, Quantity, Signal
+from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.scene import Frame, HubScene
 from models.vehicles.cut_vehicle import CutVehicle, rigid
 from models.vehicles.plausible import plausible
@@ -81,7 +83,9 @@ def describe(scene: HubScene) -> str:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
     lines += [_line("doubt", text) for text in doubts(scene)]
     never = "drag, tyres that roll, curves and friction of springs"
-    return "\n".join([*lines, *effect_lines(scene), _line("never", never)])
+    runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
+    assumed = {each.says: each for run in runs for each in assumptions(scene, vehicle, run)}
+    return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _line("never", never)])
 
 
 def doubts(scene: HubScene) -> tuple[str, ...]:

@@ -1,50 +1,61 @@
 """A scene of hub forces in an engine: what its transducers say, what holds roll and pitch, and the run that follows.
 
 A run reads its road or its forces at half steps. What changes faster between them is not resolved but mistaken for
-something slower, which no state of the run shows: one that reads twice as often does.
+something slower, which no state of the run shows: a run in other steps does.
 """
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from models.core.errors import RunFailed
+from models.core.assumptions import judged
+from models.core.discretisation import Estimate, Series, by_steps, stated, summed
+from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
 from models.core.smoothing import smoothed
+from models.core.steps import divides
 from models.engines.cut_vehicle import HubRun, build
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
-from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
-from models.systems.hub_forces.scene import HubScene, Method
+from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
+from models.systems.hub_forces.measurement import Angles, HubForces, recorded, two_tracks
+from models.systems.hub_forces.scene import Frame, HubScene, Method, Road
 from models.vehicles.cut_vehicle import ANGLES, PITCH, ROLL, CutVehicle, X, Y, Z
 
 if TYPE_CHECKING:
     from models.systems.hub_forces.tilt_filter import Tilt
 
-WINDOW = 1.0
-"""s: time of the start over which a run is repeated in half its steps."""
-ALLOWED = 0.02
-"""Change of an element's force by half the step, by the largest of it: 94 % of a fourth-order error."""
+ORDER, LIFTING_ORDER = 4.0, 3.0
+"""Orders that errors are told by: of the classical Runge-Kutta method, and where wheels leave the road and land. Still
+longer steps would tell less than these: waves of the road have few of them."""
+MIDDLE = 0.4
+"""Share of a run after which a part of it is repeated, where no longer step can be."""
 LEAST = 1e-3
-"""Share of the largest force of all elements that counts as the largest of one that hardly carries anything."""
+"""Share of the largest change of any force, moment or angle below which another one carries nothing."""
+STILL = 1e-6
+"""rad, and share of the largest force, below which a change is rounding."""
 MOTION = {name: (column, "rad") for name, column in ANGLES.items()} | {"x": (X, "m"), "y": (Y, "m"), "z": (Z, "m")}
 """Channels of the chassis: its coordinate, and the unit of that."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What drives the runs of a scene: hub forces and angles, and the true run (None) where both are virtual."""
+    """What drives the runs of a scene: hub forces and angles, and the true run (None) where both are virtual.
+
+    errors : of the steps of the true run, where they were asked for.
+    """
 
     scene: HubScene
     vehicle: CutVehicle
     truth: HubRun | None
     forces: HubForces
     angles: Angles
+    errors: dict[str, Estimate] = field(default_factory=dict)
 
     @cached_property
     def tilt(self) -> "Tilt":
@@ -87,65 +98,121 @@ def with_angles(drive: Drive, angles: np.ndarray, period: float, step: float) ->
     return replace(drive, guide=motion.sample(0.0, step / 2, len(drive.hubs)))
 
 
-def measure(scene: HubScene, engine: str) -> Measurement:
-    """What transducers say: of the files, or of a run on the road, with its noise; RunFailed for too long a step."""
+def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
+    """What transducers say: of the files, or of a run on the road, with its noise.
+
+    error : whether the error of the steps of that run is estimated, by further runs.
+    """
     vehicle, road, step = scene.cut_vehicle(), scene.road, scene.run.step
     if road is None:
         return Measurement(scene, vehicle, None, *scene.measured(vehicle))
-    left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
-
-    def on_road(step: float, steps: int) -> HubRun:
-        drive = two_tracks(vehicle, left, right, road.speed, step, steps)
-        return truth(engine, vehicle, drive, scene.forces.frame, step, step * steps)
-
-    true = on_road(step, scene.steps)
-    check_halved(engine, true, [element.name for element in vehicle.elements], on_road)
+    true, errors = on_road(vehicle, road, scene.forces.frame, (engine, step, scene.run.duration), error)
     forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
         forces = forces.noisy(scene.deviations(vehicle), scene.seed)
     if scene.angles.noise == "white":
         angles = angles.noisy(scene.angles.deviations, scene.seed)
-    return Measurement(scene, vehicle, true, forces, angles)
+    return Measurement(scene, vehicle, true, forces, angles, errors)
 
 
-def check_halved(engine: str, run: HubRun, names: list[str], again: Callable[[float, int], HubRun]) -> None:
-    """Raise RunFailed where the steps were too long; again : (step in s, steps) -> the same run with these.
+def on_road(
+    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, float, float], error: bool = False
+) -> tuple[HubRun, dict[str, Estimate]]:
+    """The vehicle on its tyres over a road, its hub forces in a frame; and errors of the run, where they are asked for.
 
-    A vehicle that has no springs, mounts or bars has nothing that a step could be too long for.
+    march : engine, step and duration (s).
     """
-    if not names:
-        return
-    step = float(run.times[1] - run.times[0])
-    rows = min(len(run.times) - 1, max(2, round(WINDOW / step)))
-    fine = again(step / 2.0, 2 * rows).elements[::2]
-    largest = np.abs(fine).max(axis=0)
-    changes = np.abs(fine - run.elements[: rows + 1]).max(axis=0) / np.maximum(largest, LEAST * largest.max())
-    worst = int(changes.argmax())
-    if not changes[worst] <= ALLOWED:
-        raise RunFailed(
-            engine,
-            f"steps of {step:g} s are too long: half of them change the force of "
-            f"{names[worst]!r} by {changes[worst]:.2g} of its largest; use a smaller step",
-        )
+    engine, step, duration = march
+    left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
+
+    def drive(step: float, steps: int) -> Drive:
+        return replace(two_tracks(vehicle, left, right, road.speed, step, steps), frame=frame)
+
+    true = build(engine, vehicle, drive(step, round(duration / step)), step, duration).run()
+    return true, errors_of_steps(engine, vehicle, true, drive)[0] if error else {}
 
 
-def run(scene: HubScene, engine: str, method: Method | None = None, measurement: Measurement | None = None) -> Result:
+def errors_of_steps(
+    engine: str, vehicle: CutVehicle, run: HubRun, drive: Callable[[float, int], Drive], period: float = 0.0
+) -> tuple[dict[str, Estimate], str]:
+    """Errors of what ``principal`` lists of a run in an engine, by name, and how they were told.
+
+    drive : what drives it, for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
+    divide it, or they would take the samples' noise for motion.
+    """
+    step, steps = float(run.times[1]), len(run.times) - 1
+
+    def again(factor: float, share: float) -> Series:
+        own, count = factor * step, max(1, int(share * steps / factor + 1e-9))
+        if factor > 2.0 or (factor > 1.0 and period and not divides(own, period)):
+            raise InputError("", "run.step", own, "is not taken: longer steps must divide the period of the samples")
+        row = 0 if factor > 1.0 else round(MIDDLE * steps)  # a road begins gently
+        first = round(row / factor)
+        inputs = drive(own, first + count)
+        guide = None if inputs.guide is None else inputs.guide[2 * first :]
+        part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
+        path = build(engine, vehicle, part, own, count * own).run(run.states[row])
+        return principal(vehicle, path, first * own)
+
+    fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
+    units |= {element.name: element.unit for element in vehicle.elements}
+    order = LIFTING_ORDER if vehicle.whole.lifts else ORDER
+    told, how = by_steps(fine._replace(channels=_moving(fine.channels, units)), again, order, step)
+    return {name: replace(each, unit=units[name]) for name, each in told.items()}, how
+
+
+def principal(vehicle: CutVehicle, run: HubRun, since: float = 0.0) -> Series:
+    """Channels whose error is told, of a run that begins at a time (s): forces of all elements, roll and pitch."""
+    channels = {element.name: run.elements[:, i] for i, element in enumerate(vehicle.elements)}
+    return Series(since + run.times, channels | {"roll": run.states[:, ROLL], "pitch": run.states[:, PITCH]})
+
+
+def _moving(channels: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """Those that carry more than a small share of what the largest of the same unit does."""
+    change = {name: float(np.std(values)) for name, values in channels.items()}
+    most = {unit: max(change[name] for name in change if units[name] == unit) for unit in set(units.values())}
+    largest = max((float(np.abs(channels[name]).max()) for name in channels if units[name] == "N"), default=0.0)
+    still = {"rad": STILL, "N": STILL * largest, "N m": STILL * largest}
+    return {
+        name: values
+        for name, values in channels.items()
+        if change[name] > max(LEAST * most[units[name]], still[units[name]])
+    }
+
+
+def run(
+    scene: HubScene,
+    engine: str,
+    method: Method | None = None,
+    measurement: Measurement | None = None,
+    error: bool = False,
+) -> Result:
     """The cut vehicle on its hub forces; the result's detail is the HubRun. Raises InputError, Refused, RunFailed.
 
     method : what holds roll and pitch, the scene's own where none is named; measurement : of the scene, where it was
-    made before, as for runs in several engines; else this engine makes it.
+    made before, as for runs in several engines; else this engine makes it. error : whether the error of the steps is
+    estimated, by further runs, on top of that of the measurement.
     """
-    measurement, method = measurement or measure(scene, engine), method or scene.stabilise.method
+    measurement, method = measurement or measure(scene, engine, error), method or scene.stabilise.method
     drive = measurement.drive(method, scene.run.step, scene.steps)
     model = build(engine, measurement.vehicle, drive, scene.run.step, scene.run.duration)
     begun = time.process_time()
     path = model.run(measurement.start(drive))
     seconds = time.process_time() - begun
-    return labelled(measurement, path, engine, method, seconds)
+    found = labelled(measurement, path, engine, method, seconds)
+    if not error:
+        return found
+    vehicle, period = measurement.vehicle, measurement.forces.period
+    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period)
+    if (
+        before := measurement.errors
+    ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much
+        told = {name: summed(told[name], before[name]) for name in told if name in before and name not in ANGLES}
+    return stated(found, told, how)
 
 
 def labelled(
-    measurement: Measurement, path: HubRun, engine: str, method: str = "on tyres", seconds: float = 0.0
+    measurement: Measurement, path: HubRun, engine: str, method: str = ON_TYRES, seconds: float = 0.0
 ) -> Result:
     """A run of the measurement's vehicle: motion of its chassis, section forces, moments that hold roll and pitch."""
     steps = len(path.times) - 1
@@ -159,7 +226,7 @@ def labelled(
         "element": Channel("element", [element.name for element in measurement.vehicle.elements]),
         "held": Channel("held", ["roll", "pitch"]),
     }
-    return result(
+    told = result(
         measurement.scene,
         channels,
         axes,
@@ -170,3 +237,4 @@ def labelled(
         detail=path,
         method=method,
     )
+    return judged(told, assumptions(measurement.scene, measurement.vehicle, method, measurement.angles))

@@ -88,8 +88,8 @@ def consequences(
         )
         try:
             if first not in known:
-                known[first] = run(_stretch(recording, samples, begun), begun)
-            put_right = run(_stretch(recording, samples | corrected, folder / place), folder / place)
+                known[first] = run(stretch(recording, samples, begun), begun)
+            put_right = run(stretch(recording, samples | corrected, folder / place), folder / place)
         except (InputError, RunFailed):
             return Consequence(finding)
         return _worst(finding, known[first], put_right, answers)
@@ -134,7 +134,7 @@ def _window(finding: Finding, recording: Recording) -> tuple[int, int]:
     return first, count
 
 
-def _stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
+def stretch(recording: Recording, samples: Samples, folder: Path) -> Recording:
     """A recording of these samples."""
     folder.mkdir(parents=True, exist_ok=True)
     count = len(next(iter(samples.values())))

@@ -70,11 +70,14 @@ class PlaneRun:
     outcome: Outcome
 
 
-def run(job: PlaneJob, folder: Path, limits: Limits | None = None) -> PlaneRun:
-    """Write the files of a scene into a new folder, and run it; raises InputError, Refused, RunFailed."""
+def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool = False) -> PlaneRun:
+    """Write the files of a scene into a new folder, and run it; raises InputError, Refused, RunFailed.
+
+    error : whether the error of the steps is estimated, by further runs.
+    """
     folder.mkdir(parents=True)
     scene, said = scene_of(job, folder)
-    result = simulate(scene, job.engine)
+    result = simulate(scene, job.engine, error=error)
     limited = trusted(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS, "pitch"):
         limited = replace(limited, unchecked="")  # the run is compared with it

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.finding import lines as told_of
@@ -9,6 +10,7 @@ from models.core.scene_effects import lines as effect_lines
 from models.measured.channel import Source
 from models.measured.formats import open_source
 from models.measured.signal import Signal
+from models.systems.measured.assumptions import assumptions
 from models.systems.measured.channel_map import signals
 from models.systems.measured.scene import MeasuredScene, Rig
 from models.systems.measured.virtual import check as check_virtual
@@ -101,7 +103,7 @@ def describe(scene: MeasuredScene) -> str:
         _line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
         _line("hand on", f"{sections}; as {', '.join(wanted.formats)}; damage of slopes {slopes}"),
     ]
-    return "\n".join([*lines, *effect_lines(scene)])
+    return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])
 
 
 def _files(scene: MeasuredScene, rig: Rig) -> list[str]:

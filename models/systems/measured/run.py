@@ -15,6 +15,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from models.core.assumptions import judged
+from models.core.discretisation import not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding
 from models.core.result import Result
@@ -28,8 +30,11 @@ from models.measured.checks.weight import moments
 from models.measured.recording import Progress, Recording, silent
 from models.measured.signal import Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
+from models.systems.measured.assumptions import assumptions
 from models.systems.measured.clock import record
-from models.systems.measured.consequences import Consequence, consequences, judged
+from models.systems.measured.consequences import Consequence, consequences
+from models.systems.measured.consequences import judged as judged_by_consequences
+from models.systems.measured.errors import errors_of_steps
 from models.systems.measured.hand_on import FILES, forces, hand_on, labelled
 from models.systems.measured.pitch_plane import PlaneJob
 from models.systems.measured.pitch_plane import run as run_plane
@@ -57,7 +62,8 @@ class Examination:
     """What there is of a recording, in the order in which it is made; what was not reached is empty.
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
-    seconds : of each part. counted : what is handed on. temporary : where all of it lies, None in a user's folder.
+    seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
+    temporary : where all of it lies, None in a user's folder.
     """
 
     scene: MeasuredScene
@@ -73,6 +79,7 @@ class Examination:
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     consequences: tuple[Consequence, ...] = ()
     compared: tuple[Compared, ...] = ()
+    plane: Result | None = None
     counted: dict[Answer, Counted] = field(default_factory=dict)
     handed: tuple[Path, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
@@ -121,14 +128,16 @@ class Examination:
         sections = Sections(vehicle, points=points(vehicle, recording.signals, self.scene.places))
         return SectionRun(vehicle, recording, sections, *settings)
 
-    def march(self, name: str, folder: Path, told: Callable[[float, float], None] = silent) -> Outcome:
-        """Make a run of this name, or what is missing of it in a folder."""
+    def march(
+        self, name: str, folder: Path, told: Callable[[float, float], None] = silent, error: bool = False
+    ) -> Outcome:
+        """Make a run of this name, or what is missing of it in a folder; with its error where the pitch plane runs."""
         job = self.job(name)
         if isinstance(job, SectionRun):
             return march(job, folder, told)
         shutil.rmtree(folder, ignore_errors=True)  # a run of seconds: what a killed one has left is made anew
-        run = run_plane(job, folder, self.scene.limits)
-        self.verdicts[name] = run.verdict
+        run = run_plane(job, folder, self.scene.limits, error and name == self.chosen)
+        self.verdicts[name], self.plane = run.verdict, run.result
         if name == FREE and run.trust is not None:
             self.trust = (("pitch", run.trust),)
         return run.outcome
@@ -140,34 +149,76 @@ class Examination:
 
 
 def run(
-    scene: MeasuredScene, engine: str = "", folder: Path | None = None, progress: Progress = silent, whole: bool = False
+    scene: MeasuredScene,
+    engine: str = "",
+    folder: Path | None = None,
+    progress: Progress = silent,
+    whole: bool = False,
+    error: bool = False,
 ) -> Result:
     """Run a recording held as its scene says; the result's detail is the Examination.
 
     folder : where samples are kept, and a killed run goes on; else they live as long as the detail. whole : whether
-    the recording is checked, run free, too, and judged, and files are handed on. Raises InputError for files that
-    cannot be read; a whole run that fails is told in the detail, another one raises RunFailed.
+    the recording is checked, run free, too, and judged, and files are handed on. error : whether the error of the steps
+    is estimated, by further runs. Raises InputError for files that cannot be read; a whole run that fails is told in
+    the detail, another one raises RunFailed.
     """
     temporary = None if folder else TemporaryDirectory()
     folder = folder or Path(temporary.name if temporary else "")
-    exam = _begun(scene, engine or scene.run.engine, folder, progress)
+    exam = _begun(scene, engine or scene.run.engine, folder, progress, error)
     exam.temporary = temporary
     if whole:
-        _examined(exam, folder, progress)
+        _examined(exam, folder, progress, error)
     else:
         begun = time.process_time()
-        exam.runs[exam.chosen] = exam.march(exam.chosen, folder / WORK / exam.chosen)
+        exam.runs[exam.chosen] = exam.march(exam.chosen, folder / WORK / exam.chosen, error=error)
         exam.seconds["march"] = time.process_time() - begun
-    return _labelled(scene, exam, folder)
+    labelled = _judged_by_assumptions(_labelled(scene, exam, folder), exam)
+    try:
+        return _with_error(labelled, exam, folder / WORK / "error") if error else labelled
+    except RunFailed as failure:
+        if not whole:
+            raise
+        exam.failed[exam.chosen] = str(failure)
+        exam.verdicts[exam.chosen] = Verdict("rejected", failure.reason)
+        labelled.data.attrs |= _ends(exam)
+        return labelled
 
 
-def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress) -> Examination:
+def _judged_by_assumptions(run: Result, exam: Examination) -> Result:
+    """The result with what it assumes and what of that it broke; of the pitch plane beside what its own run says."""
+    if exam.outcome is None:
+        return run
+    judged(run, assumptions(exam.scene, exam.rig.vehicle, exam))
+    if exam.plane is not None:
+        own, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
+        run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *own[key]] for key in own})
+        run.data.attrs["error"] = exam.plane.data.attrs["error"]
+    return run
+
+
+def _with_error(run: Result, exam: Examination, work: Path) -> Result:
+    """The result with the error of the steps of the run that is handed on."""
+    job, outcome = exam.job(exam.chosen), exam.outcome
+    if outcome is None or not isinstance(job, SectionRun):
+        return run
+    if exam.chosen in exam.failed:
+        return not_estimated(run, f"the run did not end: {exam.failed[exam.chosen]}")
+    before = exam.virtual.errors if exam.virtual is not None else {}
+    try:
+        told = errors_of_steps(job, outcome, before, work)
+    except (InputError, RunFailed) as failure:
+        return not_estimated(run, f"a part of it, in half the step, did not end: {failure}")
+    return stated(run, told, "a part from the middle, in its steps and in half of them")
+
+
+def _begun(scene: MeasuredScene, engine: str, folder: Path, progress: Progress, error: bool) -> Examination:
     """The recording on one clock: of the scene's files, or of those that a virtual measurement leaves."""
     rig, virtual, seconds, begun = scene.rig(), None, dict[str, float](), time.perf_counter()
     (folder / WORK).mkdir(parents=True, exist_ok=True)
     if scene.virtual is not None and rig.vehicle is not None:
         progress("virtual measurement", 0.0)
-        virtual = virtual_measurement(rig.vehicle, scene.virtual, engine, scene.file)
+        virtual = virtual_measurement(rig.vehicle, scene.virtual, engine, scene.file, error)
         if not (folder / "scene.toml").is_file():  # else a killed run has written it
             write_pattern(scene, virtual, virtual.samples(scene.virtual.faults, scene.virtual.seed), folder)
         scene = load(folder / "scene.toml")
@@ -207,7 +258,7 @@ def _lap(exam: Examination, part: str, begun: float) -> None:
     exam.seconds[part] = time.perf_counter() - begun - sum(exam.seconds.values())
 
 
-def _examined(exam: Examination, folder: Path, progress: Progress) -> None:
+def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) -> None:
     """Check, predict, run, judge, and hand on, as far as the recording can be used."""
     lap = partial(_lap, exam, begun=time.perf_counter() - sum(exam.seconds.values()))
     progress("checks", 0.2)
@@ -217,7 +268,7 @@ def _examined(exam: Examination, folder: Path, progress: Progress) -> None:
         return
     if exam.rig.vehicle is not None:
         _predicted(exam, exam.rig.vehicle)
-    _run(exam, folder / WORK, progress)
+    _run(exam, folder / WORK, progress, error)
     if exam.rig.vehicle is not None:
         _judged(exam, exam.rig.vehicle)
     lap("runs")
@@ -262,7 +313,7 @@ def _began(recording: Recording, what: str, axis: str, chassis: str) -> float:
     return 0.0
 
 
-def _run(exam: Examination, work: Path, progress: Progress) -> None:
+def _run(exam: Examination, work: Path, progress: Progress, error: bool) -> None:
     """Free, and with the stabiliser that the scene names; a run that fails keeps what it has."""
     for name in exam.holds:
         if isinstance(job := exam.job(name), SectionRun):
@@ -271,7 +322,7 @@ def _run(exam: Examination, work: Path, progress: Progress) -> None:
         progress(f"{name} run", 0.2 + 0.7 * i / len(exam.holds))
         told = _left(f"{name} run", progress, 0.2 + 0.7 * i / len(exam.holds), 0.7 / len(exam.holds))
         try:
-            exam.runs[name] = exam.march(name, work / name, told)
+            exam.runs[name] = exam.march(name, work / name, told, error)
         except RunFailed as error:
             exam.failed[name] = str(error)
             if isinstance(error.partial, Outcome):
@@ -324,7 +375,9 @@ def _weighed(exam: Examination, work: Path) -> None:
     if name in exam.runs:
         again, answers = partial(exam.again, name), exam.forces(exam.runs[name])
         exam.consequences = consequences(exam.findings, exam.recording, again, answers, work / "findings")
-        exam.verdicts = {name: judged(verdict, exam.consequences) for name, verdict in exam.verdicts.items()}
+        exam.verdicts = {
+            name: judged_by_consequences(verdict, exam.consequences) for name, verdict in exam.verdicts.items()
+        }
 
 
 def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:
@@ -339,7 +392,6 @@ def _handed(exam: Examination, outcome: Outcome, folder: Path) -> None:
 
 def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
     """The result of a scene, whose detail is its examination."""
-    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
     return labelled(
         scene,
         exam.outcome,
@@ -350,6 +402,11 @@ def _labelled(scene: MeasuredScene, exam: Examination, folder: Path) -> Result:
         doubts=[finding.text for finding in exam.findings if finding.weight != "note"],
         detail=exam,
         run=exam.chosen,
-        verdicts=json.dumps(verdicts),
-        failed=json.dumps(exam.failed),
+        **_ends(exam),
     )
+
+
+def _ends(exam: Examination) -> dict[str, str]:
+    """How the runs ended, as attributes."""
+    verdicts = {name: [verdict.word, verdict.reason] for name, verdict in exam.verdicts.items()}
+    return {"verdicts": json.dumps(verdicts), "failed": json.dumps(exam.failed)}

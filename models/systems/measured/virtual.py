@@ -1,7 +1,7 @@
 """A virtual measurement: a vehicle in space on a rough road, what transducers on it would write, and their file."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
+from models.core.discretisation import Estimate
 from models.core.errors import InputError
 from models.core.steps import divides, fitting
 from models.core.strict import Strict, quantity
 from models.core.whole_files import write_whole
-from models.engines.cut_vehicle import HubRun, build
+from models.engines.cut_vehicle import HubRun
 from models.measured.channel import BLOCK
 from models.measured.columns import Columns
 from models.measured.faults_of_measurement import Faults, measured
@@ -22,11 +23,10 @@ from models.measured.formats import write
 from models.measured.formats.writing import Group
 from models.measured.recording import Recording
 from models.measured.signal import HUB, Quantity, Signal
-from models.multibody.cut_table import Drive
-from models.road.iso8608 import iso8608_road
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import in_space
-from models.systems.hub_forces.measurement import truth, two_tracks
+from models.systems.hub_forces.measurement import travels
+from models.systems.hub_forces.run import on_road
 from models.systems.hub_forces.scene import Frame, Road
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, X, Y, Z
 
@@ -71,7 +71,7 @@ class VirtualMeasurement:
     """What would be recorded if nothing were wrong with any transducer.
 
     signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
-    every : steps of a sampling period.
+    every : steps of a sampling period. errors : of the steps of the true run, where they were asked for.
     """
 
     vehicle: CutVehicle
@@ -79,6 +79,7 @@ class VirtualMeasurement:
     signals: tuple[Signal, ...]
     values: np.ndarray
     every: int
+    errors: dict[str, Estimate] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -95,18 +96,22 @@ class VirtualMeasurement:
         return measured(faults, self.signals, self.values, self.step, self.every, seed, path)
 
 
-def virtual_measurement(vehicle: CutVehicle, own: VirtualTable, engine: str, file: str = "") -> VirtualMeasurement:
-    """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed."""
+def virtual_measurement(
+    vehicle: CutVehicle, own: VirtualTable, engine: str, file: str = "", error: bool = False
+) -> VirtualMeasurement:
+    """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed.
+
+    error : whether the error of the steps on the road is estimated, by further runs.
+    """
     signals = check(vehicle, own, file)
-    left, right = (iso8608_road(own.road.iso8608, own.road.seed + i) for i in range(2))
-    drive = two_tracks(vehicle, left, right, own.road.speed, own.step, round(own.duration / own.step))
-    run = truth(engine, vehicle, drive, own.frame, own.step, own.duration)
+    run, told = on_road(vehicle, own.road, own.frame, (engine, own.step, own.duration), error)
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
-    forces, gauged = ([elements.index(name) for name in names] for names in (own.sections, own.travels))
-    checks = [run.elements[:, forces], *([travels(vehicle, run, drive)[:, gauged]] if gauged else [])]
+    moved = travels(vehicle, run) if own.travels else {}
+    checks = [run.elements[:, [elements.index(name)]] for name in own.sections]
+    checks += [moved[name][:, None] for name in own.travels]
     values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), *checks])
-    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)))
+    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)), told)
 
 
 def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signal, ...]:
@@ -173,13 +178,6 @@ def body_rates(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
             -dpitch * np.sin(roll) + dheading * np.cos(roll) * np.cos(pitch),
         ]
     )
-
-
-def travels(vehicle: CutVehicle, run: HubRun, drive: Drive) -> np.ndarray:
-    """Travel (n, elements) from the design position, m (rad of a bar), positive in compression, along a run."""
-    gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
-    model = build("reference", replace(vehicle, elements=gauges), drive, run.times[1], run.times[-1])
-    return model.reported(run.times, run.states).elements
 
 
 def group(signals: tuple[Signal, ...], samples: np.ndarray, period: float) -> Group:

@@ -11,17 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import judged
+from models.core.discretisation import Series, estimated
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Settings
-from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
+from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, SpatialRun, build
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.nonlinear_copies import Copies, copies_in_time, followed
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import StatisticallyLinear, statistically_linear
+from models.road.excitation import Excitation
+from models.systems.ride.assumptions import assumptions
+from models.systems.ride.errors import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
+from models.systems.ride.watched import InTime, Spectral, few, watching
 from models.vehicles.linear_vehicle import Output
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, preloads, wheels
@@ -38,6 +44,7 @@ class Sampling(Strict):
     copies: int = Field(default=200, ge=2, le=100_000, description="of the vehicle, each on a road of its own")
     lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
     speed: float | None = quantity("m/s", "of the engines' runs and tables; the middle one if not given", default=None)
+    step: float | None = quantity("s", "longest step of the engines' runs; 2 ms if not given", default=None)
     driven: float = quantity("s", "length of the engines' runs", default=30.0)
     skipped: float = quantity("s", "left out at their beginning", default=4.0, zero=True)
     seed: int = Field(default=1, ge=0, lt=2**64, description="of all roads in time")
@@ -71,8 +78,13 @@ class Nonlinear:
         return np.array([each.covariance.deviation for each in self.replaced])
 
 
-def linearised(scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress) -> Result:
-    """Small motion and statistical linearisation at all speeds, Monte Carlo at some; detail: ``Nonlinear``."""
+def linearised(
+    scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, progress: Progress, error: bool = False
+) -> Result:
+    """Small motion and statistical linearisation at all speeds, Monte Carlo at some; detail: ``Nonlinear``.
+
+    error : whether errors are estimated, by more copies in longer steps.
+    """
     assert scene.speeds is not None
     speeds, road = scene.speeds.all(), excitation_of(scene, wheels(vehicle))
     linear, on_road, begun = linear_vehicle(vehicle), vehicle.with_tyres(pushes_only=False), time.process_time()
@@ -97,7 +109,7 @@ def linearised(scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, pr
         f"copies_{name}": Channel(("speed_of_copies", "output"), [getattr(each, part) for each in copies.values()])
         for name, part in of_copies.items()
     }
-    return result(
+    labelled = result(
         scene,
         channels,
         {
@@ -112,16 +124,56 @@ def linearised(scene: RideScene, vehicle: SpatialVehicle, sampling: Sampling, pr
         detail=found,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
+    motion = _moved(vehicle, road, speeds, replaced)
+    judged(labelled, assumptions(scene, vehicle, motion, replaced=not vehicle.lifts))
+    if not error:
+        return labelled
+    known = {} if vehicle.lifts else {speed: _replaced_at(on_road, road, speed, speeds, replaced) for speed in copies}
+    return with_error_of_copies(labelled, vehicle, road, known, copies, sampling.seed)
 
 
-def in_engine(scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling) -> Result:
-    """One path of the road through an engine, at the speed that is shown; detail: ``Ride``."""
+def _replaced_at(
+    vehicle: SpatialVehicle, road: Excitation, speed: float, speeds: np.ndarray, replaced: list[StatisticallyLinear]
+) -> StatisticallyLinear:
+    """The replaced vehicle at a speed (m/s), which may be among those that are known."""
+    at = np.flatnonzero(np.isclose(speeds, speed))
+    return replaced[at[0]] if len(at) else statistically_linear(vehicle, road, speed)
+
+
+def _moved(
+    vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, replaced: list[StatisticallyLinear]
+) -> Spectral:
+    """How the parts of replaced vehicles move, springs about means of their own."""
+    known = dict(zip(speeds.tolist(), replaced, strict=True))
+    chosen = few(speeds)
+    means = {
+        f"travel {name}": np.array([known[speed].springs[name].travel for speed in chosen])
+        for name in replaced[0].springs
+    }
+    return Spectral(vehicle, lambda speed: known[speed].vehicle, road, chosen, means)
+
+
+def in_engine(
+    scene: RideScene,
+    engine: str,
+    vehicle: SpatialVehicle,
+    sampling: Sampling,
+    error: bool = False,
+    table: np.ndarray | None = None,
+) -> Result:
+    """One path of the road through an engine, at the speed that is shown; detail: ``Ride``.
+
+    error : whether that of the steps is estimated, by runs in longer ones on the same road; table : a road in place of
+    the drawn one, as ``RoadPath.table`` has it.
+    """
     assert scene.speeds is not None
     speed, road = sampling.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    path, begun = road_path(road, speed, min(STEP, followed(vehicle, speed))), time.process_time()
-    every, seed, skipped = max(1, round(2.0 * STEP / path.step)), sampling.seed, sampling.skipped
-    ride = ridden(engine, vehicle, path, sampling.driven, seed=seed, skipped=skipped, every=every)
-    return result(
+    path = road_path(road, speed, min(sampling.step or STEP, followed(vehicle, speed)))
+    begun, every, skipped = time.process_time(), max(1, round(2.0 * STEP / path.step)), sampling.skipped
+    if table is None:
+        table = path.table(int(np.ceil(sampling.driven / path.step)), sampling.seed)
+    ride = driven(engine, vehicle, path, table, skipped=skipped, every=every)
+    labelled = result(
         scene,
         {"output_value": Channel(("time", "output"), ride.outputs)},
         {
@@ -136,6 +188,48 @@ def in_engine(scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: 
         speed=speed,
         step=path.step,
     )
+    at, seen = ride.rows, watching(linearise(vehicle, speed), vehicle, speed)
+    motion = InTime(seen, ride.run.positions[at], ride.run.rates[at], table[2 * at])
+    judged(labelled, assumptions(scene, vehicle, motion))
+    return _with_error_of_steps(labelled, engine, vehicle, path, table, skipped) if error else labelled
+
+
+ORDER, APART = 4, 16
+"""Order of the classical Runge-Kutta method; steps from one row to the next by which errors are told."""
+REPEATED, LATEST = 0.9, 0.1
+"""Shares of a run that longer steps repeat, for rows are read beside, and before which the first row lies."""
+
+
+def _with_error_of_steps(
+    run: Result, engine: str, vehicle: SpatialVehicle, path: RoadPath, table: np.ndarray, skipped: float
+) -> Result:
+    """The result with the errors of its outputs, by runs that read the same road at every second and fourth place."""
+    names, units = [str(name) for name in run["output"]], run["unit"].tolist()
+    steps = len(table) // 2
+    first = APART * int(min(skipped / path.step, LATEST * steps) / APART)
+
+    def series(ride: Ride, begin: float) -> Series:
+        known = ~np.isnan(ride.outputs).any(axis=0)
+        return Series(begin + ride.times, {name: ride.outputs[:, i] for i, name in enumerate(names) if known[i]})
+
+    def again(times: float, share: float) -> Series:
+        longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
+        count = int(REPEATED * share * steps / times)
+        read = table[:: round(times)] if times >= 1.0 else _halved(table)
+        begin = first * path.step
+        ride = driven(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
+        return series(ride, begin)
+
+    own = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
+    fine = series(own, first * path.step)
+    return estimated(run, fine, again, ORDER, path.step, dict(zip(names, units, strict=True)))
+
+
+def _halved(table: np.ndarray) -> np.ndarray:
+    """A road at twice as many places, straight between those that are known."""
+    halved = np.repeat(table, 2, axis=0)[:-1]
+    halved[1::2] = (table[:-1] + table[1:]) / 2.0
+    return halved
 
 
 @dataclass(frozen=True)
@@ -144,12 +238,14 @@ class Ride:
 
     Outputs are read by the rows of ``spatial_linear`` from the engine's own positions, rates and accelerations; those
     of small motion, which a ride is. The force of a bent spring is no linear function of them: it is left nan.
+    ``rows`` (m,): the steps at which they are read.
     """
 
     names: tuple[str, ...]
     run: SpatialRun
     times: np.ndarray
     outputs: np.ndarray
+    rows: np.ndarray
 
     def of(self, name: str) -> np.ndarray:
         """One output (m,)."""
@@ -187,15 +283,40 @@ def ridden(
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
+    table = road.table(int(np.ceil(duration / road.step)), seed, path)
+    return driven(engine, vehicle, road, table, skipped=skipped, every=every)
+
+
+def driven(
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, *, skipped: float = 0.0, every: int = 1
+) -> Ride:
+    """Drive over a road that is known by its ``table``, else as ``ridden``."""
     check_rates(vehicle, road.excitation)
-    steps = int(np.ceil(duration / road.step))
-    table = road.table(steps, seed, path)
-    settings = Settings(INTEGRATORS[engine], road.step, steps * road.step)
-    model = build(engine, vehicle, settings, road.speed, table)
+    steps = len(table) // 2
+    model = _model(engine, vehicle, road, table)
     zero = np.zeros(len(vehicle.coordinates()))
     run = model.run(zero, zero)
+    at = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
+    return _read(model, vehicle, road, table, run, at)
+
+
+def _model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray) -> SpatialModel:
+    settings = Settings(INTEGRATORS[engine], road.step, len(table) // 2 * road.step)
+    return build(engine, vehicle, settings, road.speed, table)
+
+
+def read_outputs(
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: SpatialRun, at: np.ndarray
+) -> Ride:
+    """Outputs of a run at other steps (m,)."""
+    return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, at)
+
+
+def _read(
+    model: SpatialModel, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: SpatialRun, at: np.ndarray
+) -> Ride:
+    """Outputs of a run at steps (m,)."""
     linear = linearise(vehicle, road.speed)
-    at = np.arange(int(np.ceil(skipped / road.step)), steps + 1, every)
     accelerations = np.array([model.acceleration(run.positions[i], run.rates[i], table[2 * i]) for i in at])
     rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
     outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
@@ -208,7 +329,7 @@ def ridden(
             elastic = rows @ row_of(replace(output, rate=0.0 * output.rate, road_rate=0.0 * output.road_rate))
             load = preloads(vehicle).tyres[spec.tyre]
             values[:] = np.maximum(np.minimum(load + values, 2.0 * (load + elastic)), 0.0) - load
-    return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs)
+    return Ride(linear.names, run, at * road.step - at[0] * road.step, outputs, at)
 
 
 def row_of(output: Output) -> np.ndarray:

@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from models.core.assumptions import judged
 from models.core.result import Channel, Result, result
+from models.systems.ride.assumptions import assumptions
+from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_drive, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, told_by, vehicle_of
 from models.systems.ride.scene import RideScene
+from models.systems.ride.watched import FEW, Along, Spectral, few, own_deviations
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
 
@@ -35,6 +39,7 @@ def run(
     correlations: Mapping[str, tuple[str, str] | None] | None = None,
     sampling: "Sampling | None" = None,
     progress: "Progress" = lambda text, share: None,
+    error: bool = False,
 ) -> Result:
     """Run a scene by the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
 
@@ -42,21 +47,23 @@ def run(
     correlations : of the road, left to right and front to rear, by name; None is the scene's own, the only one if none
     are named. sampling : asks for a run in time, as springs do that are bent and tyres that may lift; the reference
     then answers by statistical linearisation with copies beside, an engine by one path of the road. progress : of it.
+    error : whether errors are estimated, by further solutions or runs. What a run assumes is judged always.
 
     The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
     """
     engine = engine or "reference"
     with told_by(scene):
         if scene.drive is not None:
-            return _driven(scene, engine, vehicle or vehicle_of(scene))
+            return _driven(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or goes_in_time(scene)):
-            return _swept(scene, engine, vehicle or vehicle_of(scene), speeds, correlations or {AS_WRITTEN: None})
+            roads = correlations or {AS_WRITTEN: None}
+            return _swept(scene, engine, vehicle or vehicle_of(scene), speeds, roads, error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
         if engine == "reference":
-            return nonlinear.linearised(scene, vehicle, sampling, progress)
-        return nonlinear.in_engine(scene, engine, vehicle, sampling)
+            return nonlinear.linearised(scene, vehicle, sampling, progress, error)
+        return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
 
 
 def _swept(
@@ -65,15 +72,16 @@ def _swept(
     vehicle: SpatialVehicle,
     speeds: Sequence[float] | None,
     correlations: Mapping[str, tuple[str, str] | None],
+    error: bool,
 ) -> Result:
-    """Standard deviations (correlation, speed, output)."""
+    """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
     from models.ride.sweep import sweep
 
     assert scene.speeds is not None
     roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in correlations.items()}
-    begun = time.process_time()
-    swept = sweep(linear_vehicle(vehicle, engine), roads, speeds or scene.speeds.all(), scene.weighting)
-    return result(
+    begun, linear = time.process_time(), linear_vehicle(vehicle, engine)
+    swept = sweep(linear, roads, speeds or scene.speeds.all(), scene.weighting)
+    labelled = result(
         scene,
         {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},
         {
@@ -87,9 +95,15 @@ def _swept(
         seconds=time.process_time() - begun,
         detail=swept,
     )
+    own = roads.get(AS_WRITTEN, [*roads.values()][-1])
+    judged(labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, own, few(swept.speeds), {})))
+    if not error:
+        return labelled
+    digit = DIGIT if engine == "reference" or not any(spring.bent for spring in vehicle.springs) else CORNERED
+    return with_error_of_sweep(labelled, swept, linear, roads, scene.weighting, digit)
 
 
-def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle) -> Result:
+def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
     """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
     from models.ride.varying_speed import quasi_stationary, varying_speed
 
@@ -99,12 +113,16 @@ def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle) -> Result:
     drive = varying_speed(linear, road, scene.drive.profile(scene.file), weightings=weightings)
     speeds = np.linspace(0.0, drive.speed.max(), QUASI_STATIONARY)
     each = quasi_stationary(linear, road, speeds, weightings=weightings)
-    alone = np.column_stack([np.interp(drive.speed, speeds, column) for column in each.T])
-    return result(
+
+    def alone(every: int) -> np.ndarray:
+        kept = np.unique([*range(0, len(speeds), every), len(speeds) - 1])
+        return np.column_stack([np.interp(drive.speed, speeds[kept], column) for column in each[kept].T])
+
+    labelled = result(
         scene,
         {
             "deviation": Channel(("time", "output"), drive.deviation),
-            "quasi_stationary": Channel(("time", "output"), alone),
+            "quasi_stationary": Channel(("time", "output"), alone(1)),
             "speed": Channel("time", drive.speed, "m/s"),
             "path": Channel("time", drive.path, "m"),
         },
@@ -118,3 +136,6 @@ def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle) -> Result:
         seconds=time.process_time() - begun,
         detail=drive,
     )
+    apart = Spectral(vehicle, lambda _: linear, road, few(np.linspace(0.0, drive.speed.max(), FEW + 1)[1:]), {})
+    judged(labelled, assumptions(scene, vehicle, Along(own_deviations(vehicle, drive.deviation), apart)))
+    return with_error_of_drive(labelled, scene, linear, road, alone) if error else labelled

@@ -1,5 +1,7 @@
 """What a scene of a held wheelset will compute: printed by ``twinrig show``, checked before any run."""
 
+from models.core.assumptions import assumption_lines
+from models.systems.wheel_rail.assumptions import assumptions
 from models.systems.wheel_rail.scene import WheelRailScene
 
 
@@ -22,7 +24,9 @@ def describe(scene: WheelRailScene) -> str:
         "positions": f"{at.count} from {1e3 * at.start:g} to {1e3 * at.stop:g} mm to the right",
     }
     cases = ((name, case_text(case.yaw, case.friction)) for name, case in scene.cases.items())
-    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in (*lines.items(), *cases))])
+    told = [f"  {head:<10} {text}" for head, text in (*lines.items(), *cases)]
+    rolling = max(case.friction for case in scene.cases.values())
+    return "\n".join([scene.title, *told, *assumption_lines(assumptions(scene, rolling))])
 
 
 def case_text(yaw: float, friction: float) -> str:

@@ -2,23 +2,30 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from models.contact.wheel_on_rail import DEEP
+from models.core.assumptions import judged
+from models.core.discretisation import by_cells, not_estimated, stated
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
-from models.rail.contact_table import Place, Placed, rolling_radius_difference
-from models.systems.wheel_rail.scene import WheelRailScene
+from models.rail.contact_table import Contact, Place, Placed, rolling_radius_difference
+from models.systems.wheel_rail.assumptions import WHEELS, assumptions
+from models.systems.wheel_rail.scene import MOST_CELLS, WheelRailScene
 
-WHEELS = ("right", "left")
 TOO_DEEP = ("distance", "load")
 """What the theories complain of where the contact grows out of its surroundings."""
 POSITION = {"shift": "mm", "yaw": "mrad", "roll": "mrad", "spin_speed": "rad/s", "radius_difference": "mm"}
 """Quantities of a position, with their units."""
 DEGREES = -180.0 / np.pi
+SUMS = {"normal": "N", "area": "m^2", "fx": "N", "fy": "N", "peak": "Pa"}
+"""Quantities of a wheel whose error is told, with their units."""
+EVERY = 2
+"""Of so many positions one tells the error."""
 PATCH: dict[str, tuple[str, float, str]] = {
     "on_rail": ("mm", 1e3, "on_rail"),
     "in_track": ("mm", 1e3, "y"),
@@ -61,12 +68,15 @@ def run(
     engine: str = "",
     case: str = "",
     told: Callable[[float, float], Any] = lambda shift, share: None,
+    *,
+    error: bool = False,
 ) -> Result:
     """A case, the first of the scene's if none is named, at every position; the detail is its ``Contacts``.
 
     Channels of positions lie over the shift, those of patches over shift, wheel and patch, the one that carries most
     first; not a number where there is no further patch. Positions that fail are doubts. told : called before each
-    shift with it (mm) and the share that is done. Raises InputError for profiles that are none.
+    shift with it (mm) and the share that is done; error : whether every other position is computed on half the cells,
+    too, which tells the error of cells. Raises InputError for profiles that are none.
     """
     name = case or next(iter(scene.cases))
     held, yaw, contacts = scene.contact(scene.cases[name]), scene.cases[name].yaw, Contacts()
@@ -75,15 +85,48 @@ def run(
         begun = time.process_time()
         try:
             contacts.placed.append(held.at(shift, yaw * shift))
-        except (InputError, RunFailed) as error:
-            deep = isinstance(error, InputError) and error.place in TOO_DEEP
+        except (InputError, RunFailed) as failure:
+            deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
             contacts.failed[1e3 * shift] = (
                 f"a load of {held.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
                 if deep
-                else str(error)
+                else str(failure)
             )
         contacts.seconds.append(time.process_time() - begun)
-    return _labelled(scene, name, contacts)
+    labelled = judged(_labelled(scene, name, contacts), assumptions(scene, scene.cases[name].friction))
+    return _with_error(labelled, scene, held) if error and contacts.placed else labelled
+
+
+def _with_error(run: Result, scene: WheelRailScene, held: Contact) -> Result:
+    """The result with what the cells leave, as the root mean square over both wheels and every other position.
+
+    Half the cells are of first order: what they change is what the cells leave. Shares are of the root mean square.
+    """
+    fine, coarse = list[Placed](), list[Placed]()
+    for placed in run.detail.placed[::EVERY]:
+        with suppress(InputError, RunFailed):
+            coarse.append(replace(held, coarser=2.0 * held.coarser).at(placed.shift, placed.yaw))
+            fine.append(placed)
+    if not coarse:
+        return not_estimated(run, "no position is found on half the cells")
+    of_fine, of_coarse = (np.array([sums(placed) for placed in each]) for each in (fine, coarse))
+    errors, sizes = (np.sqrt(np.mean(values**2, axis=(0, 1))) for values in (of_fine - of_coarse, of_fine))
+    told = {
+        name: by_cells(float(error), float(size), unit, scene.method.cells, 1.0, MOST_CELLS)
+        for (name, unit), error, size in zip(SUMS.items(), errors, sizes, strict=True)
+    }
+    return stated(run, told, f"half the cells at {len(fine)} of {len(run.detail.placed)} positions")
+
+
+def sums(placed: Placed) -> np.ndarray:
+    """``SUMS`` (2, 5) of the right and the left wheel over their patches, and the largest pressure."""
+    return np.array(
+        [
+            [*(sum(getattr(place, name) for place in wheel) for name in ("normal", "area", "fx", "fy")), peak]
+            for wheel in (placed.right, placed.left)
+            for peak in [max(place.peak for place in wheel)]
+        ]
+    )
 
 
 def _labelled(scene: WheelRailScene, case: str, contacts: Contacts) -> Result:

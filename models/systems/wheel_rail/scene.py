@@ -11,9 +11,12 @@ from models.contact.material import Pair
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile, checked
 from models.core.strict import Strict, quantity
-from models.rail.contact_table import Contact
+from models.rail.contact_table import CELLS, Contact
 from models.rail.laid_profiles import Profiles
 from models.systems.contact.scene import Bodies
+
+MOST_CELLS = 300
+"""Of creep forces along each axis."""
 
 
 class HeldWheelset(Strict):
@@ -45,6 +48,14 @@ class Case(Strict):
     )
 
 
+class Method(Strict):
+    """[method]: how finely contacts are computed."""
+
+    cells: int = Field(
+        default=CELLS, ge=9, le=MOST_CELLS, description="along each axis of a patch, more on normal pressures"
+    )
+
+
 class WheelRailScene(SceneFile):
     """One scene of a held wheelset: every case at every position."""
 
@@ -54,13 +65,19 @@ class WheelRailScene(SceneFile):
     profiles: Profiles = Profiles()
     wheelset: HeldWheelset = HeldWheelset()
     positions: Positions = Positions()
+    method: Method = Method()
     cases: dict[str, Case] = Field(min_length=1, description="tables [cases.NAME] with yaw and friction")
 
     def contact(self, case: Case) -> Contact:
         """Profiles, track and wheelset in touch; raises InputError for files that are no profiles."""
         side = self.profiles.side(self.wheelset.radius)
         return Contact(
-            side, self.wheelset.load, self.wheelset.speed, case.friction, Pair(self.bodies.wheel, self.bodies.rail)
+            side,
+            self.wheelset.load,
+            self.wheelset.speed,
+            case.friction,
+            Pair(self.bodies.wheel, self.bodies.rail),
+            CELLS / self.method.cells,
         )
 
 

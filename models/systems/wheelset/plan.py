@@ -1,9 +1,11 @@
 """What a scene of a wheelset will compute: printed by ``twinrig show``, checked before any run."""
 
+from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.scene_effects import lines as effect_lines
 from models.rail.linear import critical_or_why, klingel
 from models.rail.wheelset import Wheelset
+from models.systems.wheelset.assumptions import assumptions, of_linear
 from models.systems.wheelset.of_scene import equations_of, path_speeds, wheelset_of
 from models.systems.wheelset.scene import WheelsetScene
 
@@ -46,7 +48,13 @@ def describe(scene: WheelsetScene) -> str:
         f"steps of {run.step:g} s, from {1e3 * run.displacement:g} mm and {run.yaw:g} rad",
     }
     told = [f"  {head:<10} {text}" for head, text in lines.items()]
-    return "\n".join([scene.title, *told, *effect_lines(scene), "", *ENGINES])
+    return "\n".join([scene.title, *told, *effect_lines(scene), *_assumed(scene), "", *ENGINES])
+
+
+def _assumed(scene: WheelsetScene) -> list[str]:
+    """What paths and eigenvalues take for granted."""
+    equations = equations_of(scene, "reference", path_speeds(scene)[0])
+    return assumption_lines([*assumptions(equations), *of_linear(equations.wheelset)])
 
 
 def _wheels(wheelset: Wheelset) -> str:

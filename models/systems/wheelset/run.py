@@ -1,23 +1,29 @@
 """What is computed of a scene of a wheelset: paths, its linearisation over the speeds, the branch of limit cycles."""
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from models.contact.accuracy import halved
+from models.core.assumptions import judged
+from models.core.discretisation import Estimate, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, joined, result
+from models.core.told import gathered
 from models.rail import wheel_forces as wf
-from models.rail.doubts import doubts
-from models.rail.eigenvalues import growth, hunting, locus, wavelength
+from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, Path, Y, Z
-from models.rail.limit_cycle import Orbit, attained, beside, bifurcation, refined, solved
+from models.rail.limit_cycle import Orbit, Unknown, attained, beside, bifurcation, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_or_why
+from models.systems.wheelset.assumptions import assumptions, of_branch, of_linear
 from models.systems.wheelset.of_scene import BESIDE, equations_of, implementation, path_speeds, started, wheelset_of
 from models.systems.wheelset.scene import WheelsetScene
+from models.systems.wheelset.stated_error import FEWEST, with_error, with_error_of_cycles
 
 STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
 CONTACTS = {
@@ -28,6 +34,9 @@ CONTACTS = {
     "power": (wf.POWER, "W"),
 }
 """What is saved of every path, with its place and unit."""
+SPEED: Unknown = "speed"
+AMPLITUDE: Unknown = "amplitude"
+"""What is sought of a cycle: along a branch, and at a speed."""
 ORBIT = {
     "speed": "m/s",
     "amplitude": "m",
@@ -39,9 +48,10 @@ ORBIT = {
 """What is saved of every limit cycle of a branch, with its unit."""
 
 
-def run(scene: WheelsetScene, engine: str, speed: float | None = None) -> Result:
+def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error: bool = False) -> Result:
     """The path at a speed (m/s), the first of the scene's if none is given; the detail is its ``Path``.
 
+    error : whether the error of steps and cells is estimated, by further paths. What the path assumes is judged always.
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
     """
     speed = path_speeds(scene)[0] if speed is None else speed
@@ -49,7 +59,8 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None) -> Result
     begun = time.process_time()
     motion = path(scene, engine, speed)
     seconds = time.process_time() - begun
-    return _labelled(scene, engine, motion, seconds=seconds, doubts=doubts(equations, motion))
+    labelled = judged(_labelled(scene, engine, motion, seconds=seconds), assumptions(equations))
+    return with_error(labelled, scene, lambda other: path(other, engine, speed)) if error else labelled
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> Path:
@@ -70,9 +81,15 @@ def _labelled(scene: WheelsetScene, engine: str, motion: Path, **more: Any) -> R
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Paths by engine and speed (m/s) as one result over engine, speed and time."""
-    whole = joined({engine: joined(results, "speed") for engine, results in paths.items()}, "engine")
+    each = {engine: gathered(joined(own, "speed"), at_speeds(own)) for engine, own in paths.items()}
+    whole = gathered(joined(each, "engine"), each)
     whole.data["speed"].attrs["units"] = "m/s"
     return whole
+
+
+def at_speeds(results: Mapping[Any, Result]) -> dict[str, Result]:
+    """Results of one engine by what tells them apart in words."""
+    return {f"{speed:g} m/s": result for speed, result in results.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +109,11 @@ class Linear:
         return hunting(self.values)
 
 
-def linearised(scene: WheelsetScene, engine: str) -> Result:
-    """Eigenvalues over the scene's speeds with linear creep; the detail is ``Linear``."""
+def linearised(scene: WheelsetScene, engine: str, *, error: bool = False) -> Result:
+    """Eigenvalues over the scene's speeds with linear creep; the detail is ``Linear``.
+
+    error : whether that of the differences that linearise is told, at the last speed.
+    """
     kind, wheelset, speeds = implementation(engine), wheelset_of(scene), scene.speeds.all()
     linear = Linear(
         speeds,
@@ -105,32 +125,60 @@ def linearised(scene: WheelsetScene, engine: str) -> Result:
         name: Channel(("speed", "eigenvalue"), part, "1/s")
         for name, part in (("real", linear.values.real), ("imag", linear.values.imag))
     }
-    return result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
+    labelled = result(scene, channels, {"speed": Channel("speed", speeds, "m/s")}, engine=engine, detail=linear)
+    judged(labelled, of_linear(wheelset))
+    left = uncertainty(kind, wheelset, float(speeds[-1])) if error else math.nan
+    if math.isfinite(left):
+        told = Estimate(left, "1/s", left / abs(linear.hunting[-1]), 4.0, 1.0)
+        stated(
+            labelled, {"hunting eigenvalue": told}, "differences over twice the way at the last speed", "times the way"
+        )
+    return labelled
 
 
-def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None) -> Result:
+def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None, *, error: bool = False) -> Result:
     """Limit cycles by rising amplitude within the scene's speeds, by the written equations; the detail are its orbits.
 
     Where no branch begins because nothing is stable, cycles that motions reach at these speeds. Why it ends or never
-    begins is a doubt. told : called with the number of cycles after each.
+    begins is a doubt. told : called with the number of cycles after each; error : whether one is solved on half the
+    cells, too, which tells the error of cells.
     """
-    speeds, orbits, why = scene.speeds.all(), list[Orbit](), list[str]()
+    speeds, orbits, why, unknown = scene.speeds.all(), list[Orbit](), list[str](), SPEED
     equations = equations_of(scene, "reference", float(speeds[-1]))
     try:
         for orbit in bifurcation(equations, float(speeds.min()), float(speeds.max()), scene.run.step):
             orbits.append(orbit)
             told(len(orbits))
-    except NoCriticalSpeed as error:
-        why = [f"no branch begins: the wheelset {error.allowed}"]
-        reached = (_attained(scene, float(speed)) for speed in speeds) if error.unstable else ()
+    except NoCriticalSpeed as none:
+        why, unknown = [f"no branch begins: the wheelset {none.allowed}"], AMPLITUDE
+        reached = (_attained(scene, float(speed)) for speed in speeds) if none.unstable else ()
         orbits = [refined(orbit, "amplitude") for orbit in reached if orbit is not None]
-    except RunFailed as error:
-        why = [f"the branch is followed no further: {error.reason}"]
+    except RunFailed as failure:
+        why = [f"the branch is followed no further: {failure.reason}"]
     channels = {
         name: Channel("cycle", np.array([getattr(orbit, name) for orbit in orbits]), unit)
         for name, unit in ORBIT.items()
     }
-    return result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
+    labelled = result(scene, channels, {}, engine="reference", doubts=why, detail=orbits)
+    judged(labelled, of_branch(equations.wheelset))
+    if error and orbits:
+        middle = len(orbits) // 2
+        coarse = _on_half_the_cells(scene, orbits[middle], unknown)
+        with_error_of_cycles(labelled, orbits, {} if coarse is None else {middle: coarse}, unknown, scene.contact.cells)
+    return labelled
+
+
+def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> Orbit | None:
+    """The same cycle on half the cells, in twice the step; None where none is found."""
+    if scene.contact.cells < FEWEST:
+        return None
+    coarse = replace(orbit, steps=orbit.steps // 2)
+    try:
+        return solved(
+            beside(coarse, replace(orbit.equations, cells=halved(scene.contact.cells))), unknown, precise=False
+        )
+    except RunFailed:
+        return None
 
 
 def _attained(scene: WheelsetScene, speed: float) -> Orbit | None:
@@ -143,10 +191,13 @@ def cycle_speed(scene: WheelsetScene, orbits: Sequence[Orbit]) -> float:
     return min(last, round(BESIDE[1] * orbits[0].speed, 2)) if orbits else last
 
 
-def cycles(scene: WheelsetScene, engines: Sequence[str], speed: float) -> tuple[dict[str, Result], dict[str, str]]:
+def cycles(
+    scene: WheelsetScene, engines: Sequence[str], speed: float, *, error: bool = False
+) -> tuple[dict[str, Result], dict[str, str]]:
     """One period of the refined limit cycle at a speed (m/s) by every engine, and why some have none.
 
-    Each engine finds it from a guess that is off. The details are the orbits. None of both where the motion dies out.
+    error : whether each is solved on half the cells, too, which tells the error of cells. Each engine finds it from a
+    guess that is off. The details are the orbits. None of both where the motion dies out.
     """
     results, failed = dict[str, Result](), dict[str, str]()
     first = _attained(scene, speed)
@@ -155,10 +206,18 @@ def cycles(scene: WheelsetScene, engines: Sequence[str], speed: float) -> tuple[
     for engine in engines:
         try:
             guess = beside(first, equations_of(scene, engine, speed))
-            orbit = refined(solved(guess, "amplitude", precise=False), "amplitude")
-        except RunFailed as error:
-            failed[engine] = str(error)
-            continue
-        data = over_speeds({engine: {orbit.speed: _labelled(scene, engine, orbit.path())}}).data
-        results[engine] = Result(data, orbit)
+            orbit = refined(solved(guess, AMPLITUDE, precise=False), AMPLITUDE)
+            results[engine] = _one_period(scene, engine, orbit, error)
+        except RunFailed as failure:
+            failed[engine] = str(failure)
     return results, failed
+
+
+def _one_period(scene: WheelsetScene, engine: str, orbit: Orbit, error: bool) -> Result:
+    """A cycle as a result over its period, whose detail is the orbit."""
+    labelled = judged(_labelled(scene, engine, orbit.path()), assumptions(orbit.equations))
+    period = Result(over_speeds({engine: {orbit.speed: labelled}}).data, orbit)
+    if not error:
+        return period
+    coarse = _on_half_the_cells(scene, orbit, AMPLITUDE)
+    return with_error_of_cycles(period, [orbit], {} if coarse is None else {0: coarse}, AMPLITUDE, scene.contact.cells)

@@ -20,6 +20,10 @@ LARGEST_SHIFT, LARGEST_YAW = 0.02, 0.05
 """m, rad: beyond, no wheelset stands on its rails."""
 
 
+MOST_CELLS = 200
+"""Of FASTSIM, along each strip."""
+
+
 class WheelsetTable(Strict):
     """[wheelset]: a parameter set or the user's own file, with overrides."""
 
@@ -31,7 +35,7 @@ class Creep(Strict):
     """[contact]: the law of creep forces on every path; linearisation and critical speed have the linear law."""
 
     law: Literal["linear", "fastsim"] = Field(default="fastsim", description="Kalker's linear theory, or FASTSIM")
-    cells: int = Field(default=11, ge=3, le=200, description="of FASTSIM, along each strip")
+    cells: int = Field(default=11, ge=3, le=MOST_CELLS, description="of FASTSIM, along each strip")
 
 
 class RunTable(Strict):

@@ -15,7 +15,7 @@ def answer(scene: ContactScene, engine: str) -> Answer:
     """Press the bodies and roll them at every creepage."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
-    forces = run(scene, errors=False)
+    forces = run(scene, error=False)
     quantities = {name: Quantity(forces.data[name].attrs["units"], (forces[name],)) for name in QUANTITIES}
     return Answer(quantities, forces.counts(), forces.seconds)
 

@@ -1,0 +1,326 @@
+"""What a braked vehicle on its road takes for granted.
+
+Limits without a source are chosen: where what is left out would change a stopping distance by some per cent.
+"""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from models.brake.plane_vehicle import GRAVITY, Truck
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.systems.braking.errors import SMOOTH
+from models.systems.braking.march import Braked
+from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
+
+PRESSES = 1.0
+"""N: a wheel that bears less has left the road."""
+MOVED = 0.3
+"""Of the load of a wheel at rest: by more, another axle locks first."""
+STEEREST = 0.25
+"""rad: inner and outer wheel of a truck are steered apart by 2 deg there, a third of the slip angle of most grip."""
+BENT = 1.0
+"""rad: at 57 deg the corners of truck and trailer, or the drawbar and the frame, are usually in contact."""
+HOOK, LIFTED = 0.9, 0.1
+"""m, height of a usual hook above the ground; share of an axle's load that its force may move."""
+LEAN = 0.12
+"""rad: at 7 deg usual springs, 1 m apart, have used 60 mm, and stand on their stops."""
+QUICK = 100.0
+"""bar/s: fastest filling of air chambers, 6 bar in 0.06 s."""
+HOT = 4e6
+"""J: what 40 kg of drum or disc take up in 200 K, by which linings begin to fade."""
+DRAG, AIR, LOST = 0.6, 1.2, 0.1
+"""Drag coefficient of a box, density (kg/m^3), share of the kinetic energy that the air may take."""
+TIMES = 3.0
+"""By which factor a load may be above that of friction which is known at one load only."""
+FULL_CIRCLE = 1.5
+"""rad: tables that go on to here know every slip angle."""
+CORNERING = 1e-3
+"""rad of slip angle: below, tyres have no side force to mistake."""
+
+
+def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
+    """What a procedure takes for granted, of the vehicle that is ready for it."""
+    parts = (_of_loads(scene), _of_bodies(scene, vehicle), _of_tyres(scene, vehicle), _of_brakes(scene, procedure))
+    return [*chain.from_iterable(parts), *_of_drive(scene, vehicle)]
+
+
+def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
+    """Of a plane vehicle; springs carry their loads as they are."""
+    if scene.vehicle.file is not None:
+        return
+    if scene.load_transfer is None:
+        yield Assumption(
+            "loads at rest",
+            "braking and cornering move little load between the wheels",
+            "name the effect load_transfer",
+            partial(_moved, scene),
+            "of the load at rest",
+            most=MOVED,
+        )
+    else:
+        yield Assumption(
+            "wheels on the road",
+            "every wheel stays on the road, as the body in the plane does not roll",
+            "use a vehicle on its suspension, vehicle.file",
+            lambda run: _of_wheels(run["load"]),
+            "N",
+            least=PRESSES,
+        )
+
+
+def _moved(scene: BrakingScene, run: Result) -> Watched:
+    """Shares of load that accelerations of the truck would move, as its height has them, along and across."""
+    states, times = run.detail.states, run.detail.times
+    rates = np.diff(states[:, 1, :2], axis=0) / np.maximum(np.diff(times), 1e-9)[:, None]
+    heading = states[1:, 0, 2]
+    ahead = np.abs(rates[:, 0] * np.cos(heading) + rates[:, 1] * np.sin(heading))
+    aside = np.abs(rates[:, 1] * np.cos(heading) - rates[:, 0] * np.sin(heading))
+    bodies = {"truck": vehicle_of(scene), "trailer": scene.trailer}
+    return {name: _begun(_of_body(body, ahead, aside)) for name, body in bodies.items() if body is not None}
+
+
+def _of_body(body: Truck, ahead: np.ndarray, aside: np.ndarray) -> np.ndarray:
+    lever = max(1.0 / body.front.x, -1.0 / body.rear.x)  # of the axle that bears less
+    track = min(body.front.track, body.rear.track)
+    return body.height / GRAVITY * (ahead * lever + 2.0 * aside / track)
+
+
+def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+    """Of the truck's course, its train and its springs."""
+    yield Assumption(
+        "forwards",
+        "the vehicle moves forwards",
+        "name the effect anti_lock, or brake the rear axle less: the vehicle spins",
+        lambda run: {"vehicle": Stop(run.detail).side_slip},
+        "rad",
+        -math.pi / 2,
+        math.pi / 2,
+    )
+    if scene.trailer is not None:
+        if "fold" not in scene.trailer.model_fields_set:
+            yield Assumption(
+                "hitch",
+                "truck, drawbar and trailer do not touch",
+                "give trailer.fold, the angle at which they do: the run then ends there",
+                _hinges,
+                "rad",
+                -BENT,
+                BENT,
+            )
+        yield Assumption(
+            "low hook",
+            "the hook's force moves little load, though it acts at the ground",
+            "balance brakes.trailer with those of the truck",
+            partial(_by_hook, scene),
+            "of an axle's load",
+            most=LIFTED,
+        )
+    if vehicle.sprung is not None and any(spring.travel_force is None for spring in _springs(vehicle)):
+        yield Assumption(
+            "travel",
+            "springs do not reach their stops",
+            "give all springs of vehicle.file a travel_force with their stops",
+            _lean,
+            "rad",
+            -LEAN,
+            LEAN,
+        )
+
+
+def _springs(vehicle: Braked) -> tuple[Any, ...]:
+    return tuple(vehicle.sprung.handling.vehicle.springs)
+
+
+def _hinges(run: Result) -> Watched:
+    bends = np.diff(run.detail.states[:, 0, 2:], axis=1)
+    return dict(zip(("drawbar against the truck", "trailer against the drawbar"), bends.T, strict=True))
+
+
+def _by_hook(scene: BrakingScene, run: Result) -> Watched:
+    """Share of the load of the trailer's lighter axle that the truck's pull moves: by the truck's balance along it."""
+    trailer, path = scene.trailer, run.detail
+    assert trailer is not None
+    heading, slowed = path.states[1:, 0, 2], np.diff(path.states[:, 1, :2], axis=0)
+    along = slowed[:, 0] * np.cos(heading) + slowed[:, 1] * np.sin(heading)
+    pull = run["force_x"][1:, :4].sum(axis=1) - vehicle_of(scene).mass * along / np.maximum(np.diff(path.times), 1e-9)
+    span = trailer.wheelbase
+    lighter = trailer.mass * GRAVITY * min(trailer.front.x, -trailer.rear.x) / span
+    share = np.abs(pull) * HOOK / span / lighter
+    return {"hook": _begun(np.where(Stop(path).speed[1:] > SLOWEST, share, np.nan))}
+
+
+def _lean(run: Result) -> Watched:
+    lean = Stop(run.detail).lean
+    assert lean is not None
+    return dict(zip(("roll", "pitch"), lean.T, strict=True))
+
+
+def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+    """Of the tables of friction and of the slip angles by which they are read."""
+    tables = tables_of(scene).values()
+    largest = min(table.loads[-1] * (TIMES if table.loads.size == 1 else 1.0) for table in tables)
+    yield Assumption(
+        "loads of the friction",
+        "friction is known at the loads that wheels bear",
+        "give tyres.files with tables up to larger loads",
+        lambda run: _of_wheels(run["load"]),
+        "N",
+        most=float(largest),
+    )
+    widest = min(float(table.angles[-1]) for table in tables)
+    if widest < FULL_CIRCLE:
+        yield Assumption(
+            "slip angles of the friction",
+            "friction is known at the slip angles of the tyres",
+            "give tyres.files with tables up to larger slip angles",
+            lambda run: _of_wheels(_fast(run, np.abs(run["slip_angle"]))),
+            "rad",
+            most=widest,
+        )
+    if scene.relaxation is not None or vehicle.sprung is not None:
+        yield Assumption(
+            "slip at low speed",
+            f"steps resolve slip angles above {SLOWEST:g} m/s",
+            "raise run.substeps",
+            partial(_regular, vehicle),
+            "m/s of least speed",
+            most=SLOWEST,
+        )
+
+
+def _regular(vehicle: Braked, run: Result) -> Watched:
+    """Speed (m/s) below which steps mistake slip angles, at the times when there are some."""
+    lively = GRAVITY if vehicle.sprung is None else vehicle.engine.liveliness
+    least = vehicle.slope * lively * vehicle.sample / vehicle.substeps
+    angles = np.nanmax(np.nan_to_num(np.abs(run["slip_angle"])), axis=1)
+    return {"vehicle": np.where((angles > CORNERING) & (Stop(run.detail).speed < least), least, np.nan)}
+
+
+def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
+    """Of pressures, torques and what brings them about."""
+    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in SMOOTH
+    if sets_valves and scene.pressure is None:
+        yield Assumption(
+            "chambers",
+            "chambers fill as fast as air flows",
+            "name the effect pressure_dynamics, [pressure]",
+            lambda run: _of_wheels(_begun(np.diff(run["pressure"], axis=0) / scene.run.sample)),
+            "bar/s",
+            most=QUICK,
+        )
+    if port is not None:
+        yield Assumption(
+            "supply",
+            "no brake has more pressure than the supply",
+            "raise brakes.supply, or lower gain, offset and noise of port.pressures",
+            lambda run: _of_wheels(run["pressure"]),
+            "bar",
+            most=scene.brakes.supply * (1.0 + 1e-9),
+        )
+    if port is not None and port.signals.range is not None:
+        yield Assumption(
+            "range of the signals",
+            "wheel speeds are within the range of their converter",
+            "raise port.signals.range",
+            lambda run: _of_wheels(np.abs(run["turning"]) * radii(scene, run)),
+            "m/s",
+            most=port.signals.range,
+        )
+    measured = measured_of(scene, procedure, 4 if scene.trailer is None else 8)
+    if measured is not None:
+        yield Assumption(
+            "measured pressures",
+            "pressures were measured until the end",
+            "measure longer, or end before by run.duration",
+            lambda run: {"time": run.times},
+            "s",
+            most=float(measured.times[-1]) + scene.run.sample,
+        )
+    yield Assumption(
+        "cool brakes",
+        "brakes stay so cool that their torque does not fade",
+        "brake from less speed, or spread the torque: no effect knows fading",
+        _heat,
+        "J",
+        most=HOT,
+    )
+
+
+def radii(scene: BrakingScene, run: Result) -> np.ndarray:
+    """Radius (W,) of each wheel in m."""
+    bodies = [body for body in (vehicle_of(scene), scene.trailer) if body is not None]
+    return np.array([axle.radius for body in bodies for axle in (body.front, body.rear) for _ in range(2)])
+
+
+def _heat(run: Result) -> Watched:
+    """Work (n, W) of the brakes so far."""
+    power = run["torque"] * np.abs(run["turning"])
+    steps = np.diff(run.times)[:, None] * 0.5 * (power[1:] + power[:-1])
+    return _of_wheels(np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0))))
+
+
+def _of_drive(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
+    """Of the driver, the air and the end."""
+    yield Assumption(
+        "parallel steering",
+        "both front wheels are steered alike",
+        "steer less: no effect has wheels that are steered apart",
+        partial(_steer, vehicle),
+        "rad",
+        -STEEREST,
+        STEEREST,
+    )
+    yield Assumption(
+        "still air",
+        "the air takes little of the vehicle's energy",
+        "brake from less speed: no effect adds the air's drag",
+        partial(_air, scene),
+        "of the kinetic energy",
+        most=LOST,
+    )
+    yield Assumption(
+        "stop",
+        "the vehicle stands at the end",
+        "raise run.duration",
+        lambda run: {"vehicle": np.zeros(1) if run.detail.stands else Stop(run.detail).speed[-1:]},
+        "m/s",
+        most=0.0,
+    )
+
+
+def _steer(vehicle: Braked, run: Result) -> Watched:
+    if vehicle.steering is None:
+        return {"front wheels": np.full(1, vehicle.steer[0])}
+    return {"front wheels": np.array([vehicle.steering(float(time))[0] for time in run.times])}
+
+
+def _air(scene: BrakingScene, run: Result) -> Watched:
+    """Work of the drag on a box as wide as the track and twice as high as the centre of mass, by the first energy."""
+    truck, stop = vehicle_of(scene), Stop(run.detail)
+    mass = truck.mass + (0.0 if scene.trailer is None else scene.trailer.mass + scene.trailer.drawbar_mass)
+    drag = 0.5 * AIR * DRAG * truck.front.track * 2.0 * truck.height
+    work = float(np.sum(drag * stop.speed[:-1] ** 2 * np.diff(stop.way)))
+    return {"vehicle": np.full(1, work / (0.5 * mass * stop.speed[0] ** 2))}
+
+
+def _of_wheels(values: np.ndarray) -> Watched:
+    """Columns (n, W) by the wheels' names."""
+    return dict(zip(WHEELS, values.T, strict=False))
+
+
+def _fast(run: Result, values: np.ndarray) -> np.ndarray:
+    """Values (n, W) of a vehicle that moves, others no numbers."""
+    return np.where(Stop(run.detail).speed[:, None] > SLOWEST, values, np.nan)
+
+
+def _begun(values: np.ndarray) -> np.ndarray:
+    """Values (n, ...) of the samples before all rows but the first."""
+    return np.concatenate((np.full((1, *values.shape[1:]), np.nan), values))

@@ -1,0 +1,188 @@
+"""How far its steps leave a stop from that of steps without length, where that can be told.
+
+The sample of the controller belongs to the scene: only the steps within it become fewer. While two runs switch alike,
+the error falls with the step (Richardson). A controller of valves may switch at other samples in other steps; from
+there on runs are draws of one scatter, and there is no number: ensembles tell what such stops have in common. Whether
+shorter steps would do so, the controller itself tells: it is asked again, with signals that are as far from those of
+the run as those in longer steps, to the other side.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from models.core.discretisation import LEAST_ORDER, ROUNDING, Estimate, not_estimated, rescaled, size_of, stated
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.systems.braking.march import Path
+from models.systems.braking.scene import BrakingScene
+from models.systems.braking.stop_report import Stop
+
+ORDER, CAREFUL = 2.0, 1.0
+"""Of the steps, and what is taken for it where two runs cannot tell."""
+WINDOW, FINE_WINDOW = 0.4, 0.3
+"""Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
+LATER = 1.1
+"""Times of the stop, until which another run may take to stand."""
+ALIKE = 0.01
+"""Rms of the difference of the pressures by their deviation, up to which two runs have switched alike."""
+DISTANCE = "stopping distance"
+UNITS = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", DISTANCE: "m"}
+"""Of what is told."""
+LEAST = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
+"""m, rad: errors of a course that moves by less are shares of this."""
+SMOOTH = ("none", "slip_pi")
+"""Controllers that switch no valves to and fro."""
+ASKED_ONCE = "what stands behind the port answers one run alone"
+SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
+LONGER = "the controller switches at other samples in longer steps; the study braking_ensemble tells the scatter"
+SHORTER = "in shorter steps the controller may switch at other samples; the study braking_ensemble tells the scatter"
+"""Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
+distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 45 that did, 7 were near to
+switching otherwise; among them 5 of the 6 whose true pressures were others."""
+
+
+class OtherRuns(NamedTuple):
+    """again : the same stop with so many steps to a sample, up to a time (s), which raises InputError or RunFailed;
+    answered : what the controller says to speeds of turning (n - 1, W) in rad/s and of the vehicle (n - 1,) in m/s at
+    the samples of a run."""
+
+    again: Callable[[int, float], Path]
+    answered: Callable[[Path, np.ndarray, np.ndarray], np.ndarray]
+
+
+Channels = dict[str, np.ndarray]
+
+
+def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
+    """The stop with the errors of its motion and of its distance, or with the reason why there is no number.
+
+    Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
+    """
+    path, steps = run.detail, scene.run.substeps
+    valves = switched(scene, path)
+    if not repeatable(scene) or (valves and steps == 1):
+        return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
+    try:
+        paths = _others(path, steps, other.again)
+    except (InputError, RunFailed) as error:
+        return not_estimated(run, f"other steps end the run: {error}")
+    step = scene.run.sample / steps
+    if steps == 1:
+        return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
+    if valves and not alike(path, paths[0]):
+        return not_estimated(run, LONGER)
+    if valves and near(path, paths[0], other):
+        return not_estimated(run, SHORTER)
+    return stated(run, _by_fewer(path, steps, paths, step), "runs in longer steps")
+
+
+def repeatable(scene: BrakingScene) -> bool:
+    """Whether the stop can be run again: not where a client connects once, a log is played or a clock is kept to."""
+    port = scene.port
+    return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
+
+
+def switched(scene: BrakingScene, path: Path) -> bool:
+    """Whether pressures have fallen that a controller sets by valves, or that something unknown sets."""
+    known = scene.measured is not None or (scene.port is None and scene.controller.kind in SMOOTH)
+    return not known and bool((np.diff(path.pressures, axis=0) < 0.0).any())
+
+
+def alike(path: Path, other: Path) -> bool:
+    """Whether two runs have switched alike."""
+    pressures = _at(path.times, other, other.pressures)
+    return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
+
+
+def near(path: Path, longer: Path, other: OtherRuns) -> bool:
+    """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps."""
+    times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
+    turning, speed = path.turning[:-1], speeds[0][:-1]
+    shifted = 2.0 * turning - _at(times, longer, longer.turning)
+    faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
+    said, beside = (other.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
+    return not np.array_equal(said, beside)
+
+
+def channels(path: Path, times: np.ndarray) -> Channels:
+    """Motion at times (n,) in s, after its end as it was there."""
+    places, rates = path.states[:, 0], path.states[:, 1]
+    motion = {"x": places[:, 0], "y": places[:, 1], "yaw": places[:, 2], "speed": np.hypot(rates[:, 0], rates[:, 1])}
+    if "heading_1" in path.coordinates:
+        motion["hitch"] = places[:, 3] - places[:, 2]
+    return {name: np.interp(times, path.times, values) for name, values in motion.items()}
+
+
+def whole(path: Path, times: np.ndarray) -> Channels:
+    """Motion, and the stopping distance (1,) of a run that stands."""
+    return channels(path, times) | ({DISTANCE: Stop(path).way[-1:]} if path.stands else {})
+
+
+def _others(path: Path, steps: int, again: Callable[[int, float], Path]) -> list[Path]:
+    """Runs with half of the steps, and over a part with a quarter of them; of a single one, with two over a part."""
+    last = float(path.times[-1])
+    if steps == 1:
+        return [again(2, FINE_WINDOW * last)]
+    first = again(steps // 2, LATER * last if path.stands else last)
+    return [first, again(steps // 4, WINDOW * last)] if steps >= 4 and alike(path, first) else [first]
+
+
+def _by_fewer(path: Path, steps: int, others: list[Path], step: float) -> dict[str, Estimate]:
+    """By half and a quarter of the steps; the stopping distance errs by no less than the motion along the road."""
+    fine, coarse, counts = whole(path, path.times), whole(others[0], path.times), [steps, steps // 2, steps // 4]
+    part = path.times[path.times <= others[-1].times[-1]]
+    seen = [channels(run, part) for run in (path, *others)]
+    told = dict[str, Estimate]()
+    for name in [name for name in fine if name in coarse]:
+        order = CAREFUL
+        if len(others) > 1 and name != DISTANCE:
+            gaps = [_rms(one[name] - two[name]) for one, two in itertools.pairwise(seen)]
+            order = observed(gaps[0], gaps[1], counts)
+        error = _rms(fine[name] - coarse[name]) / ((counts[0] / counts[1]) ** order - 1.0)
+        least = told["x"].error if name == DISTANCE else 0.0
+        told[name] = _estimate(name, fine[name], max(error, least), order, step)
+    return told
+
+
+def observed(fine: float, coarse: float, counts: list[int]) -> float:
+    """Order, up to ORDER, with which differences of neighbouring runs fall, of steps so many to a sample."""
+    if not (fine > 0.0 and coarse > 0.0):
+        return CAREFUL
+    orders = np.linspace(LEAST_ORDER, ORDER, 61)
+    errors = [float(count) ** -orders for count in counts]
+    ratios = np.log((errors[2] - errors[1]) / (errors[1] - errors[0]))
+    return float(orders[np.argmin(np.abs(ratios - math.log(coarse / fine)))])
+
+
+def _by_twice(path: Path, other: Path, step: float) -> dict[str, Estimate]:
+    """By twice as many steps over the first part, whose share of error is taken for that of the whole."""
+    part = path.times <= other.times[-1]
+    fine, finer, told = channels(path, path.times), channels(other, path.times[part]), {}
+    for name, values in fine.items():
+        size, seen = _size(name, values), _size(name, values[part], FINE_WINDOW)
+        error = _rms(values[part] - finer[name]) * 2.0**CAREFUL / (2.0**CAREFUL - 1.0)
+        told[name] = _estimate(name, values, error * size / seen if seen > 0.0 else 0.0, CAREFUL, step)
+    return told
+
+
+def _at(times: np.ndarray, path: Path, values: np.ndarray) -> np.ndarray:
+    """Columns (n, W) of a run at times (m,) in s."""
+    return np.column_stack([np.interp(times, path.times, column) for column in values.T])
+
+
+def _size(name: str, values: np.ndarray, part: float = 1.0) -> float:
+    """What errors are shares of; what a part of a run moves by is small in proportion."""
+    return max(size_of(values), part * LEAST.get(name, 0.0))
+
+
+def _estimate(name: str, values: np.ndarray, error: float, order: float, step: float) -> Estimate:
+    rounding = ROUNDING * float(np.abs(values).max(initial=0.0)) * math.sqrt(len(values))
+    return rescaled(Estimate(max(error, rounding), UNITS[name], 0.0, order, step), _size(name, values), step)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

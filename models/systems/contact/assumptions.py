@@ -1,0 +1,196 @@
+"""What the theories of one rolling contact take for granted."""
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from models.contact.accuracy import SLENDER
+from models.contact.limits import CONSTANT_FRICTION, HALF_SPACE, NO_SLIP, SMALL_CREEPAGE, YIELDS, yields
+from models.contact.theories import Contact, Fastsim, Linear, OnEllipse, OnPatches
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.core.tables import METRES, blocks
+from models.systems.contact.cases_table import BY_AXES, BY_CURVATURES
+from models.systems.contact.scene import ContactScene
+
+ALIKE = 0.02
+"""Of mu N: what it may cost to leave out that two bodies differ."""
+
+
+def assumptions(scene: ContactScene, body: Contact) -> list[Assumption]:
+    """What the scene's theory takes for granted of its contact."""
+    listed = [*of_pressing(scene, body), *_creepages(body)]
+    if isinstance(body, Linear):
+        listed.append(_no_slip(lambda run: {"contact": _used(run, body)}))
+    if isinstance(body, Linear | Fastsim):
+        listed.append(_slender(lambda run: {"contact": np.array([body.a / body.b])}))
+    if body.pair.mismatch != 0.0 and body.friction > 0.0:
+        listed.append(_alike(body))
+    return listed
+
+
+def of_pressing(scene: ContactScene, body: Contact) -> list[Assumption]:
+    """What is taken for granted of bodies that are pressed together, whether they roll or not."""
+    listed = [_half_space(_by_radii(scene, body))]
+    if yields(scene.bodies.wheel, scene.bodies.rail):
+        listed.append(_elastic(lambda run: {"contact": np.array([1e-6 * body.pressing.peak])}))
+    return listed + (_on_profiles(body) if scene.profiles is not None and isinstance(body, OnPatches) else [])
+
+
+def of_rows(file: Path) -> list[Assumption]:
+    """The same of a table of cases, judged by the rows that a result keeps: its first block."""
+    rows = next(iter(blocks(file, (BY_AXES, BY_CURVATURES))), None)
+    values = {} if rows is None else {name: np.asarray(column, float) for name, column in rows.values.items()}
+    listed = []
+    if "a" in values:
+        a, b = values["a"], values["b"]
+        peak = 1.5e-6 * values["load"] / (np.pi * a * b)
+        listed = [_slender(lambda run: {"rows": a / b}), _elastic(lambda run: {"rows": peak})]
+    creepages = {name: values.get(name, np.zeros(0)) for name in ("xi_x", "xi_y")}
+    return [*listed, _small(lambda run: creepages), _dry(lambda run: creepages)]
+
+
+def _half_space(watched: Callable[[Result], Watched]) -> Assumption:
+    return Assumption(
+        "half-space",
+        "the contact is small beside the bodies' radii",
+        "lower the load, or compute with finite elements",
+        watched,
+        "of the radius",
+        most=HALF_SPACE,
+    )
+
+
+def _by_radii(scene: ContactScene, body: Contact) -> Callable[[Result], Watched]:
+    """Semi-axes by the radii of curvature that are known: of both bodies, or of the undeformed distance."""
+    shares: dict[str, np.ndarray] = {}
+    if isinstance(body, OnEllipse):
+        axes = {"x": body.a, "y": body.b}
+        if scene.radii is not None:
+            shares = {f"radii.{name}": np.array([axes[name[-1]] / abs(r)]) for name, r in scene.radii if r is not None}
+        else:
+            shares = {"along": 2.0 * body.a * body.hertz.A, "across": 2.0 * body.b * body.hertz.B}
+    elif isinstance(body, OnPatches):
+        for k, part in enumerate(body.pressed.patches, 1):
+            along, across = part.patch.distance.curvatures
+            x0, x1, y0, y1 = part.box
+            shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * along])
+            shares[f"patch {k} across"] = np.array([0.5 * (y1 - y0) * across])
+    found = {where: np.atleast_1d(share) for where, share in shares.items()}
+    return lambda run: found
+
+
+def _elastic(watched: Callable[[Result], Watched]) -> Assumption:
+    return Assumption(
+        "elastic",
+        "the steel does not flow",
+        "lower the load or take larger radii: a real contact would be larger and its pressure lower",
+        watched,
+        "MPa",
+        most=1e-6 * YIELDS,
+    )
+
+
+def _creepages(body: Contact) -> list[Assumption]:
+    """That creepages are small and, where friction is constant, that slip is slow."""
+    longer = body.lever
+
+    def creepages(run: Result) -> Mapping[str, np.ndarray]:
+        return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
+
+    if isinstance(body, Linear) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
+        return [_small(creepages)]
+    return [_small(creepages), _dry(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")})]
+
+
+def _small(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+    return Assumption(
+        "small creepage",
+        "creepages, and spin times the semi-axis, are so small that their squares do not count",
+        "lower the creepage: a wheel that slides is no rolling contact",
+        lambda run: {name: np.abs(values) for name, values in watched(run).items()},
+        "",
+        most=SMALL_CREEPAGE,
+    )
+
+
+def _dry(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
+    return Assumption(
+        "constant friction",
+        "friction is the same however fast the contact slips",
+        "name the effect falling_friction, which FASTSIM computes",
+        lambda run: {name: np.abs(values) for name, values in watched(run).items()},
+        "",
+        most=CONSTANT_FRICTION,
+    )
+
+
+def _no_slip(watched: Callable[[Result], Watched]) -> Assumption:
+    return Assumption(
+        "no slip",
+        "the linear theory's force is far below what friction carries",
+        'name the effect saturation: method.name = "fastsim"',
+        watched,
+        "mu N",
+        most=NO_SLIP,
+    )
+
+
+def _used(run: Result, body: Contact) -> np.ndarray:
+    """Tangential forces by mu N; without friction any force is too large."""
+    force, limit = np.hypot(run["fx"], run["fy"]), body.friction * body.pressing.load
+    return force / limit if limit > 0.0 else np.where(force > 0.0, np.inf, 0.0)
+
+
+def _slender(watched: Callable[[Result], Watched]) -> Assumption:
+    return Assumption(
+        "axes alike",
+        "the ellipse is no more slender than those of Kalker's table",
+        'name the effect half_space: method.name = "exact"',
+        watched,
+        "",
+        *SLENDER,
+    )
+
+
+def _alike(body: Contact) -> Assumption:
+    cost = np.array([body.pair.quasi_identity_error(body.friction)])
+    return Assumption(
+        "bodies alike",
+        "both bodies stretch alike under the pressure",
+        "give both bodies the same material",
+        lambda run: {"bodies": cost},
+        "mu N",
+        most=ALIKE,
+    )
+
+
+def _on_profiles(body: OnPatches) -> list[Assumption]:
+    """That patches lie within what is known of the profiles, and beside one another."""
+    parts = sorted(body.pressed.patches, key=lambda part: part.patch.place)
+    inside = {}
+    for k, part in enumerate(parts, 1):
+        known, (_, _, low, high) = part.patch.distance, part.box
+        free = [known.y[-1] - high] * (not part.patch.cut[3]) + [low - known.y[0]] * (not part.patch.cut[2])
+        inside[f"patch {k}"] = 1e3 * np.array(free)
+    gaps = [(b.patch.place + b.box[2]) - (a.patch.place + a.box[3]) for a, b in pairwise(parts)]
+    return [
+        Assumption(
+            "within the profiles",
+            "the contact lies within the profiles and their surroundings that are known",
+            "use longer profiles, a smaller load or lateral_shift",
+            lambda run: inside,
+            "mm from the end",
+            least=0.0,
+        ),
+        Assumption(
+            "patches apart",
+            "patches of one wheel lie beside one another",
+            'use system = "wheel-rail", which joins patches that have grown together',
+            lambda run: {"neighbours": np.array(gaps) / METRES["mm"]},
+            "mm",
+            least=0.0,
+        ),
+    ]

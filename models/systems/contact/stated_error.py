@@ -1,0 +1,52 @@
+"""What the results of a contact say of their error: what the cells leave, and what the theory does."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models.contact.accuracy import Error
+from models.contact.theories import Contact, Linear
+from models.core.discretisation import Estimate, by_cells, not_estimated, of_theory, stated
+from models.core.result import Result
+from models.systems.contact.scene import ContactScene
+
+MOST_CELLS = 400
+HALF = "half the cells along each axis"
+BANDS = "which 95 % of such contacts keep to"
+
+
+def with_error(run: Result, scene: ContactScene, body: Contact, errors: Sequence[Error]) -> Result:
+    """The result with the root mean squares over its motions of the errors of force and moment.
+
+    Shares are of the root mean square of the force, for the moment times the contact's lever: a moment may vanish.
+    Raises RunFailed where the cells are too few.
+    """
+    force = rms(np.hypot(run["fx"], run["fy"]))
+    sizes = {"force": (force, "N"), "mz": (force * body.lever, "N m")}
+    likely = {"force": [e.likely for e in errors], "mz": [e.moment_likely for e in errors]}
+    cells, order = scene.method.cells, min(body.order, 1.5)
+    told = {name: by_cells(rms(np.array(likely[name])), *sizes[name], cells, order, MOST_CELLS) for name in likely}
+    if isinstance(body, Linear):
+        not_estimated(run, "the linear theory has no cells")
+    else:
+        stated(run, told, HALF)
+    theory = rms(run["error_of_theory"])
+    return of_theory(run, {"force": _of_theory(theory, force)}, BANDS) if theory > 0.0 else run
+
+
+def with_error_of_rows(table: Result, scene: ContactScene) -> Result:
+    """The same of the rows of a table of cases that it keeps, with what at least 95 % of them keep to."""
+    force = rms(np.hypot(table["fx"], table["fy"]))
+    cells, order = scene.method.cells, min(scene.method.order, 1.5)
+    stated(table, {"force": by_cells(rms(table["error_of_cells"]), force, "N", cells, order, MOST_CELLS)}, HALF)
+    return of_theory(table, {"force": _of_theory(rms(table["error_of_theory"]), force)}, BANDS)
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square of what is a number, 0 of nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+
+
+def _of_theory(error: float, force: float) -> Estimate:
+    return Estimate(error, "N", error / force if force > 0.0 else 0.0, 0.0, 0.0)

@@ -1,0 +1,146 @@
+"""What the equations of a steered car take for granted."""
+
+from functools import partial
+
+import numpy as np
+
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.multibody.numbers import GRAVITY, Handling
+from models.tyre.bristles import SLOW
+from models.vehicles.free_vehicle import SWAY, chassis_of
+
+LOADED = 2.5
+"""Of the load at rest: up to about so much a tyre's cornering stiffness grows with its load (Pacejka, Tyre and Vehicle
+Dynamics, 4.3); that of the brush grows without end."""
+LEAN = 0.2
+"""rad: springs act along the upright of the road's plane, and its cosine is 2 % below 1 here."""
+SLIDING, SLIP, SLIDES = 4.0, 0.2, 0.1
+"""m/s, and share of the speed, beyond which measured friction falls, and the share of the weight that may slide faster:
+friction that is a fifth too large makes 2 % of all forces then."""
+LENGTH, LAG = 0.3, 0.02
+"""m that a carcass takes to follow a slip angle, and rad by which the angle may be ahead of it."""
+TRAVEL = 0.12
+"""m: a car's wheels meet their stops about there."""
+LARGEST_STEER = 0.7
+"""rad: beyond, joints of a steering end, and the inner wheel must turn more than the outer one."""
+
+
+def assumptions(handling: Handling) -> list[Assumption]:
+    """What the equations of a manoeuvre take for granted."""
+    return [
+        Assumption(
+            "wheel loads",
+            "cornering stiffness grows with a tyre's load",
+            "drive more slowly or steer less: no tyre here levels off",
+            lambda run: _by_tyre(run["load"] / _static(handling), handling),
+            "of the load at rest",
+            most=LOADED,
+        ),
+        Assumption(
+            "small lean",
+            "springs stay upright on a car that leans little",
+            "drive more slowly or steer less: no suspension here has a geometry",
+            lambda run: _lean(run, handling),
+            "rad",
+            -LEAN,
+            LEAN,
+        ),
+        Assumption(
+            "one friction",
+            "friction is the same at any sliding speed, and little of the weight slides fast",
+            'brake less, or use system = "braking", whose tyre tables know locked wheels',
+            lambda run: {"all tyres": _sliding_share(run, handling)},
+            "of the weight",
+            most=SLIDES,
+        ),
+        Assumption(
+            "moving tyres",
+            "wheels move faster than the speed below which their bristles creep",
+            "end the manoeuvre before the car stops: shorten its duration",
+            lambda run: _by_tyre(_contact_speed(run), handling),
+            "m/s",
+            least=SLOW,
+        ),
+        Assumption(
+            "slow steering",
+            "tyres build up their forces at once",
+            f"steer more slowly, or drive faster: the lag of {LENGTH:g} m of way is not modelled",
+            lambda run: _by_tyre(_lag(run), handling),
+            "rad",
+            -LAG,
+            LAG,
+        ),
+        Assumption(
+            "steer angle",
+            "both front wheels steer by the same angle, and their joints allow it",
+            f"steer by at most {LARGEST_STEER:g} rad in manoeuvres.NAME.steer",
+            lambda run: _by_tyre(run["steer"], handling),
+            "rad",
+            -LARGEST_STEER,
+            LARGEST_STEER,
+        ),
+        *_travels(handling),
+    ]
+
+
+def _travels(handling: Handling) -> list[Assumption]:
+    """Of springs that carry a wheel alone: within their curves, or where they have none, before the stops of a car."""
+    chassis, bodies = chassis_of(handling.given).name, {tyre.body for tyre in handling.given.tyres}
+    listed = []
+    for spring in handling.given.springs:
+        upright = spring.axis[2] > 0.9 and spring.one == chassis and spring.two in bodies
+        if not upright or (spring.two, "z") not in handling.vehicle.coordinates():
+            continue
+        column = handling.vehicle.coordinates().index((str(spring.two), "z"))
+        low, high = -TRAVEL, TRAVEL
+        remedy = "drive more slowly, or give the spring a travel_force with its stops in the vehicle file"
+        if curve := spring.travel_force:
+            low, high, remedy = curve.arguments[0], curve.arguments[-1], "let its travel_force reach farther"
+        listed.append(
+            Assumption(
+                f"travel {spring.name}",
+                f"the spring {spring.name!r} moves within its travel",
+                remedy,
+                partial(_coordinate, column, spring.name),
+                "m",
+                low,
+                high,
+            )
+        )
+    return listed
+
+
+def _coordinate(column: int, name: str, run: Result) -> Watched:
+    return {name: run["positions"][:, column]}
+
+
+def _by_tyre(values: np.ndarray, handling: Handling) -> Watched:
+    return {tyre.name: column for tyre, column in zip(handling.vehicle.tyres, values.T, strict=True)}
+
+
+def _static(handling: Handling) -> np.ndarray:
+    return np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
+
+
+def _lean(run: Result, handling: Handling) -> Watched:
+    places = handling.vehicle.coordinates()
+    turns = (("roll", "rx"), ("pitch", "ry"))
+    return {name: run["positions"][:, places.index((SWAY, turn))] for name, turn in turns}
+
+
+def _sliding_share(run: Result, handling: Handling) -> np.ndarray:
+    """Share of the weight on tyres that slide faster than SLIDING and SLIP."""
+    fast = np.hypot(run["slip_x"], run["slip_y"]) > np.maximum(SLIDING, SLIP * _contact_speed(run))
+    weight = GRAVITY * sum(body.mass for body in handling.vehicle.bodies)
+    return np.sum(run["load"] * fast, axis=1) / weight
+
+
+def _contact_speed(run: Result) -> np.ndarray:
+    """Speed (m/s) of every wheel over the road, rolling and sliding."""
+    return np.hypot(run["tread"] + run["slip_x"], run["slip_y"])
+
+
+def _lag(run: Result) -> np.ndarray:
+    """Steering (rad) within the way that a carcass takes to follow."""
+    return np.gradient(run["steer"], run.times, axis=0) * LENGTH / np.maximum(_contact_speed(run), SLOW)

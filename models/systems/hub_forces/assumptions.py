@@ -1,0 +1,187 @@
+"""What a vehicle on hub forces, and the virtual measurement of these, take for granted."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.engines.cut_vehicle import UPRIGHT
+from models.road.iso8608 import iso8608_road
+from models.systems.hub_forces.measurement import Angles, travels
+from models.systems.hub_forces.scene import HubScene, Road
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+
+_SMOOTHER = "take a smoother road.iso8608, a lower road.speed, or stiffer springs: no stop is in the cut vehicle"
+ON_TYRES = "on tyres"
+"""In place of a method: the run on the road that gives a virtual measurement."""
+PUSHES = 1.0
+"""N: a tyre that pulls by less is at its edge."""
+GRIPS = 0.45
+"""Of a tyre's load at rest: up to half of a friction of 0.9 side forces grow with the slip angle."""
+SMALL = 0.2
+"""rad: turns about the body's axes are angles to 2 %, and a heading leaves the road's tracks to 2 %."""
+TURNED = 0.05
+"""rad that turn 5 % of a force into another axis."""
+TRAVEL, TURN = 0.12, 0.3
+"""m and rad: a car's springs meet their stops about there; no stop is in a linear spring or bar."""
+SAMPLED = {"linear": 0.25, "smooth": 0.4}
+"""Waves of the road by samples: between samples on straight lines 19 % of such a wave are lost, on cubics 20 %."""
+BALANCE, RISING = 0.05, 0.5
+"""Of the weight: forces that are out of balance by so much lift or drop a vehicle by 55 m in 15 s; and the change of
+vertical speed (m/s) that a rough road may leave between the ends of a run."""
+
+
+def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
+    """What a run takes for granted that is held by a method, or goes over the road (ON_TYRES).
+
+    angles : as measured, beside which a run is judged; None to list only.
+    """
+    listed = _on_tyres(vehicle) if method == ON_TYRES else _on_forces(scene, vehicle, method, angles)
+    return [*listed, *inside(vehicle, lambda run: travels(vehicle, run.detail), _SMOOTHER)]
+
+
+def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
+    """Of linear springs, mounts and bars, whose travels (m, rad) are told by name."""
+    kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
+    listed = []
+    for kind, of, unit, most in kinds:
+        names = {each.name for each in vehicle.elements if each.unit == of}
+
+        def watched(run: Result, names: set[str] = names) -> Watched:
+            return {name: values for name, values in travel(run).items() if name in names}
+
+        says = f"linear {kind} do not meet their stops"
+        listed += [Assumption(f"{kind} between stops", says, remedy, watched, unit, -most, most)] if names else []
+    return listed
+
+
+def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
+    """Of linear tyres on two tracks."""
+    return [
+        *_pressing(vehicle, PUSHES),
+        Assumption(
+            "side forces",
+            "side forces of the measurement grow with the slip angle",
+            'use system = "handling", whose tyres slide, or lower road.speed',
+            lambda run: {
+                hub: np.abs(force) / load
+                for (hub, force), load in zip(_at_hubs(run, vehicle, 1).items(), vehicle.loads, strict=True)
+            },
+            "of the load at rest",
+            most=GRIPS,
+        ),
+        Assumption(
+            "straight on",
+            "the measured vehicle goes straight on, level",
+            'use system = "handling", or a smoother road',
+            lambda run: {name: run[name] for name in ("roll", "pitch", "heading")},
+            "rad",
+            -SMALL,
+            SMALL,
+        ),
+    ]
+
+
+def _pressing(vehicle: CutVehicle, pull: float) -> list[Assumption]:
+    """Of tyres that may pull by so much (N) at their edge; nothing of those that only push."""
+    lifting = Assumption(
+        "tyres press",
+        "the linear tyres of the measurement stay on the road",
+        "name the effect lift_off, whose tyres only push",
+        lambda run: _at_hubs(run, vehicle, 2),
+        "N",
+        least=-pull,
+    )
+    return [] if vehicle.whole.lifts else [lifting]
+
+
+def _on_forces(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None) -> list[Assumption]:
+    """Of a cut vehicle."""
+    listed = [
+        Assumption(
+            "upright",
+            "the vehicle stays upright",
+            "name the effect kalman_filter or prescribed_angles, or end the run before",
+            lambda run: {name: run[name] for name in ("roll", "pitch")},
+            "rad",
+            -UPRIGHT,
+            UPRIGHT,
+        )
+    ]
+    if method == "none" and scene.forces.frame == "inertial":
+        listed.append(
+            Assumption(
+                "same attitude",
+                "forces that keep their directions meet a vehicle that lies as the measured one",
+                "name the effect kalman_filter or prescribed_angles",
+                lambda run: _beside(run, angles),
+                "rad",
+                -TURNED,
+                TURNED,
+            )
+        )
+    if method == "kalman":
+        listed.append(
+            Assumption(
+                "small tilt",
+                "the filter takes angles for turns about the body's axes",
+                "name the effect prescribed_angles in place of kalman_filter",
+                lambda run: {name: run[name] for name in ("roll", "pitch")},
+                "rad",
+                -SMALL,
+                SMALL,
+            )
+        )
+    if scene.road is None:
+        return [*listed, _balanced(vehicle)]
+    noise = 5.0 * scene.forces.force_deviation if scene.forces.noise == "white" else 0.0
+    return [*listed, _sampled(scene, scene.road), *_pressing(vehicle, PUSHES + noise)]
+
+
+def _balanced(vehicle: CutVehicle) -> Assumption:
+    """Of measured forces."""
+    return Assumption(
+        "balance",
+        "over the run the vertical forces carry the weight",
+        "correct the loads of the vehicle file, or the columns of forces.file",
+        lambda run: {"all hubs": carried(sum(_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1])},
+        "of the weight",
+        1.0 - BALANCE,
+        1.0 + BALANCE,
+    )
+
+
+def carried(forces: np.ndarray, vehicle: CutVehicle, duration: float) -> np.ndarray:
+    """(1,): mean of the vertical forces (n,), N, by the weight, less what may have changed the vertical speed."""
+    excess = forces.mean() / vehicle.loads.sum() - 1.0
+    return np.array([1.0 + np.sign(excess) * max(abs(excess) - RISING / (GRAVITY * duration), 0.0)])
+
+
+def _sampled(scene: HubScene, road: Road) -> Assumption:
+    """Of a virtual measurement."""
+    rate, rule = scene.forces.sampling_rate, scene.forces.interpolation
+    wave = 4.0 * iso8608_road(road.iso8608, road.seed).finest
+    other = ' or use forces.interpolation = "smooth",' if rule == "linear" else ""
+    return Assumption(
+        "samples",
+        "samples show every wave of the road",
+        f"raise forces.sampling_rate,{other} or lower road.speed",
+        lambda run: {"shortest wave": np.array([road.speed / wave / rate])},
+        "waves per sample",
+        most=SAMPLED[rule],
+    )
+
+
+def _beside(run: Result, angles: Angles | None) -> Watched:
+    """Roll and pitch beside the measured ones."""
+    assert angles is not None
+    times = angles.period * np.arange(len(angles.samples))
+    return {
+        name: run[name] - np.interp(run.times, times, angles.samples[:, i]) for i, name in enumerate(("roll", "pitch"))
+    }
+
+
+def _at_hubs(run: Result, vehicle: CutVehicle, axis: int) -> dict[str, np.ndarray]:
+    """Forces (n,), N, along an axis of every hub, as they were put in."""
+    return {hub: run.detail.wrenches[:, i, axis] for i, hub in enumerate(vehicle.hubs)}

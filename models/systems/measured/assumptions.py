@@ -1,0 +1,134 @@
+"""What a recording, and a vehicle in space on its forces, take for granted."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.core.assumptions import Assumption, Watched
+from models.engines.cut_vehicle import UPRIGHT
+from models.measured.checks.clipped import ends
+from models.systems.hub_forces.assumptions import BALANCE, SMALL, TURNED, carried, inside
+from models.systems.measured.scene import MeasuredScene
+from models.vehicles.cut_vehicle import CutVehicle
+
+if TYPE_CHECKING:
+    from models.systems.measured.run import Examination
+
+PULL = 0.2
+"""Of the load at rest: the weight and inertia of a rim and tyre in the air; whatever pulls more is no road."""
+
+
+def assumptions(
+    scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None
+) -> list[Assumption]:
+    """What the run that is handed on takes for granted; exam : of it, None to list only.
+
+    Of the pitch plane (vehicle None) its own system says the rest.
+    """
+    return [_in_range(exam), *([] if vehicle is None else _in_space(scene, vehicle, exam))]
+
+
+def _in_range(exam: "Examination | None") -> Assumption:
+    """Of the transducers."""
+
+    def clipped() -> Watched:
+        """Share of samples at an extreme where they pile up, of every channel that is put in."""
+        assert exam is not None
+        values = {s.name: exam.recording.samples(s) for s in exam.recording.signals if exam.put_in(s)}
+        return {name: np.array([np.isin(each, ends(each)).mean()]) for name, each in values.items()}
+
+    return Assumption(
+        "transducers in range",
+        "what is put in lies within its transducers' range",
+        "measure again with a wider range, or leave these times out by [clock]",
+        lambda run: clipped(),
+        "of the samples",
+        most=0.0,
+    )
+
+
+def _in_space(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
+    """Of a cut vehicle, by the answers of its run."""
+
+    def read(name: str) -> np.ndarray:
+        assert exam is not None and exam.outcome is not None
+        return exam.outcome.samples(name)
+
+    def tilt() -> Watched:
+        return {name: read(f"{vehicle.chassis} {name}") for name in ("roll", "pitch")}
+
+    def vertical() -> dict[str, np.ndarray]:
+        return {hub: read(f"{hub} hub Fz") for hub in vehicle.hubs}
+
+    def balance() -> Watched:
+        assert exam is not None
+        return {"all hubs": carried(sum(vertical().values(), np.zeros(1)), vehicle, exam.recording.duration)}
+
+    filtered = scene.stabilise.method == "kalman"
+    remedy = (
+        'use stabilise.method = "prescribed" in place of "kalman"'
+        if filtered
+        else 'use stabilise.method = "kalman" or "prescribed", or end the run before by clock.duration'
+    )
+    says = "the filter takes angles for turns about the body's axes" if filtered else "the vehicle stays upright"
+    most = SMALL if filtered else UPRIGHT
+    listed = [
+        Assumption("small tilt" if filtered else "upright", says, remedy, lambda run: tilt(), "rad", -most, most),
+        Assumption(
+            "wheels press",
+            "the road does not pull at a wheel",
+            "correct zero, sign or unit of its vertical force in the channel map",
+            lambda run: {
+                hub: force / load for (hub, force), load in zip(vertical().items(), vehicle.loads, strict=True)
+            },
+            "of the load at rest",
+            least=-PULL,
+        ),
+        Assumption(
+            "balance",
+            "over the run the vertical forces carry the weight",
+            "correct the loads of the vehicle file, or zero and unit of the forces in the channel map",
+            lambda run: balance(),
+            "of the weight",
+            1.0 - BALANCE,
+            1.0 + BALANCE,
+        ),
+        *inside(
+            vehicle,
+            lambda run: {each.name: read(f"{each.name} travel") for each in vehicle.elements},
+            "leave these times out by [clock]: no stop is in the cut vehicle's linear springs",
+        ),
+    ]
+    return [*listed, *_same_attitude(scene, vehicle, exam)]
+
+
+def _same_attitude(scene: MeasuredScene, vehicle: CutVehicle, exam: "Examination | None") -> list[Assumption]:
+    """Of a free run on forces that keep their directions, where roll or pitch were measured."""
+    if scene.stabilise.method != "none" or exam is None:
+        return []
+    frames = {s.frame for s in exam.recording.signals if s.at in vehicle.hubs and exam.put_in(s)}
+    angles = [s for s in exam.recording.find("angle", vehicle.chassis) if s.component in ("roll", "pitch")]
+    if frames != {"inertial"} or not angles:
+        return []
+
+    def beside() -> Watched:
+        assert exam.outcome is not None
+        skip = round(exam.outcome.period / exam.recording.period)
+        done = exam.outcome.done
+        return {
+            s.component: exam.outcome.samples(f"{vehicle.chassis} {s.component}")
+            - exam.recording.samples(s)[::skip][:done]
+            for s in angles
+        }
+
+    return [
+        Assumption(
+            "same attitude",
+            "forces that keep their directions meet a vehicle that lies as the measured one",
+            'use stabilise.method = "kalman" or "prescribed"',
+            lambda run: beside(),
+            "rad",
+            -TURNED,
+            TURNED,
+        )
+    ]

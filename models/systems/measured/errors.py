@@ -1,0 +1,65 @@
+"""How far the steps of a recording's run leave its section forces from those of steps without length.
+
+A step is as long as a sampling period as a rule: longer ones would take the samples' noise for motion. So a stretch of
+the recording is run in its steps and in half of them.
+"""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from models.core.discretisation import Estimate, estimate, rescaled, size_of, summed
+from models.systems.hub_forces.run import LEAST, ORDER
+from models.systems.measured.consequences import stretch
+from models.systems.measured.section_run import Outcome, SectionRun
+from models.systems.measured.section_run import run as march
+
+SHARE, LONGEST = 0.2, 30.0
+"""Share of a recording that is run again, in its steps and in half of them: 0.6 of its force calls; and s at most."""
+
+
+def errors_of_steps(
+    job: SectionRun, outcome: Outcome, before: dict[str, Estimate], folder: Path
+) -> dict[str, Estimate]:
+    """Errors by the answer's name of what springs, mounts and bars carry, and of roll and pitch.
+
+    before : errors of the virtual measurement by the element's name, which come on top. Raises RunFailed where the
+    stretch, which begins at rest in the middle of the recording, does not end.
+    """
+    grid, recording = job.grid, job.recording
+    count = round(min(SHARE * recording.duration, LONGEST) / recording.period) + 1
+    first = (recording.count - count) // 2
+    samples = {s: recording.columns.read(s.name, first, count) for s in recording.signals}
+    shutil.rmtree(folder, ignore_errors=True)
+    part = replace(job, recording=stretch(recording, samples, folder))
+    coarse = march(part, folder / "own")
+    fine = march(replace(part, step=0.5 * grid.step), folder / "half")
+    every, told = round(coarse.period / fine.period), dict[str, Estimate]()
+    for name, element in _principal(job, outcome, bool(before)).items():
+        one = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), ORDER, grid.step)
+        own = replace(one, error=one.error * 2.0**one.order, unit="rad" if not element else _unit(job, element))
+        told[name] = rescaled(own, size_of(outcome.samples(name)), grid.step)
+        if element in before:
+            told[name] = summed(told[name], before[element])
+    shutil.rmtree(folder, ignore_errors=True)
+    return told
+
+
+def _principal(job: SectionRun, outcome: Outcome, virtual: bool) -> dict[str, str]:
+    """Answers whose error is told, and the elements that they are of, none of angles; not of what hardly moves.
+
+    After a virtual measurement angles are not told: moments that are measured wrong add up in them.
+    """
+    elements = {element.name: element.unit for element in job.vehicle.elements}
+    names = {a.name: a.section for a in outcome.answers if a.section in elements and a.unit == elements[a.section]}
+    names |= {} if virtual else {f"{job.vehicle.chassis} {angle}": "" for angle in ("roll", "pitch")}
+    change = {name: float(np.std(outcome.samples(name))) for name in names}
+    kinds = {name: elements.get(element, "rad") for name, element in names.items()}
+    most = {kind: max(change[name] for name in names if kinds[name] == kind) for kind in kinds.values()}
+    return {name: element for name, element in names.items() if change[name] > LEAST * most[kinds[name]]}
+
+
+def _unit(job: SectionRun, element: str) -> str:
+    return next(each.unit for each in job.vehicle.elements if each.name == element)

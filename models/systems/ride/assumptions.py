@@ -1,0 +1,244 @@
+"""What a ride takes for granted. Where no values over time are known they are Gaussian, and judged by three deviations.
+
+Linear vehicles have tyres that would pull, springs without stops, angles without an end; spectra of roads are known for
+waves of some lengths; curves are known as far as their tables go.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from models.core.assumptions import Assumption, Gaussian, Watched
+from models.core.result import Result
+from models.systems.ride.scene import RideScene
+from models.systems.ride.watched import AXES, GRAVITY, Motion, static_loads
+from models.vehicles.spatial import NONE, Curve, SpatialVehicle, SpringDamper
+from models.vehicles.spatial_linear import Kinematics, linearise
+
+SMALL = 0.3
+"""rad: where sines are taken for angles they may be so large: 1.5 % of the sine."""
+TRAVEL = 0.1
+"""m: suspensions of road vehicles meet a stop at about so much travel."""
+SLIP = 0.07
+"""rad (4 degrees): side forces of tyres grow in proportion to slip angles up to about so much."""
+PUSHES = 1.0
+"""N: a tyre that pulls by less is at its edge."""
+SHORTEST, LONGEST = 0.1, 100.0
+"""m: waves of the road's standard spectra (ISO 8608: 0.01 to 10 cycles/m); a contact patch swallows shorter ones."""
+GAUSSIAN = 0.1
+"""Share of an output's variance that gains may leave out: beyond, its distribution is no Gaussian one any more."""
+IN_TIME = "use the study ride_nonlinear"
+UPRIGHT = 0.7
+"""Cosine of a spring's direction with the vertical from which it is a suspension."""
+
+
+def assumptions(
+    scene: RideScene, vehicle: SpatialVehicle, motion: Motion | None = None, replaced: bool = False
+) -> list[Assumption]:
+    """What is taken for granted of a vehicle in a scene; ``motion`` of a run, which is judged by it.
+
+    replaced : whether gains stand for bent springs.
+    """
+
+    def of(name: str) -> np.ndarray | Gaussian:
+        assert motion is not None
+        return motion.of(name)
+
+    whole = [*_tyres(vehicle, of), *_angles(vehicle, of), *_slips(vehicle, of)]
+    for spring in vehicle.springs:
+        whole += _curves(scene, spring, of) if spring.bent else _travels(scene, vehicle, spring, of)
+    whole += [*_waves(scene, vehicle), *_seats(scene)]
+    return [*whole, *([NEARLY_GAUSSIAN] if replaced else [])]
+
+
+Of = Callable[[str], np.ndarray | Gaussian]
+
+
+def _tyres(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+    loads = static_loads(vehicle)
+    if not loads or vehicle.lifts:
+        return
+
+    def watched(run: Result) -> Watched:
+        return {f"tyre {name}": _raised(of(f"load {name}"), load) for name, load in loads.items()}
+
+    remedy = f'{IN_TIME} with [effects.lift_off] and vehicle.operating_point = "loaded", whose tyres only push'
+    yield Assumption("tyres press", "linear tyres stay on the road", remedy, watched, "N", least=-PUSHES)
+
+
+def _raised(values: np.ndarray | Gaussian, by: float) -> np.ndarray | Gaussian:
+    return replace(values, mean=values.mean + by) if isinstance(values, Gaussian) else values + by
+
+
+def _angles(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
+    if turning:
+        names = {"rx": "roll", "ry": "pitch", "rz": "yaw"}
+        yield Assumption(
+            "small angles",
+            "bodies turn so little that sines are angles",
+            "take a smoother road or a slower speed: ride is small motion",
+            lambda run: {f"{names[f]} of {body}": of(f"{f} {body}") for body, f in turning},
+            "rad",
+            -SMALL,
+            SMALL,
+        )
+
+
+def _slips(vehicle: SpatialVehicle, of: Of) -> Iterator[Assumption]:
+    if vehicle.side_forces:
+        yield Assumption(
+            "small slip",
+            "side forces of tyres grow in proportion to slip angles",
+            "use the system handling, whose tyres saturate",
+            lambda run: {f"side force {force.name}": of(f"slip {force.name}") for force in vehicle.side_forces},
+            "rad",
+            -SLIP,
+            SLIP,
+        )
+
+
+def _travels(scene: RideScene, vehicle: SpatialVehicle, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
+    """Of a straight spring between a wheel and what it carries."""
+    wheels = {tyre.body for tyre in vehicle.tyres}
+    ends = {spring.one, spring.two}
+    if abs(spring.axis[2]) < UPRIGHT or None in ends or not ends & wheels:
+        return
+    free = float(scene.options.get("free_travel") or TRAVEL)
+    yield Assumption(
+        f"free travel of {spring.name}",
+        f"the suspension {spring.name} meets no stop",
+        f"give its spring in the vehicle file a travel_force with stops, and {IN_TIME}",
+        lambda run: {spring.name: of(f"travel {spring.name}")},
+        "m",
+        -free,
+        free,
+    )
+
+
+def _curves(scene: RideScene, spring: SpringDamper, of: Of) -> Iterator[Assumption]:
+    """Of a bent spring: by its slopes at rest within a piece of its curves, else within its tables."""
+    for kind, curve, unit in (("travel", spring.travel_force, "m"), ("rate", spring.rate_force, "m/s")):
+        friction = spring.friction and kind == "rate" and scene.vehicle.small_motion
+        if curve is None and not friction:
+            continue
+        low, high = _range(curve, scene.vehicle.small_motion)
+        if friction:
+            low, high = max(low, -spring.friction_rate), min(high, spring.friction_rate)
+        straight = (
+            f"{kind}s of {spring.name} stay where its slopes at rest stand for its curves",
+            f"leave out vehicle.small_motion and {IN_TIME}",
+        )
+        table = (
+            f"{kind}s of {spring.name} stay within the table of its curve",
+            f"give its {kind}_force in the vehicle file points further out",
+        )
+        says, remedy = straight if scene.vehicle.small_motion else table
+        yield Assumption(
+            f"{kind} of {spring.name}",
+            says,
+            remedy,
+            lambda run, name=f"{kind} {spring.name}": {spring.name: of(name)},  # type: ignore[misc]
+            unit,
+            low,
+            high,
+        )
+
+
+def _range(curve: Curve | None, small: bool) -> tuple[float, float]:
+    """Ends of a curve's table, or of the piece about rest in which it is straight."""
+    if curve is None:
+        return -np.inf, np.inf
+    at = np.array(curve.arguments)
+    if not small:
+        return float(at[0]), float(at[-1])
+    _, _, corners, bends = curve.hinges()
+    bent = np.array(corners)[np.array(bends) != 0.0] if corners else np.zeros(0)
+    if (bent == 0.0).any():  # no slope at rest stands for a corner at rest, however small the motion is
+        return 0.0, 0.0
+    return float(max(bent[bent < 0.0], default=-np.inf)), float(min(bent[bent > 0.0], default=np.inf))
+
+
+def _waves(scene: RideScene, vehicle: SpatialVehicle) -> Iterator[Assumption]:
+    """Waves of the road that swing wheels and body at constant speeds; a drive is slow only while it starts."""
+    if scene.road.file is not None or vehicle.limits:
+        return
+    hop, bounce = swings(vehicle)
+    speeds = scene.speeds.all() if scene.speeds is not None else np.array(scene.drive.speed if scene.drive else [0.0])
+    slow, fast = float(speeds.min()), float(speeds.max())
+
+    def watched(run: Result) -> Watched:
+        wheels = {f"the wheels at {slow:g} m/s": np.array([slow / hop])} if hop and scene.speeds is not None else {}
+        body = {f"the body at {fast:g} m/s": np.array([fast / bounce])} if bounce else {}
+        return wheels | body
+
+    if hop or bounce:
+        least = f"from {SHORTEST * hop:.2g} " if hop else ""
+        yield Assumption(
+            "waves of the road",
+            "waves that swing wheels and body are as long as those of which spectra of roads are known",
+            f"take speeds {least}to {LONGEST * bounce:.2g} m/s, or a measured road",
+            watched,
+            "m",
+            SHORTEST,
+            LONGEST,
+        )
+
+
+def swings(vehicle: SpatialVehicle) -> tuple[float, float]:
+    """Highest frequency (Hz) of motions that deform above all tyres, and the lowest one of all that swing; else 0."""
+    still = replace(vehicle, side_forces=(), drags=(), limits=NONE, gravity=0.0)
+    linear, motion = linearise(still), Kinematics(still)
+    squares, shapes = eigh((linear.stiffness + linear.stiffness.T) / 2, linear.mass)
+    rows = np.array([motion.shift(tyre.body, tyre.point)[2] for tyre in vehicle.tyres])
+    energy = np.array([tyre.stiffness for tyre in vehicle.tyres]) @ (rows @ shapes) ** 2
+    swinging = squares > 1e-8 * squares.max()
+    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    hop = frequencies[swinging & (energy > 0.5 * squares)]
+    return float(hop.max(initial=0.0)), float(frequencies[swinging].min(initial=np.inf))
+
+
+def _seats(scene: RideScene) -> Iterator[Assumption]:
+    """Of outputs that are weighted for people along the vertical."""
+    people = [name for name, by in scene.weighting.items() if by == "Wk"]
+    if not people:
+        return
+
+    def watched(run: Result) -> Watched:
+        outputs, deviation = run["output"].tolist(), run["deviation"]
+        if deviation.ndim == 3:
+            deviation = deviation[0]
+        rows = [f"at {speed:g} m/s" for speed in run["speed"]] if "speed" in run.data.coords else []
+        each = {name: deviation[:, outputs.index(name)] for name in people if name in outputs}
+        return {name: Gaussian(np.zeros(len(values)), values, rows) for name, values in each.items()}
+
+    yield Assumption(
+        "people stay seated",
+        "seats press on those who sit on them",
+        "take a smoother road or a slower speed: no effect lets them leave the seat",
+        watched,
+        "m/s^2",
+        least=-GRAVITY,
+    )
+
+
+NEARLY_GAUSSIAN = Assumption(
+    "nearly Gaussian",
+    "what gains leave out of bent springs is a small share of an output's variance",
+    "take the deviations of the copies (options.beside), or engines in time",
+    lambda run: {
+        f"{name} at {speed:g} m/s": np.array([share])
+        for share, name, speed in sorted(
+            (
+                (float(share), str(name), float(speed))
+                for speed, row in zip(run["speed"], run["left_out"], strict=True)
+                for name, share in zip(run["output"], row, strict=True)
+            ),
+            reverse=True,
+        )
+    },
+    "",
+    most=GAUSSIAN,
+)

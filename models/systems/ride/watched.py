@@ -1,0 +1,142 @@
+"""How the parts of a riding vehicle move, for those who judge a run: wheel loads, travels, angles and slip angles."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from models.core.assumptions import Gaussian
+from models.core.errors import InputError
+from models.ride.covariance import stationary
+from models.ride.excited import excited
+from models.road.excitation import Excitation
+from models.systems.ride.of_scene import GRAVITY, Linear
+from models.vehicles.linear_vehicle import LinearVehicle, Output
+from models.vehicles.spatial import PartOutput, PointOutput, SpatialOutput, SpatialVehicle, TurnOutput, TyreOutput
+from models.vehicles.spatial_linear import Kinematics, linearise, outputs, preloads
+
+AXES = {"rx": (1.0, 0.0, 0.0), "ry": (0.0, 1.0, 0.0), "rz": (0.0, 0.0, 1.0)}
+FEW = 5
+"""Speeds at which a sweep is judged, its ends among them."""
+
+
+class Motion(Protocol):
+    """Motion of a vehicle's parts in a run, by the names of ``watched``."""
+
+    def of(self, name: str) -> np.ndarray | Gaussian:
+        """Values at every row of the run, or what is known of them."""
+        ...
+
+
+def watched(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
+    """Outputs that tell how every part moves: the force of a tyre less its load, travels and rates, angles of bodies
+    that may turn, and, where tyres have side forces, what makes up their slip."""
+    turning = [(body.name, f) for body in vehicle.bodies for f in body.freedoms if f in AXES]
+    whole: list[SpatialOutput] = [TyreOutput(f"load {tyre.name}", "tyre force", tyre.name) for tyre in vehicle.tyres]
+    whole += [PartOutput(f"travel {spring.name}", "travel", spring.name) for spring in vehicle.springs]
+    whole += [PartOutput(f"rate {spring.name}", "travel rate", spring.name) for spring in vehicle.springs]
+    whole += [TurnOutput(f"{freedom} {body}", "angle", body, AXES[freedom]) for body, freedom in turning]
+    for force in vehicle.side_forces:
+        whole.append(PointOutput(f"side velocity {force.name}", "velocity", force.body, force.point, (0.0, 1.0, 0.0)))
+        whole.append(TurnOutput(f"roll {force.name}", "angle", force.chassis, AXES["rx"]))
+        whole.append(TurnOutput(f"yaw {force.name}", "angle", force.chassis, AXES["rz"]))
+    return tuple(whole)
+
+
+def watching(own: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+    """A linear vehicle, whoever made it, whose outputs are those of ``watched`` and the slip angles (rad)."""
+    seen = replace(vehicle, outputs=watched(vehicle))
+    rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
+    return replace(own, outputs=(*rows, *_slips(vehicle, rows, speed)))
+
+
+def _slips(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
+    named = {row.name: row for row in rows}
+    for force in vehicle.side_forces:
+        side, roll, yaw = (named[f"{part} {force.name}"] for part in ("side velocity", "roll", "yaw"))
+        displacement = force.roll_steer * roll.displacement + yaw.displacement
+        yield replace(yaw, name=f"slip {force.name}", rate=-side.rate / speed, displacement=displacement)
+
+
+def static_loads(vehicle: SpatialVehicle) -> dict[str, float]:
+    """Static load (N) of every tyre; empty where no spring carries a weight."""
+    with suppress(InputError):
+        return preloads(replace(vehicle, gravity=GRAVITY)).tyres
+    return {}
+
+
+def few(speeds: Sequence[float] | np.ndarray) -> list[float]:
+    """Some of the speeds (m/s), the slowest and the fastest among them."""
+    rising = np.unique(np.asarray(speeds, float))
+    return [float(rising[i]) for i in np.unique(np.linspace(0, len(rising) - 1, FEW).round().astype(int))]
+
+
+@dataclass(frozen=True)
+class Spectral:
+    """Motion by covariances at constant speeds (m/s); ``means`` (speeds,) of what does not swing about its rest."""
+
+    vehicle: SpatialVehicle
+    linear: Linear
+    road: Excitation
+    speeds: Sequence[float]
+    means: Mapping[str, np.ndarray]
+
+    def of(self, name: str) -> Gaussian:
+        """What is known at every speed."""
+        mean = self.means.get(name, np.zeros(len(self.speeds)))
+        return Gaussian(mean, self._deviations[name], [f"at {speed:g} m/s" for speed in self.speeds])
+
+    @cached_property
+    def _deviations(self) -> dict[str, np.ndarray]:
+        """Standard deviations (speeds,) by name, not finite where there is none."""
+        rows, names = [], tuple[str, ...]()
+        for speed in self.speeds:
+            seen = watching(self.linear(speed), self.vehicle, speed)
+            names = tuple(output.name for output in seen.outputs)
+            try:
+                rows.append(stationary(excited(seen, self.road, speed)).deviation)
+            except InputError:
+                rows.append(np.full(len(names), np.nan))
+        return dict(zip(names, np.array(rows).T, strict=True))
+
+
+@dataclass(frozen=True)
+class Along:
+    """Motion along a drive: deviations (time, ...) of the run's own outputs, and others as if each speed had always
+    been driven."""
+
+    deviations: Mapping[str, np.ndarray]
+    apart: Spectral
+
+    def of(self, name: str) -> Gaussian:
+        """What is known at every instant, or at some speeds."""
+        if name in self.deviations:
+            own = self.deviations[name]
+            return Gaussian(np.zeros(len(own)), own)
+        return self.apart.of(name)
+
+
+def own_deviations(vehicle: SpatialVehicle, deviation: np.ndarray) -> dict[str, np.ndarray]:
+    """Deviations (rows, outputs) of a vehicle's own outputs by the names of ``watched``."""
+    alike = {replace(output, name=""): output.name for output in watched(vehicle)}
+    pairs = zip(vehicle.outputs, deviation.T, strict=False)  # weighted ones come last
+    return {alike[same]: values for output, values in pairs if (same := replace(output, name="")) in alike}
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Motion in a run: positions and rates (rows, n), heights of the road and their rates (rows, 2 w)."""
+
+    seen: LinearVehicle
+    positions: np.ndarray
+    rates: np.ndarray
+    heights: np.ndarray
+
+    def of(self, name: str) -> np.ndarray:
+        """Values at every row."""
+        row = {output.name: output for output in self.seen.outputs}[name]
+        road = np.concatenate([row.road, row.road_rate])
+        return self.positions @ row.displacement + self.rates @ row.rate + self.heights @ road

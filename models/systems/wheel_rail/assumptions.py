@@ -1,0 +1,105 @@
+"""What the contact of a held wheelset takes for granted, by every patch at every position."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.contact.limits import FAST_SLIP, HALF_SPACE, SMALL_CREEPAGE, YIELDS, yields
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.rail.contact_table import Place
+from models.systems.wheel_rail.scene import WheelRailScene
+
+WHEELS = ("right", "left")
+
+
+def assumptions(scene: WheelRailScene, friction: float) -> list[Assumption]:
+    """What a case with this coefficient of friction takes for granted; judged by ``Contacts``, a result's detail."""
+    listed = [_half_space(), _within_profiles(scene)]
+    if yields(scene.bodies.wheel, scene.bodies.rail):
+        listed.append(_elastic())
+    if friction > 0.0:
+        listed += [_small_creepage(), _slow_slip(scene.wheelset.speed)]
+    return listed
+
+
+def _places(value: Callable[[Place], float], largest: bool = True) -> Callable[[Result], Watched]:
+    """The largest or least value among the patches of each wheel, over the positions."""
+    worst = max if largest else min
+
+    def watched(run: Result) -> Watched:
+        placed = run.detail.placed
+        return {
+            f"{wheel} wheel": np.array([worst(map(value, getattr(position, wheel))) for position in placed])
+            for wheel in WHEELS
+        }
+
+    return watched
+
+
+def _half_space() -> Assumption:
+    def share(place: Place) -> float:
+        return max(0.5 * place.length * place.curvature_x, 0.5 * place.width * place.curvature_y)
+
+    return Assumption(
+        "half-space",
+        "contacts are small beside the radii of wheel and rail",
+        "lower wheelset.load, or compute with finite elements",
+        _places(share),
+        "of the radius",
+        most=HALF_SPACE,
+    )
+
+
+def _within_profiles(scene: WheelRailScene) -> Assumption:
+    """The way (mm) from a patch to the nearer end of the rail or to the wheel's outer face."""
+    side = scene.profiles.side(scene.wheelset.radius)
+
+    def free(place: Place) -> float:
+        ends = place.y - side.rail.y[0], side.rail.y[-1] - place.y, side.wheel.y[-1] - place.wheel_centre
+        return float(1e3 * (min(ends) - 0.5 * place.width))
+
+    return Assumption(
+        "within the profiles",
+        "contacts lie within the profiles",
+        "use longer profiles or smaller positions",
+        _places(free, largest=False),
+        "mm from the end",
+        least=0.0,
+    )
+
+
+def _elastic() -> Assumption:
+    return Assumption(
+        "elastic",
+        "the steel does not flow",
+        "lower wheelset.load: a real contact would be larger and its pressure lower",
+        _places(lambda place: 1e-6 * place.peak),
+        "MPa",
+        most=1e-6 * YIELDS,
+    )
+
+
+def _small_creepage() -> Assumption:
+    def largest(place: Place) -> float:
+        return max(abs(place.xi_x), abs(place.xi_y), 0.5 * max(place.length, place.width) * abs(place.spin))
+
+    return Assumption(
+        "small creepage",
+        "creepages, and spin times the semi-axis, are so small that their squares do not count",
+        "lower the yaw: a wheel that slides is no rolling contact",
+        _places(largest),
+        "",
+        most=SMALL_CREEPAGE,
+    )
+
+
+def _slow_slip(speed: float) -> Assumption:
+    return Assumption(
+        "constant friction",
+        "friction is the same however fast the wheels slip",
+        "give the case's friction as it is for such slip, or lower wheelset.speed",
+        _places(lambda place: speed * float(np.hypot(place.xi_x, place.xi_y))),
+        "m/s",
+        most=FAST_SLIP,
+    )

@@ -1,0 +1,261 @@
+"""What the equations of a wheelset on straight track take for granted."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.contact.inputs import Array
+from models.contact.limits import FAST_SLIP, HALF_SPACE, NO_SLIP, YIELDS, yields
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.rail import wheel_forces as wf
+from models.rail.equations import ROLL, YAW, Equations, Path, Y
+from models.rail.flange_climbing import nadal, shares
+from models.rail.wheelset import Wheelset
+
+LEAST_LOAD = 0.05
+"""Of its load at rest, that a wheel must carry: below, it is about to leave its rail."""
+FLANGE_WAY = 5e-3
+"""m beyond the clearance that a rail gives way under a flange; a spring without end stands for it."""
+LARGEST_TRAVEL = 0.02
+"""m of the axle's ends in their suspension, whose springs are lines: guides and stops leave no more."""
+LARGEST_YAW = 0.05
+"""rad: the curvatures of a contact are those without yaw."""
+TIP = 2e-3
+"""m from the flange's tip at which a wheel has climbed, as in the table of contacts."""
+FRICTION = 0.02
+"""Coefficient below which nothing creeps as a wheel on a rail does."""
+
+
+def assumptions(equations: Equations) -> list[Assumption]:
+    """What a path of the wheelset at its speed takes for granted; judged by the path, a result's detail."""
+    wheelset = equations.wheelset
+    listed = [_presses(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
+    listed += [_elastic()] if yields(wheelset.material) else []
+    listed += [_no_slip(wheelset)] if equations.law == "linear" else []
+    listed += [_travel(wheelset)] if equations.body[-1] > 0.0 else []
+    if wheelset.profiles is not None:
+        return [*listed, _within_profiles(wheelset)]
+    return [*listed, _climbs(wheelset), _flange_way(wheelset)]
+
+
+def of_linear(wheelset: Wheelset) -> list[Assumption]:
+    """What the eigenvalues take for granted beside small motions: that creep forces act at all."""
+    return [
+        Assumption(
+            "friction",
+            "creep forces of small motions find friction",
+            "raise wheelset.override.friction",
+            lambda run: {"rails": np.array([wheelset.friction])},
+            "",
+            least=FRICTION,
+        )
+    ]
+
+
+def of_branch(wheelset: Wheelset) -> list[Assumption]:
+    """What a branch of cycles takes for granted of their amplitudes; a cone's flange is a spring."""
+    return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
+
+
+def by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
+    """Sums over the patches of each wheel of values (n, patches)."""
+    each = contacts.shape[1] // 2
+    return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}
+
+
+def _of_path(watched: Callable[[Path], Watched]) -> Callable[[Result], Watched]:
+    """What is watched of a result whose detail is its path, or a periodic motion that has one."""
+
+    def of_result(run: Result) -> Watched:
+        return watched(run.detail if isinstance(run.detail, Path) else run.detail.path())
+
+    return of_result
+
+
+def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
+    """The largest value among the patches of each wheel that carry something, 0 where none does."""
+
+    def of_path(path: Path) -> Watched:
+        each, load = path.contacts.shape[1] // 2, path.contacts[:, :, wf.LOAD]
+        values = np.where(load > 0.0, np.abs(watched(path.contacts)), 0.0)
+        return {"right wheel": values[:, :each].max(axis=1), "left wheel": values[:, each:].max(axis=1)}
+
+    return _of_path(of_path)
+
+
+def _presses(wheelset: Wheelset) -> Assumption:
+    return Assumption(
+        "wheels press",
+        "both wheels stay on their rails",
+        "start with a smaller displacement, or travel below the critical speed",
+        _of_path(
+            lambda path: by_wheel(path.contacts, path.contacts[:, :, wf.LOAD] * np.cos(path.contacts[:, :, wf.ANGLE]))
+        ),
+        "N",
+        least=LEAST_LOAD * wheelset.load / 2.0,
+    )
+
+
+def _small_yaw() -> Assumption:
+    return Assumption(
+        "small yaw",
+        "the yaw is so small that a contact's curvatures are those without it",
+        "start with a smaller displacement or yaw, or stiffen stiffness_x",
+        _of_path(lambda path: {"axle": path.states[:, YAW]}),
+        "rad",
+        -LARGEST_YAW,
+        LARGEST_YAW,
+    )
+
+
+def _rolls(equations: Equations) -> Assumption:
+    return Assumption(
+        "speed",
+        "the wheelset rolls so fast that creepage is by its speed",
+        f"travel at {wf.REGULAR:g} m/s or more",
+        lambda run: {"wheelset": np.array([abs(equations.speed)])},
+        "m/s",
+        least=wf.REGULAR,
+    )
+
+
+def _half_space() -> Assumption:
+    """Of a Hertzian contact the penetration by its shorter semi-axis is about that semi-axis by its radius."""
+
+    def watched(contacts: Array) -> Array:
+        short = np.minimum(contacts[:, :, wf.A], contacts[:, :, wf.B])
+        return contacts[:, :, wf.DEPTH] / np.where(short > 0.0, short, np.inf)
+
+    return Assumption(
+        "half-space",
+        "contacts are small beside the radii of wheel and rail",
+        "lower the load, or use profiles whose radii are larger",
+        _touching(watched),
+        "of the radius",
+        most=HALF_SPACE,
+    )
+
+
+def _elastic() -> Assumption:
+    def watched(contacts: Array) -> Array:
+        area = np.pi * contacts[:, :, wf.A] * contacts[:, :, wf.B]
+        return 1.5e-6 * contacts[:, :, wf.LOAD] / np.where(area > 0.0, area, np.inf)
+
+    return Assumption(
+        "elastic",
+        "the steel does not flow",
+        "lower the load or the displacement: real contacts would be larger, and their pressure lower",
+        _touching(watched),
+        "MPa",
+        most=1e-6 * YIELDS,
+    )
+
+
+def _slow_slip(equations: Equations) -> Assumption:
+    speed = max(abs(equations.speed), wf.REGULAR)
+    return Assumption(
+        "constant friction",
+        "friction is the same however fast the wheels slip",
+        "give wheelset.override.friction as it is for such slip, or travel slower",
+        _touching(lambda contacts: speed * np.hypot(contacts[:, :, wf.XI_1], contacts[:, :, wf.XI_2])),
+        "m/s",
+        most=FAST_SLIP,
+    )
+
+
+def _no_slip(wheelset: Wheelset) -> Assumption:
+    def watched(path: Path) -> Watched:
+        contacts = path.contacts
+        creep, limit = np.hypot(contacts[:, :, wf.FX], contacts[:, :, wf.FY]), contacts[:, :, wf.LOAD]
+        used = shares(creep, wheelset.friction * limit)
+        return {"patches": used.max(axis=1)}
+
+    return Assumption(
+        "no slip",
+        "the linear law's creep forces are far below what friction carries",
+        'name the effect fastsim: contact.law = "fastsim"',
+        _of_path(watched),
+        "mu N",
+        most=NO_SLIP,
+    )
+
+
+def _travel(wheelset: Wheelset) -> Assumption:
+    def watched(path: Path) -> Watched:
+        along, up = (1e3 * wheelset.half_spacing * path.states[:, k] for k in (YAW, ROLL))
+        return {"along": np.abs(along), "across": 1e3 * np.abs(path.states[:, Y]), "vertical": np.abs(up)}
+
+    return Assumption(
+        "suspension",
+        "springs and dampers of the suspension are lines",
+        "stiffen the suspension: real guides have stops",
+        _of_path(watched),
+        "mm",
+        most=1e3 * LARGEST_TRAVEL,
+    )
+
+
+def _climbs(wheelset: Wheelset) -> Assumption:
+    def watched(path: Path) -> Watched:
+        part = shares(path.contacts[:, :, wf.FLANGE_FORCE], path.contacts[:, :, wf.LOAD])
+        return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
+
+    return Assumption(
+        "no flange climbs",
+        "no flange is pushed so hard that it climbs (Nadal, 70 degrees)",
+        "name the effect profiles, which show it",
+        _of_path(watched),
+        "of the wheel's load",
+        most=max(0.0, nadal(wheelset.friction)),
+    )
+
+
+def _flange_way(wheelset: Wheelset, watched: Callable[[Result], Watched] | None = None) -> Assumption:
+    return Assumption(
+        "on the tread",
+        "the wheels roll on their cones, and a flange's rail gives way by a few mm at most",
+        "name the effect profiles, which have flanges of their own",
+        watched or _of_path(lambda path: {"wheelset": np.abs(path.states[:, Y])}),
+        "m",
+        most=wheelset.flange_clearance + FLANGE_WAY,
+    )
+
+
+def _within_profiles(wheelset: Wheelset) -> Assumption:
+    """Distance (mm) of the contacts on the wheel from the flange's tip, and of those on the rail from its ends."""
+    assert wheelset.profiles is not None
+    side = wheelset.profiles.side(wheelset.radius)
+    tip, outer = float(side.wheel.y[np.argmax(side.wheel.z)]), float(side.wheel.y[-1])
+
+    def watched(path: Path) -> Watched:
+        contacts = path.contacts
+        load, half = contacts[:, :, wf.LOAD], contacts[:, :, wf.B]
+        wheel, rail = np.abs(_along_axle(path)) - side.wheelset.arm, np.abs(_across_track(path))
+        ends = {
+            "flange's tip": wheel - tip - TIP,
+            "wheel's face": outer - wheel - half,
+            "rail's ends": np.minimum(rail - side.rail.y[0], side.rail.y[-1] - rail) - half,
+        }
+        return {where: 1e3 * np.where(load > 0.0, free, np.inf).min(axis=1) for where, free in ends.items()}
+
+    return Assumption(
+        "within the profiles",
+        "contacts lie within the profiles, below the flange's tip",
+        "start with a smaller displacement, or use longer profiles",
+        _of_path(watched),
+        "mm",
+        least=0.0,
+    )
+
+
+def _along_axle(path: Path) -> Array:
+    """Places (n, patches) of the contacts along the axle from its middle (m)."""
+    roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
+    x, y, z = (contacts[:, :, k] for k in (wf.PLACE_X, wf.PLACE_Y, wf.PLACE_Z))
+    return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
+
+
+def _across_track(path: Path) -> Array:
+    """Places (n, patches) of the contacts from the middle of the track (m)."""
+    return np.asarray(path.states[:, Y, None] + path.contacts[:, :, wf.PLACE_Y])

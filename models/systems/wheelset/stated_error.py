@@ -1,0 +1,135 @@
+"""What the results of a wheelset say of their error: what steps leave, and what cells of FASTSIM do.
+
+Cells leave a hundred times as much as steps. One more path on half the cells, in twice the step where that can be,
+tells what cells leave; a few steps of twice the length on all cells tell how much of that is of steps, which grows
+along the path as what cells leave does.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from models.contact.accuracy import LIKELY, halved
+from models.core.discretisation import (
+    FINE_WINDOW,
+    Estimate,
+    Series,
+    by_cells,
+    estimated,
+    not_estimated,
+    rows_at,
+    size_of,
+    stated,
+)
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.rail import wheel_forces as wf
+from models.rail.equations import YAW, Path, Y
+from models.rail.limit_cycle import Orbit
+from models.systems.wheelset.assumptions import by_wheel
+from models.systems.wheelset.scene import MOST_CELLS, WheelsetScene
+
+UNITS = {"y": "m", "yaw": "rad", "fx": "N", "fy": "N"}
+"""Channels whose error is told; forces are the sum over the patches of a wheel."""
+ORDER, KINKED = 4, 2.0
+"""Of RK4, and as it is left where cells begin to slide one by one: 1 to 4 in random scenes."""
+OF_CELLS = 1.5
+"""Order that is taken for the cells to use; their error falls with the first to the second power."""
+SHORT = 0.1
+"""Share of the path that half the step repeats where twice the step cannot be."""
+FEWEST = 5
+"""Cells from which on half of them are a net."""
+March = Callable[[WheelsetScene], Path]
+"""The path of a scene, by one engine at one speed."""
+
+
+def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
+    """The result of a path with the errors of its principal channels; raises RunFailed where it is no answer."""
+    fine, step = series(run.detail), scene.run.step
+    if scene.contact.law == "linear":
+        return estimated(run, fine, lambda times, share: series(march(changed(scene, times, share))), ORDER, step)
+    cells = scene.contact.cells
+    other = halved(cells) if cells >= FEWEST else 2 * cells
+    try:
+        coarse = _coarse(scene, march, other)
+    except (InputError, RunFailed) as failure:
+        return not_estimated(run, f"on {other} cells the path fails: {failure}")
+    told = _of_steps(scene, march, fine, coarse)
+    for name, unit in UNITS.items():
+        gap = _gap(fine, coarse, name)
+        told[f"{name} of cells"] = by_cells(gap, size_of(fine.channels[name]), unit, cells, OF_CELLS, MOST_CELLS)
+    return stated(run, told, f"a path on {other} cells and some steps of other length")
+
+
+def series(path: Path) -> Series:
+    """The principal channels of a path."""
+    forces = {
+        name: np.stack([*by_wheel(path.contacts, path.contacts[:, :, k]).values()], axis=1)
+        for name, k in (("fx", wf.FX), ("fy", wf.FY))
+    }
+    return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
+
+
+def changed(scene: WheelsetScene, times: float, share: float = 1.0, cells: int | None = None) -> WheelsetScene:
+    """The scene in steps so many times as long, over a share of its path, in whole steps, on other cells."""
+    step = times * scene.run.step
+    duration = step * max(1, math.floor(share * scene.run.duration / step + 1e-9))
+    contact = scene.contact if cells is None else scene.contact.model_copy(update={"cells": cells})
+    run = scene.run.model_copy(update={"step": step, "duration": duration})
+    return scene.model_copy(update={"contact": contact, "run": run})
+
+
+def _coarse(scene: WheelsetScene, march: March, cells: int) -> Series:
+    """The path on other cells, in twice the step where that can be."""
+    with suppress(InputError, RunFailed):
+        return series(march(changed(scene, 2.0, cells=cells)))
+    return series(march(changed(scene, 1.0, cells=cells)))
+
+
+def _of_steps(scene: WheelsetScene, march: March, fine: Series, coarse: Series) -> dict[str, Estimate]:
+    """What steps leave over the whole path: what they leave at its beginning, as much larger as that of cells grows."""
+    power = 2.0**KINKED
+    try:
+        part, share, remains = series(march(changed(scene, 2.0, FINE_WINDOW))), FINE_WINDOW, 1.0 / (power - 1.0)
+    except (InputError, RunFailed):
+        part, share, remains = series(march(changed(scene, 0.5, SHORT))), SHORT, power / (power - 1.0)
+    end, told = share * scene.run.duration, {}
+    for name, unit in UNITS.items():
+        before, whole = _gap(fine, coarse, name, end), _gap(fine, coarse, name)
+        grown = max(1.0, whole / before) if before > 0.0 else 1.0
+        error, size = remains * grown * _gap(fine, part, name), size_of(fine.channels[name])
+        told[name] = Estimate(error, unit, error / size if size > 0.0 else 0.0, KINKED, scene.run.step)
+    return told
+
+
+def _gap(fine: Series, other: Series, name: str, end: float = math.inf) -> float:
+    """Root mean square of the difference of a channel until a time (s), at the rows that have the longer steps."""
+    long, short = sorted((fine, other), key=lambda series: -series.times[min(1, len(series.times) - 1)])
+    times = long.times[long.times <= min(end, short.times[-1]) * (1.0 + 1e-9)]
+    gap = long.channels[name][: len(times)] - short.channels[name][rows_at(short.times, times)]
+    return float(np.sqrt(np.mean(gap**2)))
+
+
+def with_error_of_cycles(
+    run: Result, orbits: Sequence[Orbit], coarse: Mapping[int, Orbit], unknown: str, cells: int
+) -> Result:
+    """A result of periodic motions with the errors of what was sought and of the frequency.
+
+    Each was solved in half the step, too, which tells what steps leave; ``coarse``: some of them, by their places, on
+    half the cells.
+    """
+    units, told = {unknown: "m" if unknown == "amplitude" else "m/s", "frequency": "Hz"}, dict[str, Estimate]()
+    for name, unit in units.items():
+        size = size_of(np.array([getattr(orbit, name) for orbit in orbits]))
+        changes = [orbit.frequency_error if name == "frequency" else orbit.error for orbit in orbits]
+        error = float(np.sqrt(np.mean(np.square(changes)))) / (2.0**KINKED - 1.0)
+        steps = [orbit.period / orbit.steps for orbit in orbits]
+        told[name] = Estimate(error, unit, error / size, KINKED, float(min(steps)))
+        if coarse:
+            gaps = [getattr(orbits[k], name) - getattr(other, name) for k, other in coarse.items()]
+            left = LIKELY * float(np.sqrt(np.mean(np.square(gaps))))
+            told[f"{name} of cells"] = by_cells(left, size, unit, cells, OF_CELLS, MOST_CELLS)
+    some = f", and half the cells at {len(coarse)} of {len(orbits)} cycles" if coarse else ", none on fewer cells"
+    return stated(run, told, f"half the step at every cycle{some}")

@@ -1,0 +1,36 @@
+"""What a table of friction takes for granted where it is read."""
+
+import numpy as np
+
+from models.core.assumptions import Assumption
+from models.tyre.tyre_table import TyreTable
+
+
+def assumptions(table: TyreTable, load: float) -> list[Assumption]:
+    """Of a result over "slip_angle" (deg) under a load (N): that both lie among the table's nodes.
+
+    A table of one load holds for all of them.
+    """
+    listed = [
+        Assumption(
+            "slip angles in the table",
+            "slip angles lie within the tyre's table, whose last value holds beyond",
+            "ask for smaller options.slip_angles, or name a table in tyres.files that reaches farther",
+            lambda run: {"slip angles": run["slip_angle"]},
+            "deg",
+            most=float(np.rad2deg(table.angles[-1])) * (1.0 + 1e-9),
+        )
+    ]
+    if table.loads.size > 1:
+        listed.append(
+            Assumption(
+                "loads in the table",
+                "the load lies within the tyre's table, whose last value holds beyond",
+                "ask for another options.load, or name a table in tyres.files that reaches farther",
+                lambda run: {"load": np.array([load])},
+                "N",
+                float(table.loads[0]),
+                float(table.loads[-1]),
+            )
+        )
+    return listed

@@ -1,0 +1,131 @@
+"""What stops say of their errors and of what they take for granted."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.core.assumptions import broken_of
+from models.core.discretisation import errors_of
+from models.core.scene_file import parse
+from models.systems.braking import errors
+from models.systems.braking.errors import alike, observed, whole
+from models.systems.braking.of_scene import merged
+from models.systems.braking.plan import describe
+from models.systems.braking.run import run
+from models.systems.braking.scene import build
+
+SCENES = Path(__file__).parents[1] / "studies" / "scenes"
+PLAIN = {
+    "title": "a stop",
+    "system": "braking",
+    "load_transfer": {},
+    "pressure": {},
+    "road": {"stretches": [{"left": "ice"}]},
+    "brakes": {"supply": 2.0},
+    "procedures": {"stop": {"kind": "straight", "speed": 8.0}},
+}
+DRY = {"road": {"stretches": [{"left": "dry"}]}, "brakes": {"supply": 6.0}}
+PORT = {"controller": {"kind": "slip_pi"}, "port": {"pressures": {"gain": 1.5}}}
+RANGE = {"port": {"signals": {"bits": 12, "range": 5.0}}}
+TURN = {"procedures": {"stop": {"kind": "j_turn", "speed": 5.0, "steer": 0.4}}}
+LAG = {"relaxation": {"front": 0.5, "rear": 0.5}, "run": {"sample": 0.02, "substeps": 1}}
+SPIN = {
+    "brakes": {"supply": 6.0, "front": {"gradient": 1.0}, "rear": {"gradient": 3000.0}},
+    "procedures": {"stop": {"kind": "j_turn", "speed": 15.0, "steer": 0.06}},
+}
+PLANTED = {
+    "loads at rest": ({**DRY, "load_transfer": None}, {"load_transfer": {}}, "load_transfer"),
+    "chambers": ({"controller": {"kind": "slip_bang_bang"}, "pressure": None}, {"pressure": {}}, "pressure_dynamics"),
+    "stop": ({"run": {"duration": 1.0}}, {"run": {"duration": 60.0}}, "run.duration"),
+    "parallel steering": (TURN, {"procedures": {"stop": {"steer": 0.1}}}, "steer less"),
+    "supply": ({**DRY, **PORT}, {"port": {"pressures": {"gain": 1.0}}}, "port.pressures"),
+    "range of the signals": (RANGE, {"port": {"signals": {"range": 40.0}}}, "port.signals.range"),
+    "cool brakes": (
+        {**DRY, "vehicle": {"override": {"mass": 20000.0}}, "procedures": {"stop": {"speed": 60.0}}},
+        {"procedures": {"stop": {"speed": 15.0}}},
+        "less speed",
+    ),
+    "still air": ({"procedures": {"stop": {"speed": 40.0}}}, {"procedures": {"stop": {"speed": 8.0}}}, "less speed"),
+    "loads of the friction": (
+        {"vehicle": {"override": {"mass": 15000.0}}},
+        {"vehicle": {"override": {"mass": 6000.0}}},
+        "tyres.files",
+    ),
+    "slip at low speed": ({**LAG, **TURN}, {"run": {"substeps": 8}}, "run.substeps"),
+    "forwards": (SPIN, {"brakes": {"front": {"gradient": 3000.0}, "rear": {"gradient": 100.0}}}, "anti_lock"),
+}
+"""Legal scenes that break an assumption, changes that lift it, and a word of the remedy."""
+ENGINES = dict(zip(PLANTED, ["reference", "mujoco"] * 6, strict=False)) | {"slip at low speed": "reference"}
+
+
+def scene(*changes):
+    table = PLAIN
+    for change in changes:
+        table = merged(table, change)
+    return build({key: value for key, value in table.items() if value is not None}, "s.toml")
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_what_is_broken_is_told_with_its_remedy_and_gone_with_it(name):
+    change, cure, word = PLANTED[name]
+    told = {one.name: one for one in broken_of(run(scene(change), ENGINES[name]))}
+    assert name in told and word in told[name].remedy and 0.0 < told[name].share <= 1.0
+    assert name not in {one.name for one in broken_of(run(scene(change, cure), ENGINES[name]))}
+
+
+def test_the_plain_stop_keeps_to_everything_and_show_lists_it():
+    assert broken_of(run(scene())) == [] and describe(scene()).count("  assumes ") >= 6
+
+
+ODD = {
+    "light braking": {},
+    "slip control": {**DRY, "controller": {"kind": "slip_pi"}},
+    "one step": {"run": {"substeps": 1}},
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_the_error_is_that_against_a_hundred_times_finer_steps(name):
+    odd = scene(ODD[name])
+    told = run(odd, error=True)
+    steps = odd.run.model_copy(update={"substeps": 100 * odd.run.substeps})
+    truth = run(odd.model_copy(update={"run": steps})).detail
+    fine, exact = whole(told.detail, told.times), whole(truth, told.times)
+    for channel in ("x", "speed"):
+        true = float(np.sqrt(np.mean((fine[channel] - exact[channel]) ** 2)))
+        assert true <= 3.0 * errors_of(told)[channel].error, channel
+
+
+def test_a_stop_on_ice_with_an_anti_lock_system_says_that_it_does_not_repeat():
+    told = run(scene({"controller": {"kind": "slip_bang_bang"}, "brakes": {"supply": 6.0}}), error=True)
+    assert errors_of(told) == {} and "other samples" in json.loads(told.data.attrs["error"])["why"]
+
+
+def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
+    """Planted fault: Richardson's estimate of a stop that does not repeat."""
+    cycling = scene({"controller": {"kind": "slip_bang_bang"}, "brakes": {"supply": 6.0}})
+    monkeypatch.setattr(errors, "alike", lambda path, other: True)
+    monkeypatch.setattr(errors, "near", lambda *given: False)
+    assert errors_of(run(cycling, error=True))
+    other = cycling.model_copy(update={"run": cycling.run.model_copy(update={"substeps": 8})})
+    assert not alike(run(cycling).detail, run(other).detail)
+
+
+def test_no_error_is_asked_for_by_itself():
+    assert json.loads(run(scene()).data.attrs["error"]) == {}
+
+
+def test_orders_are_observed_of_any_numbers_of_steps():
+    for order in (1.0, 2.0):
+        errs = [count**-order for count in (6, 3, 1)]
+        assert observed(errs[1] - errs[0], errs[2] - errs[1], [6, 3, 1]) == pytest.approx(order, abs=0.03)
+
+
+@pytest.mark.parametrize("file", ["braking", "braking_ensemble", "braking_calibration", "braking_controllers"])
+def test_shipped_scenes_break_nothing(file):
+    path = SCENES / f"{file}.toml"
+    shipped = build(parse(path), path.name, path.parent)
+    for name in shipped.procedures:
+        assert broken_of(run(shipped, procedure=name)) == [], name

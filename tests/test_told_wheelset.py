@@ -1,0 +1,151 @@
+"""What results of a wheelset say of their error and of what they take for granted."""
+
+import json
+
+import numpy as np
+import pytest
+
+from models.core import told
+from models.core.assumptions import broken_of
+from models.core.discretisation import CELLS, error_lines, errors_of
+from models.core.errors import RunFailed
+from models.rail.wheelset import CHOSEN
+from models.systems.wheelset import plan
+from models.systems.wheelset import run as system
+from models.systems.wheelset.run import cycles, linearised, over_speeds, run
+from models.systems.wheelset.scene import build
+from models.systems.wheelset.stated_error import series
+from studies.command.asked import load_scene
+from validation.stated_errors.systems.wheelset import samples
+
+SPEED = 40.0
+SCENE = {
+    "title": "a wheelset",
+    "system": "wheelset",
+    "contact": {"cells": 7},
+    "speeds": {"values": [SPEED]},
+    "run": {"duration": 0.1, "displacement": 3e-3, "speeds": [SPEED]},
+}
+LINEAR = {"contact": {"law": "linear"}}
+PUSHED = {"run": {"duration": 0.1, "displacement": 0.014, "step": 1e-4}}
+SLIDES = {"run": {"duration": 0.05, "displacement": 6e-3, "yaw": 2e-3}}
+TURNED = {"wheelset": {"override": {"stiffness_x": 2e4}}, "run": {"duration": 0.05, "yaw": 0.022}}
+SHARP = {"wheelset": {"override": {"head_radius": 0.05, "load": 4e5}}, "run": {"duration": 0.02, "step": 1e-4}}
+STRAIGHT, ON_PROFILES = {"run": {"duration": 0.05, "yaw": 2e-3}}, {"profiles": {}, "run": {"duration": 0.05}}
+PLANTED = {
+    "no slip": (LINEAR | SLIDES, {"contact": {"cells": 7}}, "fastsim"),
+    "no flange climbs": (PUSHED, ON_PROFILES, "profiles"),
+    "on the tread": (PUSHED, ON_PROFILES, "profiles"),
+    "suspension": (TURNED, STRAIGHT, "stiffen"),
+    "constant friction": (TURNED, STRAIGHT, "slip"),
+    "elastic": (SHARP, {"wheelset": {}}, "load"),
+}
+"""By name of an assumption: what breaks it, the remedy, and a word that the remedy is told by."""
+
+
+def scene(**changes):
+    table = SCENE | changes
+    table["run"] = {"speeds": [SPEED], **table["run"]}
+    return build(table, "w.toml")
+
+
+def names(result):
+    return {one.name for one in broken_of(result)}
+
+
+@pytest.mark.parametrize("engine", ["reference", "mujoco"])
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_breach_is_found_and_its_remedy_lifts_it(name, engine):
+    breaks, cures, word = PLANTED[name]
+    broke = run(scene(**breaks), engine)
+    (one,) = (one for one in broken_of(broke) if one.name == name)
+    assert word in one.remedy and one.share > 0.0 and 0.0 <= one.first <= broke.times[-1]
+    assert broke.data.attrs["status"].endswith("assumptions broken") and f"worst {one.worst:.4g}" in one.line()
+    assert name not in names(run(scene(**(breaks | cures)), engine))
+
+
+def test_a_creeping_wheelset_is_told_of_its_speed():
+    slow = scene(run={"duration": 1e-4, "step": 1e-6, "speeds": [0.05], "displacement": 1e-3})
+    assert "speed" in names(run(slow, "reference", 0.05)) and "speed" not in names(run(scene(), "reference"))
+
+
+def test_a_soft_wheelset_is_no_half_space_and_one_of_steel_is(tmp_path):
+    values = CHOSEN.changed(load=12000.0).model_dump(exclude={"material", "profiles"})
+    lines = "\n".join(f"{key} = {value!r}" for key, value in values.items())
+    found = []
+    for name, modulus in (("soft", 2e6), ("steel", 2.1e11)):
+        (tmp_path / f"{name}.toml").write_text(f"{lines}\n[material]\nE = {modulus}\nnu = 0.28\n")
+        own = scene(wheelset={"parameters": str(tmp_path / f"{name}.toml")}, run={"duration": 0.02})
+        found.append(names(run(own, "reference")))
+    assert "half-space" in found[0] and "half-space" not in found[1]
+
+
+def test_without_friction_eigenvalues_say_so():
+    smooth, rough = (
+        linearised(scene(wheelset={"override": {"friction": friction}}), "reference") for friction in (0.0, 0.3)
+    )
+    assert names(smooth) == {"friction"} and names(rough) == set()
+
+
+@pytest.mark.parametrize("engine", ["reference", "exudyn", "mujoco"])
+def test_steps_and_cells_are_both_told_by_every_engine(engine):
+    result = run(scene(), engine, error=True)
+    of = {one.of for one in errors_of(result).values()}
+    assert of == {"", CELLS} and len(error_lines(result)) == 2 and errors_of(run(scene(), engine)) == {}
+
+
+@pytest.mark.full
+def test_a_truth_on_ten_times_the_cells_is_within_what_is_told():
+    ratios = np.array([sample.ratio for sample in samples(8, 4)])
+    assert (ratios < 3.0).mean() > 0.85 and (ratios > 0.1).mean() > 0.85
+
+
+def test_an_estimate_that_leaves_the_cells_out_would_be_caught():
+    """Planted fault: steps alone tell less than a tenth of what a path on few cells errs by."""
+    result = run(scene(), "reference", error=True)
+    true = run(scene(contact={"cells": 70}), "reference")
+    gap = series(result.detail).channels["y"] - series(true.detail).channels["y"]
+    error = float(np.sqrt(np.mean(gap**2)))
+    assert errors_of(result)["y"].error < 0.1 * error < errors_of(result)["y of cells"].error
+
+
+@pytest.mark.full
+def test_cells_that_are_no_answer_are_refused_with_those_to_use():
+    """Above the critical speed a path on five cells swings at a time of its own."""
+    unstable = {"wheelset": {"override": {"stiffness_x": 2e5}}}
+    long = {"run": {"duration": 6.0, "displacement": 1e-3, "speeds": [80.0]}}
+    with pytest.raises(RunFailed, match=r"the cells are too few, this is no answer: .* use at least") as refused:
+        run(scene(**unstable, **long, contact={"cells": 5}), "reference", 80.0, error=True)
+    worst = max(errors_of(refused.value.partial).values(), key=lambda one: one.share)
+    cured = run(scene(**unstable, **long, contact={"cells": int(worst.step)}), "reference", 80.0, error=True)
+    assert max(one.share for one in errors_of(cured).values()) < 0.5
+
+
+def test_joined_paths_keep_what_each_says():
+    paths = {"reference": {SPEED: run(scene(**PUSHED), "reference", error=True)}}
+    whole = over_speeds(paths)
+    assert names(whole) == names(paths["reference"][SPEED]) and "reference, 40 m/s, y of cells" in errors_of(whole)
+    json.dumps(told.as_json({"whole": whole}), allow_nan=False)
+
+
+def test_a_limit_cycle_tells_its_error_and_what_it_takes_for_granted():
+    hunts = scene(wheelset={"override": {"conicity": 0.15, "stiffness_x": 8e5}}, contact={"cells": 5})
+    found, failed = cycles(hunts, ("reference",), 67.0, error=True)
+    said = errors_of(found["reference"])
+    assert (
+        not failed
+        and {"amplitude", "frequency", "amplitude of cells"} <= said.keys()
+        and names(found["reference"]) == set()
+    )
+    finer, _ = cycles(
+        hunts.model_copy(update={"contact": hunts.contact.model_copy(update={"cells": 40})}), ("reference",), 67.0
+    )
+    true = abs(finer["reference"].detail.amplitude - found["reference"].detail.amplitude)
+    assert true < 3.0 * said["amplitude of cells"].error
+
+
+@pytest.mark.parametrize("name", ["wheelset", "choice_wheelset"])
+def test_shipped_scenes_break_nothing_and_are_listed(name):
+    shipped = load_scene(name, ["run.duration=1.0"])
+    assert all(names(run(shipped, "reference", speed)) == set() for speed in system.path_speeds(shipped))
+    assert "assumes    both wheels stay on their rails" in plan.describe(shipped)

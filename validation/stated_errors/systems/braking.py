@@ -1,0 +1,134 @@
+"""Random stops in random numbers of steps to a sample; the truth is the reference's, or MuJoCo's of a vehicle on its
+suspension, with a hundred times as many."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.systems.braking import ENGINES
+from models.systems.braking.errors import whole
+from models.systems.braking.march import Braked, Path
+from models.systems.braking.procedures import check_engine
+from models.systems.braking.run import run
+from models.systems.braking.scene import BrakingScene, build
+from validation.stated_errors.sample import Sample
+
+FINER = 100
+"""Times as many steps in the truth."""
+SURFACES = {"ice": 0.15, "snow": 0.25, "wet": 0.6, "dry": 0.7}
+"""With the friction by which circles are drawn."""
+CONTROLLERS = ("none", "slip_bang_bang", "acceleration_phases", "slip_pi")
+AXLE = {"track": 1.9, "radius": 0.5, "spin_inertia": 13.35, "roll_share": 0.5}
+TRAILER = {
+    "mass": 7000.0,
+    "yaw_inertia": 20000.0,
+    "height": 1.2,
+    "drawbar": 2.5,
+    "drawbar_mass": 600.0,
+    "drawbar_inertia": 600.0,
+    "front": {"x": 2.2, **AXLE},
+    "rear": {"x": -2.2, **AXLE},
+}
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many stops that end, those among them that say why there is no number."""
+    random, made = np.random.default_rng(seed), 0
+    while made < count:
+        engine = str(random.choice(ENGINES))
+        try:
+            scene = build(_table(random), "drawn.toml")
+            check_engine(scene, engine)
+            sample = _sample(scene, engine)
+        except (InputError, RunFailed):  # a circle that tyres do not hold, a vehicle that rolls over
+            continue
+        made += 1
+        yield sample
+
+
+def _table(random: np.random.Generator) -> dict[str, Any]:
+    """A scene of one procedure."""
+    surface, kind, steps = (
+        str(random.choice(list(SURFACES))),
+        str(random.choice(CONTROLLERS)),
+        int(random.choice(8)) + 1,
+    )
+    supply = random.uniform(0.9, 2.5) if kind == "none" else random.uniform(3.0, 9.0)
+    table: dict[str, Any] = {
+        "title": f"drawn: {kind} on {surface}, {steps} steps",
+        "system": "braking",
+        "road": {"stretches": [{"left": surface}]},
+        "tyres": {"scale": {"dry": random.uniform(0.6, 1.0)}},
+        "brakes": {
+            "supply": supply,
+            "front": {"gradient": random.uniform(800.0, 2000.0), "push_out": random.uniform(0.0, 0.8)},
+            "rear": {"gradient": random.uniform(600.0, 1500.0), "push_out": 0.25},
+        },
+        "controller": {"kind": kind},
+        "procedures": {"stop": _procedure(random, surface)},
+        "run": {"sample": float(random.choice([0.004, 0.0055, 0.01])), "substeps": steps},
+    }
+    if random.random() < 0.2:
+        return table | {"vehicle": {"file": "r19_free", "spin_inertia": 1.0}, "brakes": _of_car(random)}
+    table["vehicle"] = {"override": {"mass": random.uniform(4500.0, 9000.0), "yaw_inertia": random.uniform(2e4, 4e4)}}
+    effects = {
+        "load_transfer": {},
+        "pressure": {"fill": random.uniform(0.05, 0.25), "empty": random.uniform(0.05, 0.2)},
+        "trailer": TRAILER,
+        "relaxation": {"front": random.uniform(0.2, 0.6), "rear": random.uniform(0.2, 0.6)},
+    }
+    shares = (0.7, 0.8, 0.25, 0.2)
+    return table | {
+        name: part for (name, part), share in zip(effects.items(), shares, strict=True) if random.random() < share
+    }
+
+
+def _of_car(random: np.random.Generator) -> dict[str, Any]:
+    """Brakes of the vehicle on its suspension."""
+    gradient = random.uniform(200.0, 600.0)
+    return {"supply": random.uniform(1.0, 4.0), "front": {"gradient": gradient}, "rear": {"gradient": 0.5 * gradient}}
+
+
+def _procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
+    kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
+    radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
+    other = str(random.choice([name for name in SURFACES if name != surface]))
+    own = {"split": {"right": other}, "turn": {"radius": radius}, "j_turn": {"steer": random.uniform(-0.06, 0.06)}}
+    return {"kind": kind, "speed": speed, **own.get(kind, {})}
+
+
+def _sample(scene: BrakingScene, engine: str) -> Sample:
+    """Run with its error, and truth."""
+    with counted() as calls:
+        try:
+            told = run(scene, engine, error=True)
+        except RunFailed as error:
+            if error.partial is None or not errors_of(error.partial):
+                raise
+            told = error.partial
+    errors, true = errors_of(told), dict[str, float]()
+    if errors:
+        most = scene.run.model_copy(update={"substeps": FINER * scene.run.substeps})
+        truth = run(scene.model_copy(update={"run": most}), "mujoco" if scene.vehicle.file else "reference").detail
+        fine, exact = whole(told.detail, told.times), whole(truth, told.times)
+        true = {name: float(np.sqrt(np.mean((fine[name] - exact[name]) ** 2))) for name in errors}
+    return Sample(scene.title, engine, errors, true, calls[0], sum(calls[1:]))
+
+
+@contextmanager
+def counted() -> Iterator[list[float]]:
+    """Steps of every run within the block."""
+    calls, march = list[float](), Braked.run
+
+    def counting(vehicle: Braked, *given: Any) -> Path:
+        path = march(vehicle, *given)
+        calls.append(float(vehicle.substeps * (len(path.times) - 1)))
+        return path
+
+    with mock.patch.object(Braked, "run", counting):
+        yield calls

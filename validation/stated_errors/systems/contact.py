@@ -1,0 +1,78 @@
+"""Random contacts whose stated error is held against ten times the cells along each axis.
+
+A call is a cell; of the exact theory every cell feels every other one.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from models.contact.accuracy import halved
+from models.contact.theories import Contact
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.systems.contact.run import POWERS, run
+from models.systems.contact.scene import ContactScene, build
+from models.systems.contact.stated_error import rms
+from validation.stated_errors.sample import Sample
+
+MORE, MOST, OF_EXACT = 10, 400, 60
+"""Cells of the truths by those of the run; cells at most, along each axis, and those of the exact theory."""
+THEORIES = ("fastsim", "fastsim", "fastsim", "simplified", "exact")
+LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
+"""Cells along each axis."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many random scenes; those that are refused are drawn anew."""
+    rng, made = np.random.default_rng(seed), 0
+    while made < count:
+        try:
+            sample = _sample(_drawn(rng))
+        except (InputError, RunFailed):
+            continue
+        made += 1
+        yield sample
+
+
+def _drawn(rng: np.random.Generator) -> ContactScene:
+    theory = str(rng.choice(THEORIES))
+    method: dict[str, Any] = {"name": theory, "cells": int(rng.integers(LEAST, LARGEST[theory]))}
+    if theory == "fastsim":
+        method["march"] = str(rng.choice(["second-order", "second-order", "plain"]))
+        method["bound"] = str(rng.choice(["intermediate", "parabolic", "elliptic"]))
+        method["flexibilities"] = str(rng.choice(["blended", "one", "three"]))
+    spins = {"xi_x": 3e-3, "xi_y": 3e-3, "spin": 0.8}
+    creepage = {name: float(size * rng.normal()) for name, size in spins.items() if rng.random() < 0.7}
+    table: dict[str, Any] = {
+        "title": "a random contact",
+        "system": "contact",
+        "curvatures": {"A": float(10.0 ** rng.uniform(-0.4, 0.8)), "B": float(10.0 ** rng.uniform(-0.4, 1.0))},
+        "contact": {"load": float(10.0 ** rng.uniform(4.0, 5.2)), "friction": float(rng.uniform(0.1, 0.6))},
+        "creepage": creepage or {"xi_x": 1e-3},
+        "method": method,
+    }
+    if rng.random() < 0.4 and theory != "exact":
+        swept = str(rng.choice([*spins]))
+        table["creepage"].pop(swept, None)
+        table["sweep"] = {"of": swept, "start": 0.0, "stop": 2.0 * spins[swept], "count": 9}
+    return build(table)
+
+
+def _sample(scene: ContactScene) -> Sample:
+    run_ = run(scene, error=True)
+    body, motions, cells = run_.detail.contact, run_.detail.motions, scene.method.cells
+    most = OF_EXACT if scene.method.name == "exact" else MOST
+    truth = np.array([_rolled(body, motion, min(MORE * cells, most)) for motion in motions])
+    gap = np.column_stack([run_["fx"], run_["fy"], run_["mz"]]) - truth
+    true = {"force": rms(np.hypot(gap[:, 0], gap[:, 1])), "mz": rms(gap[:, 2])}
+    power = POWERS[scene.method.name] or 0
+    name = f"{scene.method.name} on {cells} cells, {len(motions)} motions"
+    calls = len(motions) * float(cells) ** power
+    return Sample(name, "", errors_of(run_), true, calls, calls * (halved(cells) / cells) ** power)
+
+
+def _rolled(body: Contact, motion: tuple[float, float, float], cells: int) -> tuple[float, float, float]:
+    forces = body.roll(motion, cells)
+    return forces.fx, forces.fy, forces.mz

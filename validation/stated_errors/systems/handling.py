@@ -1,0 +1,95 @@
+"""Random manoeuvres of cars on rolling tyres, in random steps and nets; the truth has ten times as many cells across
+and along the patch, and steps an eighth as long: errors are a hundredth and less."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.engines.free_vehicle import ENGINES, FreeModel
+from models.engines.spatial_protocol import SpatialRun
+from models.multibody.forces import CELLS
+from models.systems.handling.run import Drive, driven, principal, run
+from models.systems.handling.scene import HandlingScene, build
+from validation.stated_errors.sample import Sample
+
+CELL, STEP = 10, 8
+"""Times that the truth is finer in cells along the patch, and in steps."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many manoeuvres whose runs end."""
+    random, made = np.random.default_rng(seed), 0
+    while made < count:
+        engine = str(random.choice(ENGINES))
+        try:
+            sample = _sample(build(_table(random), "drawn.toml"), engine)
+        except (InputError, RunFailed):  # a step that the tyres cannot follow is refused before any error is told
+            continue
+        made += 1
+        yield sample
+
+
+def _table(random: np.random.Generator) -> dict[str, Any]:
+    """A scene of one manoeuvre; steps divide its duration."""
+    step, steps = float(f"{10.0 ** random.uniform(-3.4, -2.3):.3g}"), int(random.integers(120, 400))
+    lasts = steps * step
+    manoeuvre: dict[str, Any] = {
+        "speed": random.uniform(10.0, 35.0),
+        "duration": lasts,
+        "steer": [[0.1 * lasts, 0.0], [random.uniform(0.3, 0.9) * lasts, random.uniform(-0.08, 0.08)]],
+        "rough": bool(random.integers(2)),
+    }
+    if pedal := random.choice(["brake", "drive", ""]):
+        manoeuvre[str(pedal)] = [[0.2 * lasts, 0.0], [0.6 * lasts, random.uniform(100.0, 2500.0)]]
+    return {
+        "title": f"drawn, steps of {step:g} s",
+        "system": "handling",
+        "tyres": {"friction": random.uniform(0.3, 1.1), "cells": int(random.integers(5, 20))},
+        "road": {"iso8608": str(random.choice(list("ABC"))), "seed": int(random.integers(1000))},
+        "run": {"step": step},
+        "manoeuvres": {"drawn": manoeuvre},
+    }
+
+
+def _sample(scene: HandlingScene, engine: str) -> Sample:
+    """Run with its error, and truth."""
+    with counted() as calls:
+        try:
+            told = run(scene, engine, error=True)
+        except RunFailed as error:
+            if error.partial is None:
+                raise
+            told = error.partial
+    errors, drive = errors_of(told), told.detail
+    return Sample(scene.title, engine, errors, _true(scene, drive, engine, told), calls[0], sum(calls[1:]))
+
+
+def _true(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
+    """Errors of every channel that is told."""
+    own = scene.manoeuvres["drawn"]
+    fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
+    truth = principal(driven(engine, fine.handling("drawn"), own.speed, own.duration, scene.run.step / STEP))
+    return {
+        name: float(np.sqrt(np.mean((values - truth.channels[name][::STEP]) ** 2)))
+        for name, values in principal(drive).channels.items()
+        if name in errors_of(told)
+    }
+
+
+@contextmanager
+def counted() -> Iterator[list[float]]:
+    """Evaluations of the forces within the block, run by run, each times the cells of its tyres' nets."""
+    calls, march = list[float](), FreeModel.run
+
+    def counting(model: FreeModel, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
+        calls.append(4.0 * round(duration / step) * model.numbers[CELLS])
+        return march(model, q, v, duration, step)
+
+    with mock.patch.object(FreeModel, "run", counting):
+        yield calls

@@ -1,0 +1,103 @@
+"""Random cut vehicles on hub forces of a virtual measurement, in random engines, steps and rates.
+
+The truth, measurement and run, has steps a twelfth as long: by their order of 4 its errors are a ten-thousandth, and
+where wheels leave the road a hundredth.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.engines.cut_vehicle import ENGINES, HubModel
+from models.systems.hub_forces.run import principal, run
+from models.systems.hub_forces.scene import HubScene, build
+from validation.stated_errors.sample import Sample
+
+FINER = 12
+"""Times that the truth's steps are shorter."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many scenes whose runs end."""
+    random, made = np.random.default_rng(seed), 0
+    while made < count:
+        engine = str(random.choice(ENGINES))
+        try:
+            sample = _sample(build(_table(random), "drawn.toml"), engine)
+        except (InputError, RunFailed):  # steps in which a mode would grow are refused before any run
+            continue
+        made += 1
+        yield sample
+
+
+def _table(random: np.random.Generator) -> dict[str, Any]:
+    """A scene of a virtual measurement; steps divide its sampling period."""
+    step, part = float(f"{10.0 ** random.uniform(-3.0, -1.9):.3g}"), int(random.choice([1, 1, 2, 2, 3, 4]))
+    noise = str(random.choice(["white", "none"]))
+    return {
+        "title": f"drawn, steps of {step:g} s, {part} a sample",
+        "system": "hub-forces",
+        "vehicle": {"file": str(random.choice(["r19_free", "r19_ride"]))},
+        "run": {"step": step, "duration": step * part * int(random.uniform(0.8, 1.6) / (step * part))},
+        "road": {
+            "iso8608": str(random.choice(list("BCDE"))),
+            "speed": random.uniform(15.0, 60.0),
+            "seed": int(random.integers(1000)),
+        },
+        "forces": {
+            "sampling_rate": 1.0 / (step * part),
+            "frame": str(random.choice(["hub", "body"])),
+            "interpolation": str(random.choice(["linear", "smooth"])),
+            "noise": noise,
+        },
+        "angles": {"noise": noise},
+        "effects": {"lift_off": {}} if random.integers(4) == 0 else {},
+        "stabilise": {"method": str(random.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
+    }
+
+
+def _sample(scene: HubScene, engine: str) -> Sample:
+    """Run with its error, and truth."""
+    with counted() as calls:
+        told = _told(scene, engine)
+    errors, plain = errors_of(told), 2 * scene.steps
+    names = list(errors)
+    title = f"{scene.title}, {scene.stabilise.method}, {scene.vehicle.file}"
+    return Sample(title, engine, errors, _true(scene, engine, told, names), 4.0 * plain, sum(calls) - 4.0 * plain)
+
+
+def _told(scene: HubScene, engine: str) -> Result:
+    """The run with its error, refused or not."""
+    try:
+        return run(scene, engine, error=True)
+    except RunFailed as error:
+        if error.partial is None:
+            raise
+        return error.partial
+
+
+def _true(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[str, float]:
+    """Errors of every channel that is told."""
+    fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
+    vehicle = scene.cut_vehicle()
+    truth, own = principal(vehicle, run(fine, engine).detail).channels, principal(vehicle, told.detail).channels
+    return {name: float(np.sqrt(np.mean((own[name] - truth[name][::FINER]) ** 2))) for name in names}
+
+
+@contextmanager
+def counted() -> Iterator[list[float]]:
+    """Evaluations of the forces within the block, run by run."""
+    calls, march = list[float](), HubModel.marched
+
+    def counting(model: HubModel, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        calls.append(4.0 * model.steps)
+        return march(model, q, v)
+
+    with mock.patch.object(HubModel, "marched", counting):
+        yield calls

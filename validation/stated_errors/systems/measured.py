@@ -1,0 +1,85 @@
+"""Random recordings of a virtual measurement, whose section forces are computed in random engines.
+
+The truth, measurement and run, has steps a twelfth as long: by their order of 4 its errors are a ten-thousandth.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.engines.cut_vehicle import ENGINES
+from models.systems.measured.run import run
+from models.systems.measured.scene import build
+from validation.stated_errors.sample import Sample
+from validation.stated_errors.systems.hub_forces import counted
+
+FINER = 12
+"""Times that the truth's steps are shorter."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many recordings whose runs end."""
+    random, made = np.random.default_rng(seed), 0
+    while made < count:
+        engine, table = str(random.choice(ENGINES)), _table(random)
+        try:
+            sample = _sample(table, engine)
+        except (InputError, RunFailed):  # steps in which a mode would grow are refused before any run
+            continue
+        made += 1
+        yield sample
+
+
+def _table(random: np.random.Generator) -> dict[str, Any]:
+    """A scene of a virtual measurement; steps of the road divide its period, those of the run are it."""
+    period, part = float(f"{10.0 ** random.uniform(-2.9, -2.1):.3g}"), int(random.choice([1, 2]))
+    road = {
+        "iso8608": str(random.choice(list("BCD"))),
+        "speed": random.uniform(15.0, 45.0),
+        "seed": int(random.integers(99)),
+    }
+    return {
+        "title": f"drawn, every {period:g} s, {part} steps of the road each",
+        "system": "measured",
+        "vehicle": {"file": "r19_free"},
+        "virtual": {
+            "road": road,
+            "duration": period * int(random.uniform(2.0, 4.0) / period),
+            "sampling_rate": 1.0 / period,
+            "step": period / part,
+            "frame": str(random.choice(["hub", "body"])),
+            "faults": {"noise": {"force": random.uniform(0.0, 10.0), "angle": 1e-3, "angular rate": 3e-3}},
+            "format": "csv",
+        },
+        "stabilise": {"method": str(random.choice(["none", "kalman", "prescribed"])), "smoothing": 3.0},
+    }
+
+
+def _sample(table: dict[str, Any], engine: str) -> Sample:
+    """Run with its error, and truth."""
+    own = build(table, "drawn.toml")
+    with counted() as calls:
+        try:
+            told = run(own, engine, error=True)
+        except RunFailed as error:
+            if error.partial is None:
+                raise
+            told = error.partial
+    virtual = table["virtual"] | {"step": table["virtual"]["step"] / FINER}
+    truth = run(build(table | {"virtual": virtual, "run": {"step": 1.0 / (FINER * virtual["sampling_rate"])}}), engine)
+    steps = 4.0 * (round(virtual["duration"] / table["virtual"]["step"]) + told.counts()["steps"])
+    title = f"{table['title']}, {table['stabilise']['method']}"
+    return Sample(title, engine, errors_of(told), _true(told, truth), steps, sum(calls) - steps)
+
+
+def _true(told: Result, truth: Result) -> dict[str, float]:
+    """Errors of every channel that is told."""
+    mine, fine = (each.detail.outcome for each in (told, truth))
+    return {
+        name: float(np.sqrt(np.mean((mine.samples(name) - fine.samples(name)[: mine.done]) ** 2)))
+        for name in errors_of(told)
+    }

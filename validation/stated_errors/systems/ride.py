@@ -1,0 +1,201 @@
+"""Samples of rides: covariances beside extended precision, drives beside shorter steps, copies beside many more, and
+engines in time beside runs a hundred times finer on the same road."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from control import lyap
+
+from models.core.discretisation import Estimate, errors_of
+from models.core.errors import RunFailed
+from models.core.result import Result
+from models.ride.covariance import hits
+from models.ride.excited import excited
+from models.ride.nonlinear_copies import copies_in_time
+from models.ride.road_path import RoadPath
+from models.ride.varying_speed import REACH, varying_speed
+from models.road.excitation import Excitation
+from models.systems.ride.nonlinear import ORDER, Sampling, driven, in_engine, linearised
+from models.systems.ride.of_scene import excitation_of, linear_vehicle, vehicle_of
+from models.systems.ride.run import ANY, run
+from models.systems.ride.scene import RideScene, build
+from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import linearise, wheels
+from validation.stated_errors.sample import Sample
+
+FINER = 100
+"""Times that a truth's steps are shorter."""
+MANY = 2000
+"""Copies of a truth."""
+ENGINES = ("exudyn", "mujoco")
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """Random rides of all kinds, in turn."""
+    rng = np.random.default_rng(seed)
+    kinds = (_in_time, _swept, _in_time, _driven, _in_time, _copies)
+    for i in range(count):
+        yield kinds[i % len(kinds)](rng, i)
+
+
+def _scene(rng: np.random.Generator, file: str, point: str = "unloaded", **tables: Any) -> RideScene:
+    """A scene with a road of random level, corners and correlation."""
+    road = {
+        "level": float(10 ** rng.uniform(-6.0, -4.3)),
+        "corner_mean": float(rng.uniform(0.02, 0.5)),
+        "corner_roll": float(rng.uniform(0.6, 3.0)),
+    }
+    road |= {"cutoff": float(rng.uniform(8.0, 40.0))} if rng.random() < 0.5 else {}
+    vehicle = {"file": file, "operating_point": point}
+    return build({"title": "a sample", "system": "ride", "vehicle": vehicle, "road": road, **tables}, "sample.toml")
+
+
+def _varied(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle:
+    """The vehicle with other stiffnesses and dampings."""
+    springs = tuple(
+        replace(s, stiffness=s.stiffness * rng.uniform(0.6, 1.6), damping=s.damping * rng.uniform(0.5, 1.8))
+        for s in vehicle.springs
+    )
+    tyres = tuple(replace(t, stiffness=t.stiffness * rng.uniform(0.7, 1.4)) for t in vehicle.tyres)
+    return replace(vehicle, springs=springs, tyres=tyres)
+
+
+def _of(result: Result, name: str, engine: str, true: Mapping[str, float], calls: float, extra: float) -> Sample:
+    told = {channel: one for channel, one in errors_of(result).items() if channel in true}
+    return Sample(name, engine, told, true, calls, extra)
+
+
+def _swept(rng: np.random.Generator, number: int) -> Sample:
+    """Deviations of a linear vehicle at nine speeds, beside the same in extended precision."""
+    file = str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    engine = str(rng.choice(["reference", *ENGINES]))
+    scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
+    vehicle = _varied(rng, vehicle_of(scene))
+    result = run(scene, engine, vehicle=vehicle, error=True)
+    road, own = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
+    true = np.array([exact(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
+    gaps = np.sqrt(np.mean((own - true) ** 2, axis=0))
+    names = result["output"].tolist()
+    return _of(result, f"{number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0)
+
+
+def exact(linear: LinearVehicle, road: Excitation, speed: float) -> np.ndarray:
+    """Deviations (p,) of a vehicle with undamped tyres in extended precision, from the matrices as they are."""
+    system, n, m = excited(linear, road, speed), len(linear.mass), len(road.F)
+    A, C = system.A.astype(np.longdouble), system.C.astype(np.longdouble)
+    forces = np.hstack([linear.road_stiffness.astype(np.longdouble) @ heights for heights in road.heights])
+    wanted = np.hstack([-linear.stiffness, -linear.damping, forces])
+    for _ in range(3):
+        left = wanted - linear.mass.astype(np.longdouble) @ A[n : 2 * n]
+        A[n : 2 * n] += np.linalg.solve(linear.mass, left.astype(float))
+    A[2 * n :, 2 * n :] = np.kron(np.eye(len(road.heights)), speed * road.F.astype(np.longdouble)).reshape(
+        len(road.heights) * m, -1
+    )
+    C += linear.read.acceleration @ (A - system.A)[n : 2 * n]
+    met = hits(system)
+    before, Q = np.zeros_like(met.B[0], np.longdouble), np.zeros_like(A)
+    for j, b in enumerate(met.B):
+        if j and not met.independent:
+            before = _exponential(A * (met.delays[j] - met.delays[j - 1])) @ (before + met.B[j - 1])
+        Q += b @ b.T + before @ b.T + b @ before.T
+    P: np.ndarray = np.zeros_like(A)
+    for _ in range(8):
+        half = A @ P
+        P += lyap(system.A, (half + half.T + Q).astype(float), method="scipy")
+        P = (P + P.T) / 2
+    return np.sqrt(np.einsum("pi,ij,pj->p", C, P, C)).astype(float)
+
+
+def _exponential(A: np.ndarray) -> np.ndarray:
+    """e^A in extended precision, by a series of a small part of A, squared."""
+    halvings = max(0, int(np.ceil(np.log2(float(abs(A).sum(axis=1).max()) + 1e-30))) + 1)
+    small, term = A / 2**halvings, np.eye(len(A), dtype=np.longdouble)
+    total = term.copy()
+    for k in range(1, 30):
+        term = term @ small / k
+        total += term
+    for _ in range(halvings):
+        total = total @ total
+    return total
+
+
+def _driven(rng: np.random.Generator, number: int) -> Sample:
+    """A drive with two pieces, beside the same in steps eight times shorter, whose error is some 1e-9 of its own."""
+    first = float(rng.choice([0.0, rng.uniform(2.0, 15.0)]))
+    drive = {"time": [0.0, float(rng.uniform(1.0, 2.0)), 3.0], "speed": [first, *rng.uniform(3.0, 30.0, 2).tolist()]}
+    scene = _scene(rng, "quarter_car", drive=drive, study="ride_drive")
+    vehicle = _varied(rng, vehicle_of(scene))
+    engine = str(rng.choice(["reference", *ENGINES]))
+    result = run(scene, engine, vehicle=vehicle, error=True)
+    road, profile = excitation_of(scene, wheels(vehicle)), scene.drive.profile()  # type: ignore[union-attr]
+    fine = varying_speed(linear_vehicle(vehicle)(ANY), road, profile, instants=result.times, reach=REACH / 8.0)
+    rows = np.abs(fine.time[:, None] - result.times).argmin(axis=0)
+    gaps = np.sqrt(np.mean((fine.deviation[rows] - result["deviation"]) ** 2, axis=0))
+    true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
+    steps = float(len(result.times))
+    return _of(result, f"{number}: quarter car, drive from {first:.3g} m/s", engine, true, steps, 0.6 * steps)
+
+
+def _copies(rng: np.random.Generator, number: int) -> Sample:
+    """Copies and gains of a bent quarter car, beside many more copies in shorter steps; chance is part of both."""
+    speed = float(rng.uniform(5.0, 35.0))
+    scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
+    vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=number)
+    result = linearised(scene, vehicle, sampling, lambda text, share: None, error=True)
+    own, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
+    fine = copies_in_time(vehicle, road, speed, 10.0, copies=MANY, seed=1000 + number, longest=own.step / 4.0)
+    chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
+    told, true = dict[str, Estimate](), dict[str, float]()
+    for i, (name, gains) in enumerate(zip(own.names, result["deviation"][0], strict=True)):
+        for part, value in (("copies", own.deviation[i]), ("gains", gains)):
+            channel = f"{name}, {part}"
+            one = errors_of(result)[channel]
+            more = chance.get(channel, {"error": 0.0, "share": 0.0})
+            error, share = np.hypot(one.error, more["error"]), np.hypot(one.share, more["share"])
+            told[channel] = replace(one, error=float(error), share=float(share))
+            true[channel] = abs(float(value - fine.deviation[i]))
+    steps = sampling.copies * 6.0 / own.step
+    return Sample(f"{number}: bent quarter car at {speed:.3g} m/s", "reference", told, true, steps, 0.375 * steps)
+
+
+def _in_time(rng: np.random.Generator, number: int) -> Sample:
+    """A run in time, bent springs or tyres that lift, beside one in much shorter steps on the same road."""
+    bent, speed = rng.random() < 0.5, float(rng.uniform(5.0, 40.0))
+    file = "quarter_car_nonlinear" if bent else str(rng.choice(["quarter_car", "half_car", "seven_freedoms"]))
+    tables: dict[str, Any] = {"speeds": {"values": [speed]}, "study": "ride_nonlinear"}
+    tables |= {} if bent else {"effects": {"lift_off": {}}}
+    scene = _scene(rng, file, "loaded", **tables)
+    vehicle, engine = _varied(rng, vehicle_of(scene)), str(rng.choice(ENGINES))
+    sampling = Sampling(step=float(10 ** rng.uniform(-3.7, -2.5)), driven=3.0, skipped=0.5, seed=number)
+    road = excitation_of(scene, wheels(vehicle))
+    path = _path(scene, engine, vehicle, sampling, road, speed)
+    steps, finer = int(np.ceil(sampling.driven / path.step)), replace(path, half=path.half / FINER)
+    table = finer.table(steps * FINER, number)
+    try:
+        result = in_engine(scene, engine, vehicle, sampling, True, table[::FINER].copy())
+    except RunFailed as failure:
+        result = failure.partial
+    rows = result.detail.rows * FINER
+    every, begin = int(rows[1] - rows[0]), float(rows[0] * finer.step)
+    fine = driven("mujoco", vehicle, finer, table, skipped=begin, every=every)
+    gaps = np.sqrt(np.mean((fine.outputs[: len(rows)] - result.detail.outputs) ** 2, axis=0))
+    true = dict(zip(result["output"].tolist(), gaps.tolist(), strict=True))
+    calls = ORDER * steps + len(rows)
+    read = (1.0 + 0.9 + 0.18) * steps / 16
+    name = f"{number}: {file} at {speed:.3g} m/s in steps of {1e3 * path.step:.2g} ms"
+    return _of(result, name, engine, true, calls, 0.54 * ORDER * steps + read)
+
+
+def _path(
+    scene: RideScene, engine: str, vehicle: SpatialVehicle, sampling: Sampling, road: Excitation, speed: float
+) -> RoadPath:
+    """The road as ``in_engine`` cuts it."""
+    from models.ride.nonlinear_copies import followed
+    from models.ride.road_path import road_path
+    from models.systems.ride.nonlinear import STEP
+
+    return road_path(road, speed, min(sampling.step or STEP, followed(vehicle, speed)))

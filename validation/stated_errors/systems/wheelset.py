@@ -1,0 +1,110 @@
+"""Random wheelsets whose stated error is held against steps an eighth as long and against ten times the cells.
+
+A call is a cell of FASTSIM in a stage of a step, or with the linear law a stage. Truths are paths of the reference,
+from which the engines are 1e-11 apart.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from models.core.discretisation import Series, errors_of, rows_at
+from models.core.errors import RunFailed
+from models.core.result import Result
+from models.rail.equations import Path
+from models.systems.wheelset import run as system
+from models.systems.wheelset.of_scene import equations_of
+from models.systems.wheelset.scene import WheelsetScene, build
+from models.systems.wheelset.stated_error import changed, series
+from validation.stated_errors.sample import Sample
+
+ENGINES = ("reference", "exudyn", "mujoco")
+FINER, MORE, MOST = 8.0, 10, 200
+"""Steps and cells of the truths by those of the run; cells at most."""
+LONGEST = 2.4
+"""Steps by the fastest motion's rate, at most."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many random scenes; those that fail or are refused are drawn anew."""
+    rng, made = np.random.default_rng(seed), 0
+    while made < count:
+        scene, engine, speed = _drawn(rng)
+        sample = _sample(scene, engine, speed)
+        if sample is not None:
+            made += 1
+            yield sample
+
+
+def _drawn(rng: np.random.Generator) -> tuple[WheelsetScene, str, float]:
+    speed, profiled = float(rng.uniform(8.0, 90.0)), rng.random() < 0.25
+    override = {
+        "stiffness_x": 10.0 ** rng.uniform(4.7, 6.3),
+        "damping_x": 10.0 ** rng.uniform(2.0, 4.0),
+        "friction": rng.uniform(0.15, 0.5),
+        "load": 10.0 ** rng.uniform(4.7, 5.2),
+        "conicity": rng.uniform(0.03, 0.2),
+    }
+    law = "linear" if rng.random() < 0.2 else "fastsim"
+    table: dict[str, Any] = {
+        "title": "a random wheelset",
+        "system": "wheelset",
+        "wheelset": {"override": {name: float(value) for name, value in override.items()}},
+        "contact": {"law": law} | ({"cells": int(rng.integers(5, 25))} if law == "fastsim" else {}),
+        "speeds": {"values": [speed]},
+        "run": {"displacement": float(rng.uniform(5e-4, 7e-3)), "speeds": [speed], "step": 1e-4, "duration": 1e-4},
+    }
+    table |= {"profiles": {}} if profiled else {}
+    equations = equations_of(build(table), "reference", speed)
+    fastest = float(np.abs(np.linalg.eigvals(equations.state_matrix)).max())
+    duration = float(rng.uniform(0.3, 2.0))
+    steps = math.ceil(duration * fastest / (LONGEST * rng.uniform(0.1, 1.0)))
+    table["run"] |= {"step": duration / steps, "duration": duration}
+    return build(table), str(rng.choice(ENGINES)), speed
+
+
+def _sample(scene: WheelsetScene, engine: str, speed: float) -> Sample | None:
+    marched, march = list[float](), system.path
+
+    def counted(other: WheelsetScene, engine: str, speed: float) -> Path:
+        path = march(other, engine, speed)
+        marched.append((len(path.times) - 1) * _cells(other))
+        return path
+
+    try:
+        with mock.patch.object(system, "path", counted):
+            run = system.run(scene, engine, speed, error=True)
+        true = _true(scene, run, lambda other: march(other, "reference", speed))
+    except RunFailed:
+        return None
+    told = errors_of(run)
+    name = f"{speed:.3g} m/s, step {scene.run.step:.2g} s, {scene.contact.law}, {scene.contact.cells} cells"
+    name += ", profiles" if scene.profiles else ""
+    true = {channel: true[channel] for channel in told}
+    return Sample(name, engine, told, true, 4.0 * marched[0], 4.0 * sum(marched[1:]))
+
+
+def _cells(scene: WheelsetScene) -> float:
+    return scene.contact.cells**2 if scene.contact.law == "fastsim" else 1.0
+
+
+def _true(scene: WheelsetScene, run: Result, march: Callable[[WheelsetScene], Path]) -> Mapping[str, float]:
+    """Errors by the channels of the estimates, of steps and of cells."""
+    fine = series(run.detail)
+    true = _apart(fine, series(march(changed(scene, 1.0 / FINER))))
+    if scene.contact.law == "linear":
+        return true
+    cells = min(MORE * scene.contact.cells, MOST)
+    of_cells = _apart(fine, series(march(changed(scene, 1.0, cells=cells))))
+    return true | {f"{name} of cells": error for name, error in of_cells.items()}
+
+
+def _apart(fine: Series, truth: Series) -> dict[str, float]:
+    rows = rows_at(truth.times, fine.times)
+    return {
+        name: float(np.sqrt(np.mean((values - truth.channels[name][rows]) ** 2)))
+        for name, values in fine.channels.items()
+    }
