@@ -25,8 +25,6 @@ LOWEST, HIGHEST = 1e-3, 1e3
 ELEMENTS = 8
 """Elements whose activity is drawn, the most active first."""
 LEFT, STAYS = "#009e73", "#d55e00"
-PREFIX = "assumption broken: "
-"""Of what is said of a broken assumption."""
 Progress = Callable[[str, float], None]
 
 
@@ -274,7 +272,7 @@ def lines(one: Found, named: bool) -> list[str]:
         f"    {name} {_stays(change, one)}" for name, change in sorted(one.further.items(), key=lambda item: item[1])
     ]
     rows += [
-        f"    {name} stays; without it an assumption would be broken: {each.brief().removeprefix(PREFIX)}"
+        f"    {name} stays; without it an assumption would be broken: {each.fact()}"
         for name, own in choice.barred.items()
         for each in own
     ]

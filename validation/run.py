@@ -46,7 +46,10 @@ SEEDED = (
     "validation.ride.fitted_roads",
 )
 """Modules beside the cases that draw at random by a seed of their own."""
-ALONE = {True: ("recommendation",), False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges")}
+ALONE = {
+    True: ("recommendation",),
+    False: ("effect_prices", "price", "recommendation", "ensemble", "contact_bridges", "stated_errors"),
+}
 """Cases that begin when all others have ended, and have the machine alone, by ``quick``: those that tell seconds first
 of all, and, in full, those that take all processors themselves. Seconds of the processor alone do not spare a case
 that: of small steps, beside others that empty the caches, a ratio rises by a quarter."""

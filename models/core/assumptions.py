@@ -73,9 +73,11 @@ class Broken:
 
     def brief(self) -> str:
         """A few words for a figure."""
-        return (
-            f"assumption broken: {self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
-        )
+        return f"assumption broken: {self.fact()}"
+
+    def fact(self) -> str:
+        """The same where it is known that an assumption was broken."""
+        return f"{self.says}; {self.where}, {self._time}, worst {self.worst:.4g} {self.unit}".rstrip()
 
     @property
     def _time(self) -> str:

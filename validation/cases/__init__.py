@@ -37,6 +37,7 @@ CASES = (
     "effect_prices",
     "price",
     "instruction_counts",
+    "stated_errors",
     "recommendation",
     "ensemble",
     "contact_hertz",

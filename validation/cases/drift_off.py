@@ -22,7 +22,7 @@ from models.systems.pitch_plane.trust import ANGLE, Curve, interpolation, model,
 from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
 from models.vehicles.pitch_plane import Parameters
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, within
-from validation.common.scenes import drive, force_scene
+from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
 SYSTEM: System = "drift"
@@ -69,6 +69,7 @@ COMBINATIONS = (
 )
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per combination; quick: the first one, by few paths."""
     found = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]

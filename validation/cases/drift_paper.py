@@ -9,7 +9,9 @@ from models.core.systems import load
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import followed, row
+from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Saved, System, Table, finding, within
+from validation.common.scenes import on_paper_road
 
 TITLE = "The paper's six runs"
 SYSTEM: System = "drift"
@@ -81,6 +83,8 @@ FIGURES = (
 """Id, run, figure of that run, words, unit, what the paper has, why they may differ."""
 
 
+@allowing("that runs drift off is what the paper shows", "upright")
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())

@@ -23,7 +23,7 @@ from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import Curve
 from models.vehicles.pitch_plane_equations import suspension_loads
 from validation.common.rows import CaseAnswer, Row, Saved, System, Table, finding, within
-from validation.common.scenes import drive, force_scene
+from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "What drift depends on: samples and noise, not solvers"
 SYSTEM: System = "drift"
@@ -70,6 +70,7 @@ SCORED = 5.0
 """Time (s) up to which section forces are compared, before drift-off."""
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Drift-off by solver and by interpolation, growth and bias by smoothing and scheme; quick: four solvers."""
     solvers = _solvers(folder, (*SOLVERS[:2], *SOLVERS[-2:]) if quick else SOLVERS)

@@ -31,7 +31,7 @@ from models.systems.pitch_plane.virtual_measurement import perturbed, write_meas
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, within
-from validation.common.scenes import drive, force_scene, road_scene
+from validation.common.scenes import drive, force_scene, on_paper_road, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
 SYSTEM: System = "drift"
@@ -53,6 +53,7 @@ ROADS = {
 LAW = "the averaged law holds to its next order in growth rate over frequency; 3 % is twice what was seen"
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Growth rate, spread of noise, and what neither step nor engine may change; quick: one road, no Monte Carlo."""
     true = drive(folder, LENGTH)

@@ -23,8 +23,9 @@ from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import growth
 from models.systems.pitch_plane.virtual_measurement import perturbed
 from models.vehicles.parameters.itwm_drift import PARAMETERS
+from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Row, Saved, System, Table, behaves, finding, within
-from validation.common.scenes import drive, force_scene
+from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "The smallest spring that holds a force-excited run"
 SYSTEM: System = "drift"
@@ -61,6 +62,8 @@ class FreeRuns:
     law: float
 
 
+@allowing("a spring that is too soft lets the run drift off, which is what is shown", "upright")
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)

@@ -12,6 +12,7 @@ from models.drift.innovations import consistency
 from models.drift.score import CHANNELS
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE
 from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, finding, within
+from validation.common.scenes import on_paper_road
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
     COARSE,
@@ -41,6 +42,7 @@ FILTERS = {"right": (1.0, 1.0), "Q": (4.0, 1.0), "R": (1.0, 4.0)}
 SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
     place = folder / "kalman"

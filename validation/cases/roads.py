@@ -13,7 +13,7 @@ from models.road.profile import Profile
 from models.road.study import study_road
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import Row, System, at_most, not_run, within
-from validation.common.scenes import COURSE, data_folder, gap, road_scene
+from validation.common.scenes import COURSE, data_folder, gap, on_paper_road, road_scene
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
 SYSTEM: System = "pitch-plane"
@@ -29,6 +29,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return [*rows, _recurrence(), _class_variance(), *_measured()], {}
 
 
+@on_paper_road()
 def _round_trips(folder: Path) -> list[Row]:
     road = study_road()
     write_opencrg(road, folder / "study.crg", LENGTH, INCREMENT)

@@ -13,7 +13,7 @@ from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, finding, within
-from validation.common.scenes import drive, force_scene
+from validation.common.scenes import drive, force_scene, on_paper_road
 from validation.hard_cases.case import IMPLEMENTATIONS
 
 TITLE = "The score of a stabilised run"
@@ -47,6 +47,7 @@ PROTOTYPE = {
 """Largest pitch error (rad), damage ratio of f3z and of f3x that an earlier prototype measured, with other noise."""
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Heave, blindness, conventions and verdicts; in full the whole study in all engines and the prototype's table."""
     rows = [*_conventions(), *_heave(("reference",) if quick else IMPLEMENTATIONS, 5.0 if quick else 20.0)]

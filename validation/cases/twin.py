@@ -8,7 +8,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.rows import CaseAnswer, Row, System, at_most, not_run
-from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, road_scene
+from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, on_paper_road, road_scene
 
 TITLE = "Same tableau and step: whole paths against the reference"
 SYSTEM: System = "pitch-plane"
@@ -21,6 +21,7 @@ OTHER_ROADS = (("belgian_block.crg", 6.0, "mirrored"), ("Horstwalde.crg", 60.0, 
 WHY = "RK4 with the same stages differs only by the order of additions: 1e-16 a step over at most 20,000 steps"
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows per road, excitation, vehicle and engine, each the worst over the steps; quick: one vehicle at one step."""
     rows: list[Row] = []

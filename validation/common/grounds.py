@@ -17,7 +17,7 @@ from models.core.assumptions import Broken, broken_of, watching
 from models.core.result import Result
 
 ANY = ""
-"""In place of a name: every assumption."""
+"""Stands for the name of every assumption."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Grounds:
 def _told(same: list[Breach]) -> str:
     worst = max(same, key=lambda each: each.broken.share)
     runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
-    return f"{worst.broken.brief()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
+    return f"{worst.broken.fact()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
 
 
 _GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
@@ -97,9 +97,9 @@ def _part() -> int:
 
 
 @contextmanager
-def allowing(name: str, why: str) -> Iterator[None]:
-    """Runs that are made inside may break an assumption, or all of them (ANY), and why; decorates functions, too."""
-    before = _ALLOWED.set({**_ALLOWED.get(), name: why})
+def allowing(why: str, *names: str) -> Iterator[None]:
+    """Runs that are made inside may break these assumptions, or any where none is named; decorates functions, too."""
+    before = _ALLOWED.set(_ALLOWED.get() | dict.fromkeys(names or (ANY,), why))
     try:
         yield
     finally:

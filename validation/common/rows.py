@@ -53,7 +53,7 @@ class Row:
         """The row, failed where it rests on an assumption that was broken without leave."""
         if not self.broken or self.status == "not run":
             return self
-        reason = f"{self.reason}; rests on a run with an {self.broken}".removeprefix("; ")
+        reason = f"{self.reason}; rests on a broken assumption: {self.broken}".removeprefix("; ")
         return replace(self, status="failed", reason=reason)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,0 +1,217 @@
+"""Errors that results state, of random scenes of every system in random engines, against truths 100 times finer.
+
+The true error is that of the channel which the screen names: the one whose stated error is the largest share.
+"""
+
+import math
+import os
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from models.core.discretisation import WARNED
+from models.core.systems import modules_of
+from models.ensemble.workers import processes
+from validation.common.grounds import allowing
+from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, within
+from validation.stated_errors.sample import Sample
+
+TITLE = "Stated errors against truths a hundred times finer"
+SYSTEM: System = "cost"
+SEED = 21
+SYSTEMS = modules_of("validation.stated_errors.systems")
+"""Modules that draw samples, by system."""
+COUNT = 60
+"""Samples of all systems together, at least; as many of each."""
+QUICK = {"pitch-plane": 3}
+"""Those of the quick share."""
+NEAR, FAR, TENTH = 3.0, 10.0, 0.1
+"""Ratios of true to stated error: up to which it is right, from which it misleads, and below which it is useless."""
+SHARE, FEW, COST = 0.95, 0.1, 0.6
+"""Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
+EDGE = 1e-12
+"""True errors below this share of their channel are rounding."""
+COLOURS = ("#222222", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#b00020")
+
+
+@allowing("what is judged is how well equations are solved, whatever a random vehicle does")
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
+    names = list(SYSTEMS)
+    counts = QUICK if quick else dict.fromkeys(names, -(-COUNT // len(names)))
+    found = [one for own in _made(counts) for one in own]
+    return [*_rows(found, quick), *(row for name in counts for row in _of_system(name, found))], {"samples": found}
+
+
+def _made(counts: dict[str, int]) -> list[list[Saved]]:
+    """Samples of each system, by as many processes as there are processors, two at most, where there are several."""
+    if len(counts) == 1:
+        return [samples(name, count) for name, count in counts.items()]
+    with processes(min(2, os.cpu_count() or 1)) as pool:
+        return list(pool.map(samples, counts, counts.values()))
+
+
+def samples(name: str, count: int) -> list[Saved]:
+    """Samples of a system as JSON keeps them."""
+    drawn: Iterator[Sample] = import_module(SYSTEMS[name]).samples(count, SEED)
+    return [_saved(name, sample) for sample in drawn]
+
+
+def _saved(system: str, sample: Sample) -> Saved:
+    """A sample as JSON keeps it; ``ratio`` : true by stated error, None where there is no number."""
+    told = {
+        "system": system,
+        "name": sample.name,
+        "engine": sample.engine,
+        "cost": sample.extra / sample.calls,
+        "ratio": None,
+    }
+    if not sample.told:
+        return told
+    stated, true = sample.told[sample.printed], sample.true[sample.printed]
+    return told | {
+        "channel": sample.printed,
+        "stated": stated.error,
+        "true": true,
+        "unit": stated.unit,
+        "share": stated.share,
+        "warned": stated.warned,
+        "ratio": ratio(true, stated.error),
+        "rounding": true <= EDGE * stated.error / stated.share if stated.share > 0.0 else true == 0.0,
+    }
+
+
+def ratio(true: float, stated: float) -> float:
+    """True by stated error."""
+    return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
+
+
+def _rows(found: list[Saved], quick: bool) -> list[Row]:
+    """What is asked of all systems together; shares of the few samples of a quick run are reported."""
+    known = [one for one in found if one["ratio"] is not None]
+    right = _share(one["ratio"] <= NEAR or one["rounding"] for one in known)
+    useless = _share(one["ratio"] < TENTH and not one["rounding"] for one in known)
+    silent = [one for one in known if one["ratio"] > FAR and not (one["warned"] or one["rounding"])]
+    costs = [_cost(name, found) for name in dict.fromkeys(one["system"] for one in found)]
+    near = f"share of {len(known)} samples whose true error is within {NEAR:g} times the stated one"
+    below = f"share whose true error is below a tenth of the stated one, of {len(known)} samples"
+    asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
+    shares = (
+        [
+            finding("stated_errors.near", SYSTEM, near, right, "", 1.0, asked, "none"),
+            finding("stated_errors.useless", SYSTEM, below, useless, "", 0.0, tenth, "none"),
+        ]
+        if quick
+        else [
+            within("stated_errors.near", SYSTEM, near, right, "", 1.0, 1.0 - SHARE, asked, "none"),
+            at_most("stated_errors.useless", SYSTEM, below, useless, "", FEW, tenth, "none"),
+        ]
+    )
+    return [
+        *shares,
+        at_most(
+            "stated_errors.silent",
+            SYSTEM,
+            f"samples whose true error is above {FAR:g} times the stated one, without a warning",
+            float(len(silent)),
+            "",
+            0.0,
+            f"asked: none; a warning stands above {100 * WARNED:g} % of the channel's deviation",
+            "none",
+        ),
+        at_most(
+            "stated_errors.cost",
+            SYSTEM,
+            "force evaluations of the estimate by those of the run, median of systems",
+            float(np.median(costs)),
+            "",
+            COST,
+            "asked: about half the run again",
+            "none",
+        ),
+        finding(
+            "stated_errors.without",
+            SYSTEM,
+            f"of {len(found)} samples: results that say why there is no number",
+            float(len(found) - len(known)),
+            "",
+            "few",
+            "what does not repeat has no error of steps",
+            "none",
+        ),
+    ]
+
+
+def _share(hits: Iterator[bool]) -> float:
+    """Share of what is true; 1 of nothing."""
+    counted = list(hits)
+    return float(np.mean(counted)) if counted else 1.0
+
+
+def _cost(name: str, found: list[Saved]) -> float:
+    """Median cost of a system's estimates, those without a number left out where others have one."""
+    own = [one for one in found if one["system"] == name]
+    return float(np.median([one["cost"] for one in own if one["ratio"] is not None] or [one["cost"] for one in own]))
+
+
+def _of_system(name: str, found: list[Saved]) -> list[Row]:
+    """The same of one system, reported."""
+    own = [one for one in found if one["system"] == name]
+    known = [one for one in own if one["ratio"] is not None]
+    told = f"{name}, {len(known)} of {len(own)} samples"
+    near = _share(one["ratio"] <= NEAR or one["rounding"] for one in known)
+    middle = float(np.median([one["ratio"] for one in known])) if known else math.nan
+    why = "all systems are judged together"
+    shown = (
+        ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
+        ("ratio", "true by stated error, median", middle, 1.0),
+        ("cost", "cost of the estimate by that of the run, median", _cost(name, found), COST),
+    )
+    return [
+        finding(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "", expected, why, "none")
+        for id, what, value, expected in shown
+    ]
+
+
+def tables(data: Saved) -> list[Table]:
+    """Every sample, those whose true error is the largest by the stated one first."""
+    known = sorted((one for one in data["samples"] if one["ratio"] is not None), key=lambda one: -one["ratio"])
+    rows = tuple(
+        (
+            one["system"],
+            one["name"],
+            one["engine"],
+            one["channel"],
+            f"{one['stated']:.2g} {one['unit']}".rstrip(),
+            f"{100.0 * one['share']:.2g}{' (warned)' if one['warned'] else ''}",
+            f"{one['true']:.2g}",
+            f"{one['ratio']:.2g}",
+            f"{one['cost']:.2f}",
+        )
+        for one in known
+    )
+    heads = ("System", "Scene", "Engine", "Channel", "Stated", "in %", "True", "True / stated", "Cost")
+    note = "Shares are of the channel's standard deviation over the run; the cost is that of the estimate by the run's."
+    return [Table("Stated and true errors", note, heads, rows)]
+
+
+def draw(data: Saved) -> Drawn:
+    """True over stated error, both by the channel's deviation."""
+    from models.drawing.figures import plt
+
+    figure, axis = plt.subplots(figsize=(7.5, 5.6))
+    known = [one for one in data["samples"] if one["ratio"] is not None and one["share"] > 0.0]
+    for name, colour in zip(dict.fromkeys(one["system"] for one in known), COLOURS, strict=False):
+        stated = np.array([one["share"] for one in known if one["system"] == name])
+        ratios = np.array([one["ratio"] for one in known if one["system"] == name])
+        axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)
+    ends = np.array([1e-16, 1.0])
+    for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):
+        axis.plot(ends, factor * ends, style, color="#777777", lw=0.9)
+    axis.axvspan(WARNED, 10.0, color="#e69f00", alpha=0.15, lw=0)
+    axis.set(xscale="log", yscale="log", xlabel="stated error by the channel's deviation", ylabel="true error, same")
+    axis.set_title("dashed: three times the stated error; dotted: ten times and a tenth; shaded: warnings")
+    axis.legend(loc="upper left")
+    return [("True errors of random scenes over what their results state.", figure)]
