@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 from models.advice.price import Answer, Ladder
@@ -12,7 +13,9 @@ from models.advice.price.recommendation import price, recommend
 from models.advice.price.systems.pitch_plane import own
 from models.advice.price.text import as_dict, lines
 from models.advice.price.truth import at
+from models.core.assumptions import Assumption, judged
 from models.core.errors import InputError, RunFailed
+from models.core.result import Result
 from models.engines.outside import register
 from models.systems.pitch_plane.scene import build
 from validation.price.unseen import true_errors
@@ -90,6 +93,39 @@ class AsGood(Planted):
 
     def reference(self):
         return Ladder("reference", "fourth", tuple(2 * STEPS[5] / 2**k for k in range(6)), 4)
+
+
+@dataclass(frozen=True)
+class Lifting(Planted):
+    """One whose steps above 20 ms make a tyre pull, or in which it pulls always."""
+
+    always: bool = False
+
+    def solve(self, setting, duration):
+        force = 5.0 if setting.value <= 0.02 and not self.always else -5.0
+        run = Result(xr.Dataset(attrs={"status": "complete"}))
+        judged(
+            run, [Assumption("press", "tyres press", "name lift_off", lambda run: {"t": np.array([force])}, "N", 0.0)]
+        )
+        return super().solve(setting, duration)
+
+
+def test_nothing_is_recommended_that_breaks_an_assumption_which_the_reference_keeps():
+    """The rung of 50 ms meets the tolerance, and its tyre pulls; that of 12.5 ms does neither."""
+    found = recommend(Lifting(), 1e-2)
+    best = found.winners["", "calls"]
+    assert best.tried.setting.value == 0.0125 and best.error == pytest.approx(1e3 * 0.0125**4, rel=1e-3)
+    flagged = [one for one in found.tried if one.status == "flagged"]
+    assert {one.setting.value > 0.02 for one in flagged} == {True} and "tyres press" in flagged[0].reason
+    assert any("flagged" in line and "tyres press" in line for line in lines(found))
+    assert as_dict(found)["broken assumptions"] == []
+
+
+def test_what_every_setting_breaks_is_told_and_forbids_none():
+    found = recommend(Lifting(always=True), 1e-2)
+    assert found.winners["exudyn", "calls"].tried.setting.value == 0.05
+    assert any("with every setting: assumption broken: tyres press" in line for line in lines(found))
+    assert as_dict(found)["broken assumptions"][0]["remedy"] == "name lift_off"
 
 
 def test_an_error_is_told_against_a_truth_that_is_better_known():
