@@ -10,6 +10,7 @@ from models.advice.ride_choice.in_time import FEWEST
 from models.core.errors import InputError
 from validation.choice.drawn_scenes import drawn
 from validation.choice.judged import JudgedByRuns, judged_of
+from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, finding, within
 from validation.ride.drawn_rides import COPIES, Bent, drawn_bent
 
@@ -62,6 +63,7 @@ def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
     return float(np.quantile(changes, UNSURE))
 
 
+@allowing("random scenes: whether what is left changes them as foretold is judged")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}

@@ -16,6 +16,7 @@ from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
 from models.systems.pitch_plane.scene import assemble
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, not_run, within
+from validation.common.scenes import on_paper_road
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure
 from validation.price.force_calls import counted
@@ -70,6 +71,7 @@ ALIKE = {
 ON_SECONDS = "a target about seconds, which are reported and never gated"
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.

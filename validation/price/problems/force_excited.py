@@ -63,7 +63,7 @@ def driven() -> Assembly:
     on_road = assemble(scene(DURATION))
     true = simulate(on_road.scene, "reference", Settings("RK4", PERIOD / 80, DURATION))
     forces = Sampled(np.column_stack([true["f1"], true["f2"]])[::80], PERIOD, held=False)
-    return replace(on_road.without_tyres().with_input("force", forces))
+    return replace(on_road.without_tyres().with_input("force", forces), assumptions=())  # those of the road are gone
 
 
 class ForceExcited:
