@@ -38,7 +38,7 @@ SMOOTH = ("none", "slip_pi")
 """Controllers that switch no valves to and fro."""
 ASKED_ONCE = "what stands behind the port answers one run alone"
 SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
-REMEDY = "raise run.substeps, or let the study braking_ensemble tell the scatter"
+REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
 LONGER = f"the controller switches at other samples in longer steps: {REMEDY}"
 SHORTER = f"the controller may switch at other samples in shorter steps: {REMEDY}"
 """Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
