@@ -175,3 +175,17 @@ def assumed_of(run: Result) -> list[str]:
     """Assumptions that a result was judged by."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
     return list(said.get("assumed", ()))
+
+
+@contextmanager
+def breaches() -> Iterator[dict[str, Broken]]:
+    """Assumptions that are broken by results which are judged inside: the worst of each by its name."""
+    worst: dict[str, Broken] = {}
+
+    def note(run: Result) -> None:
+        for one in broken_of(run):
+            if one.name not in worst or one.share > worst[one.name].share:
+                worst[one.name] = one
+
+    with watching(note):
+        yield worst
