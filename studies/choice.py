@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from pydantic import Field
 from models.advice.choice.choose import BUDGET, ROUNDS, RUNS, Choice, Chooser
 from models.advice.choice.variants import Variants, system_of
 from models.core.errors import InputError
+from models.core.result import Result
 from models.core.strict import Strict, read
 from studies.command.asked import ANY, load_scene, plan_of
 
@@ -24,6 +25,8 @@ LOWEST, HIGHEST = 1e-3, 1e3
 ELEMENTS = 8
 """Elements whose activity is drawn, the most active first."""
 LEFT, STAYS = "#009e73", "#d55e00"
+PREFIX = "assumption broken: "
+"""Of what is said of a broken assumption."""
 Progress = Callable[[str, float], None]
 
 
@@ -46,7 +49,7 @@ class Alone:
 @dataclass(frozen=True)
 class Found:
     """A scene's choice, effects one by one, tolerances above which effects that stay would go, energy activity (W) by
-    element where it has a closed form."""
+    element where it has a closed form; results of what is left, with their errors."""
 
     scene: Any
     engine: str
@@ -54,6 +57,7 @@ class Found:
     alone: list[Alone]
     further: dict[str, float]
     watts: dict[str, float]
+    results: list[Result] = field(default_factory=list)
 
     @property
     def stay(self) -> list[str]:
@@ -95,6 +99,18 @@ def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Pr
         "failed": {},
         "answer": [_answer(one) for one in found],
         "table": [line for one in found for line in lines(one, len(found) > 1)],
+        "results": _results(found),
+    }
+
+
+def _results(found: list[Found]) -> dict[str, Result]:
+    """Results of what is left of each scene, by what tells them apart."""
+    return {
+        " ".join(
+            (*([one.scene.system] if found[1:] else []), f"what is left{f', run {i + 1}' if one.results[1:] else ''}")
+        ): run
+        for one in found
+        for i, run in enumerate(one.results)
     }
 
 
@@ -134,11 +150,12 @@ def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], Non
     engine = engine_of(scene, engines)
     chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress)
     choice, none = chooser.choose(), chooser.work(frozenset())
+    results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
         Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
         for one in chooser.effects
     ]
-    return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {})
+    return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
 
 
 def _linear(scene: Any) -> Found:
@@ -195,6 +212,7 @@ def _answer(one: Found) -> dict[str, Any]:
         "calls": list(choice.calls),
         "confirmations": choice.rounds,
         "would matter no more above": one.further,
+        "would break an assumption": {name: [asdict(each) for each in own] for name, own in choice.barred.items()},
     }
 
 
@@ -203,10 +221,11 @@ def _save(one: Found, path: Path) -> None:
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         heads = [f"{name}, change [-]" for name in one.scene.quantities]
-        writer.writerow(["effect", "left out", *heads, "times less work alone [-]"])
+        writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
         for effect in one.alone:
             values = map(repr, effect.changes.tolist())
-            writer.writerow([effect.effect, effect.effect in one.choice.left_out, *values, repr(effect.saved)])
+            broken = "; ".join(each.says for each in one.choice.barred.get(effect.effect, ()))
+            writer.writerow([effect.effect, effect.effect in one.choice.left_out, *values, repr(effect.saved), broken])
 
 
 def percent(value: float) -> str:
@@ -254,6 +273,11 @@ def lines(one: Found, named: bool) -> list[str]:
     rows += [
         f"    {name} {_stays(change, one)}" for name, change in sorted(one.further.items(), key=lambda item: item[1])
     ]
+    rows += [
+        f"    {name} stays; without it an assumption would be broken: {each.brief().removeprefix(PREFIX)}"
+        for name, own in choice.barred.items()
+        for each in own
+    ]
     if choice.ended:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
@@ -279,7 +303,7 @@ def misled(one: Found) -> list[str]:
 
 def choice_figure(found: list[Found], path: Path) -> None:
     """A panel per scene; one more for the activity of those that have it."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     panels = [(one, False) for one in found] + [(one, True) for one in found if one.watts]
     columns = min(2, len(panels))
@@ -291,12 +315,8 @@ def choice_figure(found: list[Found], path: Path) -> None:
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
     gap = " " if columns > 1 else "\n"
-    figure.suptitle(
-        f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
+    title = f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance"
+    heading(figure, title, _results(found))
     save(figure, path)
 
 
@@ -314,6 +334,10 @@ def _changes(axis: Any, one: Found) -> None:
             ms=5,
             label=name.partition(" [")[0],
         )
+    barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in one.choice.barred]
+    if barred:
+        place = np.full(len(barred), HIGHEST)
+        axis.plot(place, barred, "x", color="#b00020", ms=7, mew=1.6, label="would break an assumption")
     axis.axvline(100 * one.scene.tolerance, color="#222222", ls="--", lw=1, label="tolerance")
     axis.set(
         xscale="log",

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, get_args
@@ -158,9 +159,10 @@ def run_scene(
         from studies.command.sweep import RECORDS, points
         from studies.command.sweep import run as run_points
 
-        job = points(sweep, scene, changes or (), engine)
+        job = points(sweep, scene, changes or (), engine, not no_error)
         folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
-        return _finish(lambda progress: run_points(replace(job, folder=folder), progress), folder, as_json)
+        work = partial(run_points, replace(job, folder=folder))
+        return _finish(work, folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)

@@ -1,7 +1,7 @@
 """What one contact of wheel and rail does: area, pressure, forces and how far they are off, at one creepage or many."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -81,7 +81,7 @@ def _table(scene: ContactScene, forces: Result) -> list[str]:
         * bool(rolls.errors),
     ]
     step = max(1, (len(rolls.motions) - 1) // ROWS)
-    errors = rolls.errors or [None] * len(rolls.motions)
+    errors: Sequence[Error | None] = rolls.errors or [None] * len(rolls.motions)
     for motion, force, error in list(zip(rolls.motions, rolls.rolled, errors, strict=True))[::step]:
         lines.append(
             f"    {motion[0]:>10.3g}{motion[1]:>10.3g}{motion[2]:>11.3g}{round(force.fx):>10,}"

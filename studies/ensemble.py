@@ -5,6 +5,7 @@ blocks of paths are kept in the folder ``blocks``, so that ``twinrig run ensembl
 that was killed, to the same bits. Each other engine repeats the first paths on the same noise samples.
 """
 
+import json
 import math
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -16,10 +17,13 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import Watched, judged
+from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.steps import divides
 from models.core.strict import Strict, quantity, read
+from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
 from models.ensemble.runner import Progress as Done
@@ -27,7 +31,9 @@ from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import cluster, processes
+from models.systems.pitch_plane.assumptions import upright
 from models.systems.pitch_plane.noise_paths import gap, mujoco_threads, noise_paths
+from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import check_road, follower, measure, write_measurement
 from models.vehicles.pitch_plane import STATE_NAMES
@@ -76,7 +82,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All paths in the reference, the first ones in the other engines; saves ``ensemble.nc``, table and figure."""
     options = check(scene, engines)
-    measured, period = measure(scene), 1.0 / options.sampling_rate
+    measured, period = measure(scene, scene.error), 1.0 / options.sampling_rate
     times = options.rows * np.arange(round(scene.run.duration / options.rows) + 1)
 
     def tell(done: Done) -> None:
@@ -86,6 +92,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         largest = write_measurement(measured, Path(name), period)
         noise = {"deviation": options.noise_fraction * largest, "seed": options.seed}
         noisy = follower(scene, Path(name))({}, {"force_noise": noise})
+        first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
         found = run_paths(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell)
         gaps = {}
@@ -104,20 +111,43 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": Channel("path", found["failed"], "s", "last good time of a path that failed"),
     }
     axes = {"time": Channel("time", times, "s"), "state": Channel("state", list(STATE_NAMES))}
-    result(noisy, channels, axes, threshold=options.threshold).save(folder / "ensemble.nc")
     rows = _rows(options, times, found["states"] - true)
+    saved = _told(result(noisy, channels, axes, engine="reference", threshold=options.threshold), first, rows, options)
+    saved.save(folder / "ensemble.nc")
     table = text(options, scene, rows, found, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, folder)
+    results = {"measurement": measured, "all paths": saved}
+    _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
+        "results": results,
         "paths": options.paths,
         "rows": rows,
         "gaps": {engine: None if math.isnan(worst) else worst for engine, worst in gaps.items()},
         "failed": {},
         "table": table,
     }
+
+
+def _told(saved: Result, first: Result, rows: list[dict[str, float]], options: Options) -> Result:
+    """The ensemble with the error of the steps, of its first path, and the standard errors of its deviations."""
+    error = json.loads(first.data.attrs["error"])
+    saved.data.attrs["error"] = json.dumps(error | ({"how": f"{error['how']}, of the first path"} if error else {}))
+    worst = {
+        name: by_chance(row[f"{name} error"], row[name], unit, options.paths)
+        for name, unit in (("pitch", "rad"), ("heave", "m"))
+        for row in [max(rows, key=lambda row: row[f"{name} error"] / (row[name] or 1.0))]
+    }
+    assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", _steepest)]
+    return of_chance(
+        judged(saved, assumed), {f"deviation of {name}": one for name, one in worst.items()}, options.paths
+    )
+
+
+def _steepest(run: Result) -> Watched:
+    """Largest pitch (rad) of all paths at each time; of those that left all bounds it is none."""
+    return {"any path": np.fmax.reduce(np.abs(run["states"][:, :, 3]), axis=0)}
 
 
 def _workers(options: Options) -> AbstractContextManager[Executor | None]:
@@ -170,7 +200,9 @@ def _time(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "never"
 
 
-def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, folder: Path) -> None:
+def _figure(
+    times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, options: Options, results: Results, folder: Path
+) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
     from models.drawing.drift import draw_fan
     from models.drawing.figures import heading, plt, save
@@ -191,7 +223,8 @@ def _figure(times: np.ndarray, errors: np.ndarray, drift_off: np.ndarray, option
     if len(drifted):
         histogram.legend()
     plt.setp((fan, histogram), xlabel="time [s]")
-    heading(figure, f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz")
+    title = f"{options.paths} noise paths of one measured run, forces at {options.sampling_rate:g} Hz"
+    heading(figure, title, results)
     save(figure, folder / "ensemble.png")
 
 

@@ -13,13 +13,20 @@ import numpy as np
 from pydantic import Field
 from scipy.interpolate import CubicSpline
 
+from models.core.assumptions import Assumption, judged
+from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError, RunFailed
+from models.core.result import Channel, Result
+from models.core.result import result as labelled
 from models.core.strict import Strict, quantity, read
+from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.angle_damage import UnitPaths, damage_curve, damage_errors, unit_paths
 from models.drift.score import CHANNELS
+from models.ensemble.statistics import ERRORS_95, quantile
 from models.fatigue.damage import SLOPE
 from models.sensors.inertial_unit import DEGREES_PER_HOUR, DEGREES_PER_ROOT_HOUR, angle_variance
+from models.systems.pitch_plane.assumptions import watching
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 
@@ -29,6 +36,8 @@ Minutes = Annotated[float, Field(ge=0.1, le=600)]
 
 SURE = 0.9
 """Part of all units of one grade that must keep within the allowed error."""
+LARGEST = 0.5
+"""rad: an angle error beyond it is no tilt of a vehicle on any road."""
 KEPT = 0.01
 """Spacing (s) of the saved runs."""
 
@@ -78,15 +87,17 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     largest = max(float(np.abs(angle_errors(paths, options, i)).max()) for i in range(len(options.grades)))
     reach = min(largest, np.pi / 2)  # beyond a quarter turn no pitch is left to speak of
     curves: dict[str, CubicSpline] = {}
+    results: dict[str, Result] = {}
     failed: dict[str, str] = {}
     for i, engine in enumerate(engines):
         progress(f"{engine}: run and damage", (i + 0.5) / (len(engines) + 1))
         try:
-            result = simulate(scene, engine)
+            result = simulate(scene, engine, error=scene.error)
         except RunFailed as error:
             failed[engine] = str(error)
             continue
         result.every(KEPT).save(folder / f"{engine}.nc")
+        results[engine] = result
         curves[engine] = damage_curve(result, reach, scene.file)
     pairs = [(grade, minutes) for grade in range(len(options.grades)) for minutes in options.durations]
     rows = [_row(options, grade, minutes, angle_errors(paths, options, grade), curves) for grade, minutes in pairs]
@@ -95,7 +106,8 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     if curves:
         from models.drawing.figures import save
 
-        save(_figure_grades(rows, options), folder / "grades.png")
+        results["units"] = _units(scene, paths, options, next(iter(curves.values())))
+        save(_figure_grades(rows, options, results), folder / "grades.png")
         save(_figure_curve(next(iter(curves.values()))), folder / "damage_of_an_angle.png")
     return {
         "scene": scene.title,
@@ -103,6 +115,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "rows": rows,
         "cheapest": cheapest(rows, options),
         "failed": failed,
+        "results": results,
         "table": table,
     }
 
@@ -111,6 +124,26 @@ def angle_errors(paths: UnitPaths, options: Options, grade: int) -> np.ndarray:
     """Angle errors (samples, seconds + 1) in rad of one grade, by its number."""
     walk, drift = options.random_walks[grade] * DEGREES_PER_ROOT_HOUR, options.grades[grade] * DEGREES_PER_HOUR
     return walk * paths[0] + drift * paths[1]
+
+
+def _units(scene: Scene, paths: UnitPaths, options: Options, curve: CubicSpline) -> Result:
+    """Largest angle error (rad) of each grade over the longest drive, and the damage error that SURE of its units keep,
+    with the standard error of that."""
+    angles = [angle_errors(paths, options, grade) for grade in range(len(options.grades))]
+    worst = [np.abs(damage_errors(curve, each)).max(axis=1) for each in angles]
+    kept = [quantile(each, SURE) for each in worst]
+    channels = {
+        "angle_error": Channel("grade", [float(np.abs(each).max()) for each in angles], "rad", "largest angle error"),
+        "damage_error": Channel("grade", [middle for middle, _, _ in kept], "", "damage error"),
+    }
+    units = labelled(scene, channels, {"grade": Channel("grade", options.grades, "deg/h")})
+    says, remedy = "the angle errors are small ones", "take finer grades, or shorter drives"
+    judged(units, [Assumption("small angle errors", says, remedy, watching(units="angle_error"), "rad", most=LARGEST)])
+    chances = {
+        f"damage error at {grade:g} deg/h": by_chance((high - low) / (2 * ERRORS_95), middle, "", options.samples)
+        for grade, (middle, low, high) in zip(options.grades, kept, strict=True)
+    }
+    return of_chance(units, chances, options.samples)
 
 
 def angle_law(seconds: np.ndarray, options: Options, grade: int) -> np.ndarray:
@@ -175,7 +208,7 @@ def _percent(part: float) -> str:
     return f"{100 * part:.2g}" if part < 1 else f"{100 * part:,.0f}"
 
 
-def _figure_grades(rows: list[dict[str, Any]], options: Options) -> Any:
+def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
     """Angle error and damage error over the length of the drive, a line per grade."""
     from models.drawing.figures import heading, plt
 
@@ -192,7 +225,7 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options) -> Any:
     axes[0].set(title="angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")
     axes[1].set(title=f"damage error that {SURE:.0%} of all units keep [%]", xlabel="length of the drive [min]")
     figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(options.grades) + 1)
-    heading(figure, "What the grade of a gyro does to angle and damage")
+    heading(figure, "What the grade of a gyro does to angle and damage", results)
     return figure
 
 

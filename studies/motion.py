@@ -14,13 +14,17 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import judged
+from models.core.discretisation import not_estimated
 from models.core.errors import InputError, RunFailed
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.tables import ACCELERATIONS
 from models.core.time_series import read_time_series, write_time_series
+from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.score import rms
+from models.sensors.motion_assumptions import Record, assumptions
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
     LIMIT,
@@ -70,6 +74,7 @@ class Source:
     gyro: np.ndarray | None = None
     quality: Quality | None = None
     ways: dict[str, Motion] = field(default_factory=dict)
+    run: Result | None = None
 
     @property
     def start(self) -> Start:
@@ -84,6 +89,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     array = _array(scene, p.positions())
     failed: dict[str, str] = {}
     sources: list[Source] = []
+    results: dict[str, Result] = {}
     for i, name in enumerate(engines if options.file is None else (options.file,)):
         progress(f"{name}: readings and motion", i / len(engines))
         try:
@@ -92,18 +98,20 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         except (RunFailed, GimbalLock) as error:
             failed[name] = str(error)
             continue
-        _save(scene, source, folder)
+        results |= {} if source.run is None else {name: source.run}
+        results[f"{name}: motion"] = _save(scene, source, folder, options)
         sources.append(source)
     arranged = ["  The sensors", *(f"    {line}" for line in array.describe())]
     table = [*arranged, *(line for source in sources for line in _lines(source, p)), *_closing(options)]
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     progress("figure", 1.0)
     if sources:
-        _figure(sources[0], folder / "motion.png")
+        _figure(sources[0], results, folder / "motion.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": failed,
+        "results": results,
         "table": table,
         "rows": [_numbers(source) for source in sources],
     }
@@ -157,13 +165,14 @@ def _from_file(name: str, path: Path, p: Parameters) -> Source:
 def _run(scene: Scene, engine: str, folder: Path) -> Source:
     """One engine's run; its readings go through a file as measured ones do."""
     p = scene.effects["accelerometers"]
-    made = simulate(scene, engine)
+    made = simulate(scene, engine, error=scene.error)
     path = folder / f"{engine} readings.csv"
     write(made, {channel: channel for channel in chain(*names(p))}, p.sampling_rate, path)
     source = _from_file(engine, path, p)
     rows = np.searchsorted(made.times, source.period * (np.arange(len(source.readings)) - 1e-3))
     wanted = {name: channel for name, (channel, _) in CHANNELS.items()} | {"heave rate": "z3_rate"}
     source.truth = {name: made[channel][rows] for name, channel in wanted.items()}
+    source.run = made
     source.gyro = made["gyro"][rows] if "gyro" in made.data else None
     return source
 
@@ -193,8 +202,8 @@ def _values(found: Motion) -> dict[str, np.ndarray]:
     return {"pitch": found.angles()[:, 1], "rate": found.rates[:, 1], "heave": found.position[:, 2]}
 
 
-def _save(scene: Scene, source: Source, folder: Path) -> None:
-    """Recovered pitch, rate and heave: a file of every way, and all of them as a result."""
+def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
+    """Recovered pitch, rate and heave: a file of every way, and all of them as a result, which is returned."""
     stem, ways = Path(source.name).stem, {way: _values(moved) for way, moved in source.ways.items()}
     for way, found in ways.items():
         columns = {name: (CHANNELS[name][1], values) for name, values in found.items()}
@@ -205,7 +214,15 @@ def _save(scene: Scene, source: Source, folder: Path) -> None:
     }
     times = source.period * np.arange(len(source.readings))
     axes = {"way": Channel("way", list(ways)), "time": Channel("time", times, "s")}
-    result(scene, channels, axes, engine=source.name).save(folder / f"{stem} motion.nc")
+    saved = result(scene, channels, axes, engine=source.name)
+    assert source.quality is not None
+    record = Record(source.quality, source.readings, source.period, not source.truth and not options.zeroed)
+    judged(saved, assumptions(record, source.ways["integrated"]))
+    if scene.error:
+        beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
+        not_estimated(saved, f"noise and mounts err most, and {beside}")
+    saved.save(folder / f"{stem} motion.nc")
+    return saved
 
 
 def _numbers(source: Source) -> dict[str, Any]:
@@ -267,7 +284,7 @@ def _closing(options: Options) -> list[str]:
     ]
 
 
-def _figure(source: Source, path: Path) -> None:
+def _figure(source: Source, results: Results, path: Path) -> None:
     """Pitch, heave, error of the pitch or its rate, and the misfit of the readings, of one source."""
     from models.drawing.figures import heading, plt, save
 
@@ -290,7 +307,7 @@ def _figure(source: Source, path: Path) -> None:
     axes[1, 1].set_title(f"readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s^2]")
     plt.setp(axes[1], xlabel="time [s]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5)
-    heading(figure, f"Pitch and heave from accelerometers, {source.name}")
+    heading(figure, f"Pitch and heave from accelerometers, {source.name}", results)
     save(figure, path)
 
 

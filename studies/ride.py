@@ -10,6 +10,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.core.result import Result, joined
 from models.core.strict import Strict, quantity, read
+from models.core.told import inherited
 from models.core.whole_files import write_whole
 from models.ride.measures import dynamic_load_factor, exceedances, share_beyond
 from models.ride.sweep import Sweep
@@ -68,7 +69,7 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Sweep speeds and correlations; saves ``deviations.nc`` and ``.csv``, ``system.npz`` and ``.mat``, figures."""
-    from studies.ride_figures import along_figure, outputs_figure, road_figure, spectra_figure
+    from studies.ride_figures import Heading, along_figure, outputs_figure, road_figure, spectra_figure
 
     options = read(Options, scene.options, scene.file, "options")
     assert scene.speeds is not None
@@ -79,30 +80,32 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     results = {}
     for i, engine in enumerate(engines):
         progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
-        results[engine] = run_scene(scene, engine, speeds=[*speeds, speed], correlations=roads)
+        results[engine] = run_scene(scene, engine, speeds=[*speeds, speed], correlations=roads, error=scene.error)
     sweeps = {engine: result.detail for engine, result in results.items()}
     first, linear = sweeps[engines[0]], linear_vehicle(vehicle, engines[0])(speed)
     progress("figures", 0.7)
+    top = Heading(scene.title, results)
     _save(results, folder)
     _save_system(scene, linear, speed, folder)
     if along := _along(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
         at = run_scene(plain, "reference", vehicle=along, speeds=[speed], correlations=roads).detail
         places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
-        along_figure(places, at, first, vehicle, speed, scene.title, folder / "body_acceleration.png")
+        along_figure(places, at, first, vehicle, speed, top, folder / "body_acceleration.png")
     kinds = [output.kind for output in vehicle.outputs] + ["acceleration"] * len(scene.weighting)
     panels = list(zip(kinds, first.units, strict=True))
-    outputs_figure(first, panels, static_loads(vehicle), scene.title, folder / "over_speed.png")
-    spectra_figure(linear, excitation_of(scene, there), speed, scene.title, folder / "spectra.png")
+    outputs_figure(first, panels, static_loads(vehicle), top, folder / "over_speed.png")
+    spectra_figure(linear, excitation_of(scene, there), speed, top, folder / "spectra.png")
     fitted = fitted_road(scene) if scene.road.file else None
     road, y = road_of(scene, there), half_track_of(scene, there)
-    road_figure(road, y, fitted, scene.title, folder / "road.png")
+    road_figure(road, y, fitted, top, folder / "road.png")
     texts = (road.label(y), *met(scene, there), *(fitted.notes if fitted else ()))
     notes = [*(f"  question: {text}" for text in doubts(vehicle)), *(f"  road: {text}" for text in texts)]
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": results,
         "answer": _answer(first),
         "table": [*_table(scene, vehicle, sweeps, speed, options), *notes],
     }
@@ -133,7 +136,7 @@ def _along(vehicle: SpatialVehicle) -> SpatialVehicle | None:
 def _save(results: Mapping[str, Result], folder: Path) -> None:
     """Deviations of every engine over case, speed and output; the last speed is that of the tables."""
     whole = joined(results, "engine")
-    saved = Result(whole.data.isel(speed=slice(-1)))
+    saved = inherited(Result(whole.data.isel(speed=slice(-1))), results, "the Lyapunov equation of nudged matrices")
     saved.save(folder / "deviations.nc")
     write_whole(folder / "deviations.csv", saved.data["deviation"].drop_vars("unit").to_dataframe().to_csv())
 

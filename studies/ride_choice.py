@@ -1,7 +1,7 @@
 """Which effects of a ride scene do its quantities call for: chosen within a tolerance, and confirmed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,13 @@ from models.advice.ride_choice.choose import Choice, Chooser
 from models.advice.ride_choice.in_time import Samples
 from models.advice.ride_choice.reduced_files import SCENE, write
 from models.core.errors import InputError
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import read
+from models.core.told import inherited
 from models.core.whole_files import write_whole
+from models.systems import run as run_scene
 from models.systems.ride.of_scene import goes_in_time, told_by
-from models.systems.ride.reduced_scene import Effect, illegal
+from models.systems.ride.reduced_scene import Effect, ReducedScene, illegal
 from models.systems.ride.scene import RideScene
 from studies.choice import told
 
@@ -74,15 +76,27 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         watts = activity(chooser.wholes[len(chooser.wholes) // 2])
     if choice.left_out:
         write(chooser.rest(frozenset(choice.left_out)), folder)
-    _save(scene, alone, choice, watts, folder)
-    choice_figure(scene, alone, choice, watts, folder / "choice.png")
+    progress("what is left", 0.9)
+    results = _runs(scene, chooser.rest(frozenset(choice.left_out)))
+    _save(scene, alone, choice, watts, results, folder)
+    choice_figure(scene, alone, choice, watts, results, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": results,
         "answer": _answer(scene, choice, further),
         "table": _table(scene, choice, alone, further),
     }
+
+
+def _runs(scene: RideScene, rest: ReducedScene) -> dict[str, Result]:
+    """Deviations of the scene and of what a choice leaves of it, with their errors and what they take for granted."""
+    results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
+    vehicle = replace(rest.vehicle, limits=rest.limits)
+    if rest != ReducedScene.whole(scene):
+        results["what is left"] = run_scene(rest.ride, "reference", vehicle=vehicle, error=scene.error)
+    return results
 
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
@@ -116,7 +130,14 @@ def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> d
     }
 
 
-def _save(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str, float], folder: Path) -> None:
+def _save(
+    scene: RideScene,
+    alone: list[Alone],
+    choice: Choice,
+    watts: dict[str, float],
+    results: dict[str, Result],
+    folder: Path,
+) -> None:
     """What leaving out each effect alone changes, predicted and confirmed, and whether it was left out; a CSV of these
     and one of the energy activity of every element beside."""
     import pandas as pd
@@ -137,7 +158,7 @@ def _save(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str,
         engine="reference",
         counts={"confirmations": choice.rounds},
     )
-    saved.save(folder / "choice.nc")
+    inherited(saved, results, "deviations of the whole scene and of what is left").save(folder / "choice.nc")
     told |= {
         f"{name}, {part} [-]": values[:, i]
         for i, name in enumerate(scene.quantities)
@@ -149,9 +170,16 @@ def _save(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str,
     write_whole(folder / "activity.csv", activities.to_csv(na_rep="nan"))
 
 
-def choice_figure(scene: RideScene, alone: list[Alone], choice: Choice, watts: dict[str, float], path: Path) -> None:
+def choice_figure(
+    scene: RideScene,
+    alone: list[Alone],
+    choice: Choice,
+    watts: dict[str, float],
+    results: dict[str, Result],
+    path: Path,
+) -> None:
     """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
     height = 1.6 + 0.3 * max(len(names) + 1, ELEMENTS)
@@ -174,7 +202,7 @@ def choice_figure(scene: RideScene, alone: list[Alone], choice: Choice, watts: d
     )
     left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)
     _activity(right, watts)
-    figure.suptitle(scene.title)
+    heading(figure, scene.title, results)
     save(figure, path)
 
 

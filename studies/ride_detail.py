@@ -1,7 +1,7 @@
 """How much vehicle and how much road does a question need: error of every output by model and road, beside its cost."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from models.core.errors import InputError
-from models.core.result import Channel, result
+from models.core.result import Channel, Result, result
 from models.core.strict import Strict, read
+from models.core.told import inherited
 from models.core.whole_files import write_whole
 from models.machine.seconds import cost
 from models.ride.covariance import stationary
@@ -62,15 +63,16 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Compare; saves ``errors.nc`` and ``.csv``, and a figure."""
-    from studies.ride_figures import detail_figure
+    from studies.ride_figures import Heading, detail_figure
 
     check(scene, engines)
     full, plain = vehicle_of(scene), scene.model_copy(update={"weighting": {}})
-    models, sweeps = _named([*_simpler(scene), full]), {}
+    models, results = _named([*_simpler(scene), full]), dict[str, Result]()
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
         roads = {road: ROADS[road] for road in _roads(vehicle)}
-        sweeps[name] = run_scene(plain, "reference", vehicle=vehicle, correlations=roads).detail
+        results[name] = run_scene(plain, "reference", vehicle=vehicle, correlations=roads, error=scene.error)
+    sweeps = {name: run.detail for name, run in results.items()}
     names = [output.name for output in full.outputs]
     truth = list(sweeps.values())[-1].deviation[-1]
     errors = {
@@ -79,9 +81,9 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         for i, road in enumerate(sweep.cases)
     }
     costs = _costs(scene, models)
-    _save(scene, errors, names, folder)
+    _save(scene, errors, names, results, folder)
     middle = {name: float(np.median(seconds)) for name, seconds in costs.items()}
-    detail_figure(errors, names, middle, scene.title, folder / "detail.png")
+    detail_figure(errors, names, middle, Heading(scene.title, results), folder / "detail.png")
     answer = {
         f"{model}, {road}": {
             name: None if np.isnan(value) else float(value) for name, value in zip(names, values, strict=True)
@@ -92,6 +94,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": results,
         "answer": answer,
         "table": _table(errors, costs, full),
     }
@@ -137,7 +140,7 @@ def _costs(scene: RideScene, models: dict[str, SpatialVehicle]) -> dict[str, lis
     return seconds
 
 
-def _save(scene: RideScene, errors: Errors, names: list[str], folder: Path) -> None:
+def _save(scene: RideScene, errors: Errors, names: list[str], results: Mapping[str, Result], folder: Path) -> None:
     """A row per output, a column per model and road, relative; empty where a model has no such output."""
     heads = [f"{model}, {road}" for model, road in errors]
     saved = result(
@@ -146,7 +149,7 @@ def _save(scene: RideScene, errors: Errors, names: list[str], folder: Path) -> N
         {"output": Channel("output", names), "model": Channel("model", heads)},
         engine="reference",
     )
-    saved.save(folder / "errors.nc")
+    inherited(saved, results, "the deviations of which they are ratios").save(folder / "errors.nc")
     table = saved.data["error"].to_pandas().rename(columns=lambda head: f"{head} [-]")
     write_whole(folder / "errors.csv", table.to_csv())
 

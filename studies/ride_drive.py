@@ -42,22 +42,23 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Follow the drive with the linear vehicle of the first engine; saves ``drive.nc`` and a figure."""
-    from studies.ride_figures import drive_figure
+    from studies.ride_figures import Heading, drive_figure
 
     check(scene, engines)
     vehicle, engine = vehicle_of(scene), engines[0]
     progress(f"drive, linear vehicle of {engine}, and each speed by itself", 0.1)
-    result = run_scene(scene, engine)
+    result = run_scene(scene, engine, error=scene.error)
     result.save(folder / "drive.nc")
     drive, alone, units = result.detail, result["quasi_stationary"], result["unit"].tolist()
     kinds = {output.name: (output.kind, unit) for output, unit in zip(vehicle.outputs, units, strict=False)}
     shown = [name for name, (kind, _) in kinds.items() if kind in ("acceleration", "tyre force")]
     shown = _options(scene).outputs or shown or list(kinds)
-    drive_figure(drive, alone, shown, kinds, scene.title, folder / "drive.png")
+    drive_figure(drive, alone, shown, kinds, Heading(scene.title, {engine: result}), folder / "drive.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
+        "results": {engine: result},
         "answer": _answer(drive, alone),
         "table": [f"  linear vehicle of {engine}", *_table(drive, alone, units)],
     }

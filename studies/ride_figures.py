@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from models.core.told import Results
 from models.drawing.figures import COLOURS as ENGINES
-from models.drawing.figures import LABELS, plt, save
+from models.drawing.figures import LABELS, heading, plt, save
 from models.ride.frequency import one_sided
 from models.ride.statistical_linearisation import GRADES
 from models.ride.sweep import Sweep
@@ -24,8 +26,15 @@ COLOURS = ("#222222", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
 STYLES = ("-", "--", ":", "--", ":")
 
 
+class Heading(NamedTuple):
+    """Title of a figure, and the results whose warnings stand below it."""
+
+    title: str
+    results: Results
+
+
 def along_figure(
-    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, title: str, path: Path
+    places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, above: Heading, path: Path
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
@@ -41,7 +50,7 @@ def along_figure(
     for axis in (left, right):
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
     left.legend(title="the axles' and tracks' roads")
-    _save(figure, f"{title}: which correlations of the road matter where", path)
+    _save(figure, above, ": which correlations of the road matter where", path)
 
 
 def _middle(vehicle: SpatialVehicle) -> str:
@@ -57,7 +66,7 @@ NONE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], title: str, path: Path
+    found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], above: Heading, path: Path
 ) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
     panels = list(dict.fromkeys(kinds))
@@ -73,7 +82,7 @@ def outputs_figure(
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
         _name_beside(axis)
-    _save(figure, f"{title}: standard deviations over speed", path)
+    _save(figure, above, ": standard deviations over speed", path)
 
 
 def _written(unit: str) -> str:
@@ -99,7 +108,7 @@ def _distinct(curves: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"\n= ".join(names): values for names, values in groups}
 
 
-def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, title: str, path: Path) -> None:
+def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, above: Heading, path: Path) -> None:
     """One-sided spectra of the accelerations and tyre forces over frequency at one speed; no figure where all is 0."""
     frequency = np.geomspace(0.1, 100.0, 800)
     densities = one_sided(linear, excitation, speed, frequency)
@@ -117,10 +126,10 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
         _name_beside(axis)
-    _save(figure, f"{title}: spectra at {speed:g} m/s", path)
+    _save(figure, above, f": spectra at {speed:g} m/s", path)
 
 
-def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: str, path: Path) -> None:
+def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: Heading, path: Path) -> None:
     """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
@@ -137,14 +146,14 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, title: 
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
     right.set(xlabel="wavenumber [rad/m]", ylabel="coherency", ylim=(0, 1.05), title="Left and right track")
     left.legend(), right.legend(fontsize=8)
-    _save(figure, f"{title}: the road", path)
+    _save(figure, above, ": the road", path)
 
 
 def detail_figure(
     errors: Mapping[tuple[str, str], np.ndarray],
     names: Sequence[str],
     cost: Mapping[str, float],
-    title: str,
+    above: Heading,
     path: Path,
 ) -> None:
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
@@ -161,8 +170,7 @@ def detail_figure(
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
     what = "largest error of each standard deviation over the speeds [%], and the time of one covariance"
-    axis.set_title(f"{title}\n{what.capitalize()}")
-    save(figure, path)
+    _save(figure, above, f"\n{what.capitalize()}", path)
 
 
 def drive_figure(
@@ -170,7 +178,7 @@ def drive_figure(
     alone: np.ndarray,
     shown: Sequence[str],
     kinds: Mapping[str, tuple[str, str]],
-    title: str,
+    above: Heading,
     path: Path,
 ) -> None:
     """Standard deviations along a drive, dashed if every speed is taken by itself, above the speed."""
@@ -193,14 +201,14 @@ def drive_figure(
         _name_beside(axis)
     axes[-1, 0].plot(found.time, found.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    _save(figure, f"{title}\nsolid: exact; dashed: each speed taken by itself", path)
+    _save(figure, above, "\nsolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST = 12
 """Outputs that a figure shows."""
 
 
-def nonlinear_figure(answer: Nonlinear, title: str, path: Path) -> None:
+def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
     """Every output over speed: small motion, statistical linearisation, Monte Carlo; open where no longer good."""
     outputs = answer.shown.vehicle.outputs
     figure, axes = _few(min(len(outputs), MOST))
@@ -229,11 +237,11 @@ def nonlinear_figure(answer: Nonlinear, title: str, path: Path) -> None:
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
     axes[0].legend(fontsize=7.5)
-    _save(figure, f"{title}\nStandard deviations over speed", path)
+    _save(figure, above, "\nStandard deviations over speed", path)
 
 
 def engine_spectra_figure(
-    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, title: str, path: Path
+    runs: Mapping[str, Ride], linear: LinearVehicle, road: Excitation, speed: float, above: Heading, path: Path
 ) -> None:
     """Spectra of the engines' runs, by Welch's method, over those of the replaced vehicle."""
     frequency = np.geomspace(0.3, 40.0, 300)
@@ -251,7 +259,7 @@ def engine_spectra_figure(
         unit = f"one-sided density [({_written(output.unit)})²/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
     axes[0].legend(fontsize=7.5)
-    _save(figure, f"{title}\nSpectra at {speed:g} m/s", path)
+    _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
 
 
 def _panels(count: int, wide: int, size: tuple[float, float]) -> tuple[plt.Figure, list[plt.Axes]]:
@@ -273,6 +281,6 @@ def _name_beside(axis: plt.Axes) -> None:
     axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _save(figure: plt.Figure, title: str, path: Path) -> None:
-    figure.suptitle(title, fontsize=11)
+def _save(figure: plt.Figure, above: Heading, text: str, path: Path) -> None:
+    heading(figure, above.title + text, above.results)
     save(figure, path)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.core.errors import InputError
+from models.core.errors import InputError, RunFailed
 from models.core.strict import read
 from models.engines.spatial_protocol import INTEGRATORS
 from models.ride.frequency import standard_errors
@@ -52,25 +52,32 @@ def check(scene: RideScene, engines: tuple[str, ...]) -> None:
 
 def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Sweep the speeds, run copies and engines in time; saves ``nonlinear.nc`` and two figures."""
-    from studies.ride_figures import engine_spectra_figure, nonlinear_figure
+    from studies.ride_figures import Heading, engine_spectra_figure, nonlinear_figure
 
     check(scene, engines)
     assert scene.speeds is not None
     options, vehicle = _options(scene), vehicle_of(scene)
     speed, road = options.shown(scene.speeds.all()), excitation_of(scene, wheels(vehicle))
-    result = run_scene(scene, "reference", sampling=options, progress=progress)
-    result.save(folder / "nonlinear.nc")
-    answer, runs = result.detail, dict[str, Ride]()
+    results = {"reference": run_scene(scene, "reference", sampling=options, progress=progress, error=scene.error)}
+    results["reference"].save(folder / "nonlinear.nc")
+    answer, runs, failed = results["reference"].detail, dict[str, Ride](), dict[str, str]()
     for engine in (engine for engine in engines if engine in INTEGRATORS):
         progress(f"{engine} in time", 0.8)
-        runs[engine] = run_scene(scene, engine, sampling=options).detail
-    nonlinear_figure(answer, scene.title, folder / "deviations.png")
+        try:
+            results[engine] = run_scene(scene, engine, sampling=options, error=scene.error)
+        except RunFailed as error:
+            failed[engine] = str(error)
+            continue
+        runs[engine] = results[engine].detail
+    top = Heading(scene.title, results)
+    nonlinear_figure(answer, top, folder / "deviations.png")
     if runs:
-        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, scene.title, folder / "spectra.png")
+        engine_spectra_figure(runs, answer.shown.vehicle, road, speed, top, folder / "spectra.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
-        "failed": {},
+        "failed": failed,
+        "results": results,
         "answer": _answer(answer),
         "table": _table(answer, speed) + _lifted(vehicle, answer, runs) + _time_table(runs, answer, road, speed),
     }

@@ -13,7 +13,7 @@ import numpy as np
 from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.whole_files import write_whole
-from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import DRIFT, Options, error, followed, options_of, row
 
@@ -27,7 +27,7 @@ check = options_of
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """All six runs in each engine; saves every result, five figures and ``table.txt``."""
     options = check(scene, engines)
-    measured, deviation, scenes = followed(scene, folder)
+    measured, deviation, scenes = followed(scene, folder, scene.error)
     measured.save(folder / "measurement.nc")
     runs: dict[str, dict[str, Result]] = {engine: {} for engine in engines}
     failed: dict[str, str] = {}
@@ -35,7 +35,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     for i, (engine, name) in enumerate(pairs):
         progress(f"{engine}: {name}", i / len(pairs))
         try:
-            runs[engine][name] = simulate(scenes[name], engine)
+            runs[engine][name] = run_away(scenes[name], engine, scene.error)
         except RunFailed as failure:
             failed[f"{engine}, {name}"] = str(failure)
             continue
@@ -46,9 +46,11 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
     progress("figures", 1.0)
     if not failed:
         _figures(measured, runs[engines[0]], folder)
+    told = {f"{engine}: {name}": result for engine in engines for name, result in runs[engine].items()}
     return {
         "scene": scene.title,
         "folder": str(folder),
+        "results": {"measurement": measured, **told},
         "sampling rate": options.sampling_rate,
         "noise deviation": deviation,
         "rows": rows,
@@ -135,7 +137,7 @@ def _figure_measurement(measured: Result) -> Any:
         part.set_title(f"detail, from {middle:g} s on")
     axes[0, 0].legend(ncols=2, loc="upper right")
     plt.setp(axes[1], xlabel="time [s]")
-    heading(figure, "Virtual measurement: road and wheel forces")
+    heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured})
     return figure
 
 
@@ -152,7 +154,7 @@ def _figure_drift(results: dict[str, Result], title: str) -> Any:
     heave.set(title="error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
     pitch.set(title="pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
     figure.legend(*pitch.get_legend_handles_labels(), loc="outside lower center", ncols=len(results), fontsize=8.5)
-    heading(figure, title)
+    heading(figure, title, results)
     return figure
 
 
@@ -164,7 +166,8 @@ def _figure_moment(result: Result) -> Any:
     inertia.set(title="inertia term I beta'' [kN m]", xlabel="time [s]")
     moment.plot(result.times, result["enforced_moment"], linewidth=0.5, color="C1")
     moment.set(title="enforced moment [N m]", xlabel="time [s]")
-    heading(figure, "Pitch prescribed, perturbed model and noisy forces: what the guidance takes")
+    title = "Pitch prescribed, perturbed model and noisy forces: what the guidance takes"
+    heading(figure, title, {"guided, both": result})
     return figure
 
 

@@ -5,11 +5,13 @@ where whatever keeps the pitch near zero is wrong. The first engine runs all met
 """
 
 import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from models.core.result import tabulated
+from models.core.told import Results
 from models.core.whole_files import whole_file, write_whole
 from models.drift.score import CHANNELS
 from models.fatigue.damage import CONVENTION
@@ -35,19 +37,31 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    tabulated(scene, rows, "run").save(folder / "score.nc")
+    results = {name: result for bench in benches for name, result in bench.results.items()}
+    saved = tabulated(scene, rows, "run")
+    saved.data.attrs["error"] = _steps(benches[0].results)
+    saved.save(folder / "score.nc")
     progress("figures", 1.0)
     of_first = [row for row in rows if row["engine"] == engines[0]]
-    save(decision(of_first, options.limits, options.grade), folder / "decide.png")
+    save(decision(of_first, options.limits, options.grade, results), folder / "decide.png")
     save(stiffness(sweep, benches[0], options.limits, options.grade), folder / "stiffness.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "rows": rows,
         "failed": failed,
+        "results": results,
         "table": table,
         "sweep": {road: found.tolist() for road, found in sweep.items()},
     }
+
+
+def _steps(results: Results) -> str:
+    """What the score says of the error of the steps: that of the measurement, whose steps all runs share."""
+    error = json.loads(next(iter(results.values())).data.attrs["error"])
+    return json.dumps(
+        error | {"how": f"{error['how']}, of the measurement, whose steps all runs share"} if error else {}
+    )
 
 
 def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:

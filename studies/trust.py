@@ -14,17 +14,20 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import judged
+from models.core.discretisation import by_chance, of_chance
 from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
+from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.drift.growth import pitch_variance
 from models.ensemble.runner import run_paths
-from models.ensemble.statistics import quantile
+from models.ensemble.statistics import ERRORS_95, quantile
 from models.systems.pitch_plane.noise_paths import noise_paths
-from models.systems.pitch_plane.run import run as simulate
+from models.systems.pitch_plane.run import run_away
 from models.systems.pitch_plane.scene import Scene, assemble, changed
-from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding
+from models.systems.pitch_plane.trust import ANGLE, Curve, growth, interpolation, model, noise, rounding, small_errors
 from models.systems.pitch_plane.virtual_measurement import check_road, check_steps, follower, measure, write_measurement
 
 Progress = Callable[[str, float], None]
@@ -50,7 +53,7 @@ class Options(Strict):
 def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Predictions, an ensemble and two runs in the first engine; saves ``table.txt``, ``trust.nc``, a figure."""
     options = check(scene, engines)
-    base, truth, largest = _forces(scene, options, folder)
+    base, measured, largest = _forces(scene, options, folder)
     deviation, assembly = options.noise_fraction * largest, assemble(base)
     other = assembly.parameters.model_copy(update={"I": assembly.parameters.I * (1 - options.inertia_error)})
     progress("predictions", 0.1)
@@ -61,20 +64,24 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "rounding": rounding(assembly),
     }
     runs = {}
-    if truth is not None:
+    if measured is not None:
         progress("runs", 0.2)
-        clean = simulate(base, engines[0])
-        wrong = simulate(changed(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
-        runs = {"interpolation": _error(clean, truth), "inertia": _error(wrong, clean["pitch"])}
+        clean = run_away(base, engines[0])
+        wrong = run_away(changed(base, vehicle={"override": {**base.vehicle.override, "I": other.I}}), engines[0])
+        runs = {"interpolation": _error(clean, measured["pitch"]), "inertia": _error(wrong, clean["pitch"])}
     progress("noise paths", 0.4)
-    spread = _ensemble(base, deviation, options, engines[0])
+    quiet = run_away(base, "reference", scene.error)
+    spread = _ensemble(base, quiet, deviation, options, engines[0])
     rows = _rows(curves, runs, spread, options)
     table = _text(rows, options, deviation, growth(assembly).rate, base, curves)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
-    _save(scene, rows, spread, folder / "trust.nc")
+    saved = _told(_saved(scene, rows, spread), quiet, spread, options)
+    saved.save(folder / "trust.nc")
+    results = {"forces without noise": quiet, "growth": saved} | ({} if measured is None else {"measurement": measured})
     progress("figure", 0.9)
-    _figure(curves, runs, spread, options, folder / "error_growth.png")
-    return {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}
+    _figure(curves, runs, spread, options, results, folder / "error_growth.png")
+    summary = {"scene": scene.title, "folder": str(folder), "rows": rows, "failed": {}, "table": table}
+    return summary | {"results": results}
 
 
 def check(scene: Scene, engines: tuple[str, ...]) -> Options:
@@ -95,14 +102,14 @@ def check(scene: Scene, engines: tuple[str, ...]) -> Options:
     return options
 
 
-def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, np.ndarray | None, float]:
-    """The force-excited scene, the true pitch at its steps where that is known, and the largest force (N)."""
+def _forces(scene: Scene, options: Options, folder: Path) -> tuple[Scene, Result | None, float]:
+    """The force-excited scene, the run on the road that left its forces, if any, and the largest force (N)."""
     if "road" not in scene.effects:
         return scene, None, float(np.abs(assemble(scene).input.values).max())  # type: ignore[union-attr]
     assert options.sampling_rate is not None
-    measured = measure(scene)
+    measured = measure(scene, scene.error)
     largest = write_measurement(measured, folder, 1.0 / options.sampling_rate)
-    return follower(scene, folder)({}, {}), measured["pitch"], largest
+    return follower(scene, folder)({}, {}), measured, largest
 
 
 def _error(run: Result, pitch: np.ndarray) -> Curve:
@@ -110,13 +117,12 @@ def _error(run: Result, pitch: np.ndarray) -> Curve:
     return Curve(run.times, np.abs(run["pitch"] - pitch))
 
 
-def _ensemble(base: Scene, deviation: float, options: Options, engine: str) -> dict[str, np.ndarray]:
-    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise.
+def _ensemble(base: Scene, quiet: Result, deviation: float, options: Options, engine: str) -> dict[str, np.ndarray]:
+    """Drift-off times (paths,) and pitch errors (paths, rows) of noise paths beside the run without noise, ``quiet``.
 
     The errors are nan from where a path left all bounds.
     """
     noisy = changed(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
-    quiet = simulate(base, "reference")
     rows = np.arange(0, len(quiet.times), max(1, round(SPACING / base.run.step)))
     times, true = quiet.times[rows], quiet["pitch"]
     found = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths)
@@ -124,7 +130,18 @@ def _ensemble(base: Scene, deviation: float, options: Options, engine: str) -> d
     return {"times": times, "drift_off": found["drift_off"], "errors": errors}
 
 
-def _save(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray], path: Path) -> None:
+def _told(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:
+    """The result with the error of the steps, of the run without noise, and the standard error of the median."""
+    saved.data.attrs["error"] = quiet.data.attrs["error"]
+    judged(saved, [small_errors(options.angle)])
+    middle, low, high = quantile(spread["drift_off"], 0.5)
+    if not math.isfinite(high):
+        return saved
+    error = by_chance((high - low) / (2.0 * ERRORS_95), middle, "s", options.paths)
+    return of_chance(saved, {"median drift-off by noise": error}, options.paths)
+
+
+def _saved(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray]) -> Result:
     """Drift-off by source, and the noise paths."""
     drift_off = {
         name: Channel("source", [np.nan if row[name] is None else row[name] for row in rows], "s", f"drift-off, {name}")
@@ -135,7 +152,7 @@ def _save(scene: Scene, rows: list[Row], spread: dict[str, np.ndarray], path: Pa
         "error": Channel(("path", "time"), spread["errors"], "rad", "pitch error"),
     }
     axes = {"source": Channel("source", list(NAMES)), "time": Channel("time", spread["times"], "s")}
-    result(scene, drift_off | paths, axes).save(path)
+    return result(scene, drift_off | paths, axes)
 
 
 NAMES = {
@@ -226,10 +243,15 @@ def _excess(curve: Curve, options: Options, rate: float) -> float:
 
 
 def _figure(
-    curves: dict[str, Curve], runs: dict[str, Curve], spread: dict[str, np.ndarray], options: Options, path: Path
+    curves: dict[str, Curve],
+    runs: dict[str, Curve],
+    spread: dict[str, np.ndarray],
+    options: Options,
+    results: Results,
+    path: Path,
 ) -> None:
     """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
     figure, axis = plt.subplots(figsize=(8.0, 4.6))
@@ -244,13 +266,8 @@ def _figure(
             curve.times[::50], small[::50], "--", color=colours[name], linewidth=1.5, label=f"{name}: predicted"
         )
     axis.axhline(options.angle, color="black", linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
-    axis.set(
-        xlabel="time [s]",
-        ylabel="pitch error [rad]",
-        ylim=(1e-12, 10),
-        xlim=(0, curves["noise"].times[-1]),
-        title="Growth of the pitch error of a force-excited run by source, predicted and run",
-    )
+    axis.set(xlabel="time [s]", ylabel="pitch error [rad]", ylim=(1e-12, 10), xlim=(0, curves["noise"].times[-1]))
+    heading(figure, "Growth of the pitch error of a force-excited run by source, predicted and run", results)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
     save(figure, path)
 

@@ -54,7 +54,7 @@ class Made(Variants):
     """Variants whose quantity is a given function of what is left out and of the step."""
 
     def __init__(self, function, effects):
-        self.function, self.names, self.calls, self._kept, self._costs = function, effects, 0, {}, {}
+        self.function, self.names, self.calls, self._kept, self._costs, self._broken = function, effects, 0, {}, {}, {}
         self.scene, self.engine = type("Made", (), {"file": "t", "system": "made"}), ""
         self.system = type(
             "System",

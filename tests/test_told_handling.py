@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.assumptions import assumed_of, broken_of
-from models.core.discretisation import WARNED, errors_of
+from models.core.discretisation import WARNED, error_lines, errors_of
 from models.core.errors import RunFailed
 from models.core.systems import load
 from models.systems.handling import run as module
@@ -99,8 +99,8 @@ def test_few_cells_are_a_warning_with_those_to_use():
     own = scene(1e-3, 5, steer=[[0.05, 0.0], [0.4, 0.05]], duration=0.4)
     told = run(own, "mujoco", error=True)
     worst = max(errors_of(told).values(), key=lambda one: one.share)
-    assert worst.warned and "per cell (1 / tyres.cells)" in told.data.attrs["error"]
-    cured = run(scene(1e-3, round(1.0 / worst.step), **own.manoeuvres["own"].model_dump()), "mujoco", error=True)
+    assert worst.warned and error_lines(told)[0].endswith(f"use at least {worst.step:g} tyres.cells")
+    cured = run(scene(1e-3, round(worst.step), **own.manoeuvres["own"].model_dump()), "mujoco", error=True)
     assert max(one.share for one in errors_of(cured).values()) < WARNED
 
 

@@ -15,6 +15,7 @@ from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,8 +29,9 @@ from models.ensemble.runner import AHEAD, run_paths
 from models.ensemble.store import Arrays, code, locked
 from models.ensemble.workers import processes
 from validation.cases import CASES
+from validation.common import grounds
 from validation.common.changes import against, lines
-from validation.common.rows import STATUSES, Row, Saved
+from validation.common.rows import STATUSES, CaseAnswer, Row, Saved
 from validation.common.scenes import data_folder
 from validation.report.shares import full
 
@@ -76,7 +78,7 @@ class Cases:
         start = time.perf_counter()
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as own:  # what cases write to run is no part of the report
-            rows, data = case.measure(self.quick, Path(own))
+            rows, data = rested(name, partial(case.measure, self.quick, Path(own)))
         write_whole(self.folder / "data" / f"{name}.json", json.dumps(data).encode())
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
@@ -121,9 +123,25 @@ def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone:
     }
 
 
+def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
+    """What a case answers; rows fail that rest on an assumption which was broken without leave.
+
+    What runs after the last row broke has a row of its own.
+    """
+    (rows, data), last = grounds.measured(measure)
+    rows = [row.grounded() for row in rows]
+    if last:
+        rows.append(_failed(f"{name}.assumptions", f"runs of case {name} after its last row", last))
+    return rows, data
+
+
 def _broken(name: str, reason: str) -> Row:
     """The failed row of a case that gave none."""
-    return Row(f"{name}.broken", "pitch-plane", f"case {name}", None, "", "", None, "", "none", "failed", reason)
+    return _failed(f"{name}.broken", f"case {name}", reason)
+
+
+def _failed(id: str, quantity: str, reason: str) -> Row:
+    return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
 
 
 def validate(folder: Path, quick: bool, command: str, earlier: Saved | None = None, resumed: bool = False) -> int:

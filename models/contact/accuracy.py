@@ -108,7 +108,8 @@ def _most(contact: Contact, cells: int, fine: Rolled, coarse: Rolled) -> tuple[f
     limit = contact.friction * contact.pressing.load
     if limit == 0.0:
         return 0.0, 0.0
-    error = limit * float(cells_error(*_by_friction(contact, fine, coarse), cells, contact.order))
+    here, there = _by_friction(contact, fine, coarse)
+    error = limit * float(cells_error(here, there, cells, contact.order))
     return error, contact.lever * error
 
 

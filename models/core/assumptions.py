@@ -2,7 +2,9 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,7 +18,7 @@ RARE = 0.00135
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Values of which mean and standard deviation (rows,) are known; ``rows``: what tells them apart, as "at 20 m/s"."""
+    """Values of which mean and standard deviation (rows,) are known; ``rows`` tells them apart, as "at 20 m/s"."""
 
     mean: np.ndarray
     deviation: np.ndarray
@@ -79,7 +81,7 @@ class Broken:
     def _time(self) -> str:
         if math.isnan(self.first) and not self.law:
             return "once"
-        return f"{100.0 * self.share:.2g} % of the time" + self.law
+        return f"{100.0 * self.share:.3g} % of the time" + self.law
 
     def line(self) -> str:
         """A sentence for readers."""
@@ -141,7 +143,21 @@ def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
+    _NOTED.get()(run)
     return run
+
+
+_NOTED: ContextVar[Callable[[Result], None]] = ContextVar("noted", default=lambda run: None)
+
+
+@contextmanager
+def watching(note: Callable[[Result], None]) -> Iterator[None]:
+    """Tell ``note`` of every result that is judged inside; where watches are nested the inner one alone is told."""
+    before = _NOTED.set(note)
+    try:
+        yield
+    finally:
+        _NOTED.reset(before)
 
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
@@ -159,3 +175,17 @@ def assumed_of(run: Result) -> list[str]:
     """Assumptions that a result was judged by."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
     return list(said.get("assumed", ()))
+
+
+@contextmanager
+def breaches() -> Iterator[dict[str, Broken]]:
+    """Assumptions that are broken by results which are judged inside: the worst of each by its name."""
+    worst: dict[str, Broken] = {}
+
+    def note(run: Result) -> None:
+        for one in broken_of(run):
+            if one.name not in worst or one.share > worst[one.name].share:
+                worst[one.name] = one
+
+    with watching(note):
+        yield worst

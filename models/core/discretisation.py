@@ -20,12 +20,17 @@ from models.core.result import Result
 
 WARNED, REFUSED, GOAL = 0.02, 0.5, 0.005
 """Shares of a channel from which an error is a warning, from which it is no answer, and which a step is advised for."""
-WINDOW, FINE_WINDOW = 0.4, 0.2
+WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a run that are repeated in four times the step, to observe the order, and in half of it."""
+STEEPEST = 4.0
+"""Largest power of time with which errors of a part are taken to grow on: a road that fades in makes 3, a drift 2."""
 LEAST_ORDER = 0.5
 """Observed orders are taken for at least this: below, runs differ by chance."""
 CELLS = "cells along each axis"
 """What an estimate is of that a coarser grid told."""
+FALL, FLOOR = 0.6, 0.03
+"""Power of the tolerance with which the error of an adaptive method is taken to fall, which is from 0.5 to 1.1, and
+share of the tolerance that it errs by at least, as where its input has it stop more often than the tolerance would."""
 STILL, ROUNDING = 1e-9, 4.0 * np.finfo(float).eps
 """Deviation by size below which a channel does not move; error by size of one rounding."""
 
@@ -58,8 +63,8 @@ class Estimate:
 
     @property
     def refused(self) -> bool:
-        """Whether the channel is no answer."""
-        return not self.share <= REFUSED
+        """Whether the channel is no answer; what no step mends is told, and not refused."""
+        return not self.share <= REFUSED and self.step != 0.0
 
 
 def size_of(values: np.ndarray) -> float:
@@ -122,29 +127,47 @@ raises InputError or RunFailed where that cannot be."""
 
 
 def estimated(
-    run: Result, fine: Series, again: Again, order: float, step: float, units: Mapping[str, str] | None = None
+    run: Result,
+    fine: Series,
+    again: Again,
+    order: float,
+    step: float,
+    units: Mapping[str, str] | None = None,
+    growth: Mapping[str, float] | None = None,
+    sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
-    units : of these channels, where the result has no channels of their names. Raises RunFailed, whose ``partial`` is
-    the result, where a channel is no answer.
+    units : of these channels, where the result has no channels of their names; growth : by channel, least factor on
+    what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
+    that is not its own deviation. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    told, how = by_steps(fine, again, order, step)
+    told, how = by_steps(fine, again, order, step, growth, sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     known |= units or {}
     return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
 
 
-def by_steps(fine: Series, again: Again, order: float, step: float) -> tuple[dict[str, Estimate], str]:
+def by_steps(
+    fine: Series,
+    again: Again,
+    order: float,
+    step: float,
+    growth: Mapping[str, float] | None = None,
+    sizes: Mapping[str, float] | None = None,
+) -> tuple[dict[str, Estimate], str]:
     """Errors of the channels of ``fine``, without units, and how they were told.
 
     Twice the step over the whole run and four times over a part cost 0.6 of its force calls; where no longer step can
-    be, half of it over a part tells.
+    be, half of it over a part tells. growth, sizes : as in ``estimated``.
     """
     try:
-        return _by_longer_steps(fine, again, order, step), "runs in longer steps"
+        told, how = _by_longer_steps(fine, again, order, step), "runs in longer steps"
     except (InputError, RunFailed):
-        return _by_half_steps(fine, again, order, step), "a part in half the step"
+        told, how = _by_half_steps(fine, again, order, step, growth or {}), "a part in half the step"
+    for name, size in (sizes or {}).items():
+        told[name] = rescaled(told[name], size, step)
+    return told, how
 
 
 def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
@@ -159,8 +182,10 @@ def _by_longer_steps(fine: Series, again: Again, order: float, step: float) -> d
     }
 
 
-def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dict[str, Estimate]:
-    """The error of the finer run, times what its order makes of twice the step."""
+def _by_half_steps(
+    fine: Series, again: Again, order: float, step: float, growth: Mapping[str, float]
+) -> dict[str, Estimate]:
+    """The error of the finer run, times what its order makes of twice the step, and as the rest of the run makes it."""
     finer = again(0.5, FINE_WINDOW)
     slack = 1e-9 * finer.times[-1]
     part = (fine.times >= finer.times[0] - slack) & (fine.times <= finer.times[-1] + slack)
@@ -168,21 +193,49 @@ def _by_half_steps(fine: Series, again: Again, order: float, step: float) -> dic
     told = {}
     for name, values in fine.channels.items():
         one = estimate(finer.channels[name][rows], values[part], order, step)
-        told[name] = rescaled(replace(one, error=one.error * 2.0**one.order), size_of(values), step)
+        later = max(
+            _later(values[part] - finer.channels[name][rows], values) if part[0] else 1.0, growth.get(name, 1.0)
+        )
+        told[name] = rescaled(replace(one, error=one.error * 2.0**one.order * later), size_of(values), step)
     return told
+
+
+def _later(gap: np.ndarray, values: np.ndarray) -> float:
+    """Rms of an error over a whole run by that over its first rows, of which ``gap`` (k, ...) is the difference.
+
+    Errors go on to grow with the power of time that they have there, or as the channel (n, ...) gets rougher.
+    """
+    if len(gap) < 4:
+        return 1.0
+    first, second = _rms(gap[: len(gap) // 2]), _rms(gap[len(gap) // 2 :])
+    power = 0.5 * (math.log2(1.0 + (second / first) ** 2) - 1.0) if first > 0.0 else 0.0
+    bends = np.diff(values, 2, axis=0)
+    before, over_all = _rms(bends[: len(gap) - 2]), _rms(bends)
+    rougher = over_all / before if before > 0.0 else 1.0
+    return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST))
 
 
 def rescaled(one: Estimate, size: float, step: float) -> Estimate:
     """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
     being that of the run."""
     share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
-    advised = step * min(1.0, (GOAL / share) ** (1.0 / one.order)) if share > 0.0 else step
-    return replace(one, share=share, step=float(f"{advised:.2g}"))
+    wanted = (share / GOAL) ** (1.0 / one.order) if share < math.inf else 1.0
+    return replace(one, share=share, step=step / _parts(wanted))
 
 
-def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, tolerance: float) -> Result:
+def _parts(wanted: float) -> int:
+    """Least whole number from ``wanted`` on whose part of a step is a short decimal, so that it divides what the step
+    divides."""
+    powers = (2**i * 5**j for i in range(30) for j in range(12))
+    return min((number for number in powers if number >= wanted), default=1)
+
+
+def of_tolerance(
+    run: Result, fine: Series, looser: Series, factor: float, tolerance: float, sizes: Mapping[str, float] | None = None
+) -> Result:
     """The result of an adaptive method with the errors of its channels, by a run whose tolerance is ``factor`` times
-    as large: its error is taken to be larger by the root of that only, so that what is told is rather too large.
+    as large: its error is taken to be larger by the power FALL of that only, so that what is told is rather too large.
+    ``sizes`` as in ``estimated``.
 
     Rows may lie where steps end: the finer run is read at the looser one's times by a cubic spline.
     """
@@ -190,10 +243,11 @@ def of_tolerance(run: Result, fine: Series, looser: Series, factor: float, toler
 
     told = {}
     for name, values in fine.channels.items():
-        at = CubicSpline(fine.times, values)(looser.times)
-        error = _rms(at - looser.channels[name]) / (math.sqrt(factor) - 1.0)
-        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 2.0, tolerance)
-        told[name] = rescaled(one, size_of(values), tolerance)
+        same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
+        at = values if same else CubicSpline(fine.times, values)(looser.times)
+        error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), FLOOR * tolerance * size_of(values))
+        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
+        told[name] = rescaled(one, (sizes or {}).get(name, size_of(values)), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
@@ -205,9 +259,14 @@ def by_cells(error: float, size: float, unit: str, cells: int, order: float, mos
 
 
 def summed(one: Estimate, other: Estimate) -> Estimate:
-    """An error on top of another, as that of an input on top of that of the run which it drives."""
-    order, step = min(one.order, other.order), min(one.step, other.step)
-    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step)
+    """An error on top of another, as that of an input on top of that of the run which it drives.
+
+    What mends it is told of the larger one where that is of cells and the other of steps.
+    """
+    larger = one if one.share >= other.share else other
+    step = min(one.step, other.step) if one.of == other.of == "" else larger.step
+    order = min(one.order, other.order)
+    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step, larger.of)
 
 
 def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from models.core.assumptions import Broken, assumed_of, broken_of
-from models.core.discretisation import error_lines, errors_of, stated, worst_of
+from models.core.discretisation import WARNED, error_lines, errors_of, stated, worst_of
 from models.core.result import Result
 
 EACH = 4
@@ -24,17 +24,21 @@ def lines(results: Results) -> list[str]:
 def _errors(results: Results) -> list[str]:
     if len(results) <= EACH:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
-    texts: dict[str, list[str]] = {}
+    untold: dict[str, list[str]] = {}
+    worst = {name: one for name, run in results.items() if (one := worst_of(run)) is not None}
     for name, run in results.items():
-        worst = worst_of(run)
-        for line in error_lines(run) if worst is None or worst.warned else ():
-            texts.setdefault(line, []).append(name)
-    shares = {name: worst.share for name, run in results.items() if (worst := worst_of(run)) is not None}
-    largest = max(shares, key=lambda name: shares[name], default=None)
-    listed = [f"  {_few(names)}: {line}" for line, names in texts.items()]
-    if largest is None or any(largest in names for names in texts.values()):
+        for line in error_lines(run) if name not in worst else ():
+            untold.setdefault(line, []).append(name)
+    listed = [f"  {_few(names)}: {line}" for line, names in untold.items()]
+    if not worst:
         return listed
-    return [f"  {len(shares)} results, the largest error {largest}: {error_lines(results[largest])[0]}", *listed]
+    largest = max(worst, key=lambda name: worst[name].share)
+    warned = [name for name, one in worst.items() if one.warned]
+    more = (
+        [f"  errors above {100.0 * WARNED:g} % in {len(warned)} of {len(worst)}: {_few(warned)}"] if warned[1:] else []
+    )
+    first = f"  {len(worst)} results, the largest error {largest}: {error_lines(results[largest])[0]}"
+    return [first, *more, *listed]
 
 
 def _few(names: list[str]) -> str:
@@ -110,3 +114,19 @@ def _plain(run: Result, key: str) -> dict[str, Any]:
     """An attribute without NaN and infinity, which JSON does not have."""
     said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)
     return said
+
+
+SAID = ("engine", "error", "assumptions")
+"""Attributes by which a result says what it must be doubted for."""
+
+
+def attributes(results: Results) -> dict[str, dict[str, str]]:
+    """What results say, without their channels, as JSON keeps it; ``speaking`` reads it."""
+    return {name: {key: run.data.attrs[key] for key in SAID} for name, run in results.items()}
+
+
+def speaking(attributes: Mapping[str, Mapping[str, str]]) -> dict[str, Result]:
+    """Results without channels that say the same."""
+    import xarray as xr
+
+    return {name: Result(xr.Dataset(attrs=said)) for name, said in attributes.items()}

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from models.core.told import Results
 from models.drawing.figures import heading, plt
 from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 
@@ -30,7 +31,7 @@ def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
     axis.set_title("magnitude of the pitch error [rad]")
 
 
-def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
+def decision(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
     """One line per method: damage, pitch error, artificial moment, cost and the two verdicts."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     widths = (3.4, 1.9, 2.1, 3.6)
@@ -56,6 +57,7 @@ def decision(rows: list[Row], limits: Limits, grade: float | None) -> Any:
     heading(
         figure,
         f"Which stabiliser leaves the section forces right: perturbed model, noisy wheel forces ({rows[0]['engine']})",
+        results,
     )
     return figure
 

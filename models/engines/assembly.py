@@ -5,6 +5,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from models.core.assumptions import Assumption
 from models.core.signals import Signal
 from models.vehicles import pitch_plane
 from models.vehicles.description import PitchSpring, Vehicle
@@ -33,6 +34,7 @@ class Assembly:
     outputs : functions of the run that add channels to its result, one per effect that asks for any
     sensors : the same, of the run and of the model that made it, for effects that read accelerations
     doubts : sentences on what contradicts the scene, with size and remedy: told before the run and saved with it
+    assumptions : what its effects take for granted, beside what the vehicle does
     """
 
     scene: Any
@@ -45,6 +47,7 @@ class Assembly:
     moment: Signal | None = None
     sensors: tuple[Any, ...] = ()
     doubts: tuple[str, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
     @property
     def guided(self) -> tuple[int, ...]:

@@ -3,14 +3,16 @@
 import csv
 from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from models.core.discretisation import errors_of
 from models.core.errors import InputError
-from models.core.result import load
+from models.core.result import Result, load
+from models.core.told import SAID, Results
 from models.core.whole_files import whole_file
 
 SUFFIXES = (".nc", ".csv")
@@ -27,7 +29,7 @@ class Quantity:
     """values (n,) over ``grid`` (n,), which is a time, a coordinate or the first column of a table, or counts rows.
 
     kind : system and mode of the run, where the file says them; labels (n,) : what names the rows of a table, if it is
-    no number.
+    no number; error : that the result states for its channel, in its unit, nan where it states none.
     """
 
     unit: str
@@ -36,11 +38,15 @@ class Quantity:
     grid: np.ndarray
     kind: str = ""
     labels: tuple[str, ...] = ()
+    error: float = np.nan
 
 
 @dataclass(frozen=True)
 class Difference:
-    """``two`` less ``one`` over ``grid`` (n,); ``note`` says how they came onto the same rows."""
+    """``two`` less ``one`` over ``grid`` (n,); ``note`` says how they came onto the same rows.
+
+    stated : errors that both results state for the channel, together, root mean squares; nan where one states none.
+    """
 
     name: str
     unit: str
@@ -50,6 +56,12 @@ class Difference:
     two: np.ndarray
     note: str = ""
     labels: tuple[str, ...] = ()
+    stated: float = np.nan
+
+    @property
+    def within(self) -> bool:
+        """Whether both results differ by less than they say that they err: then the difference tells nothing."""
+        return 0.0 < self.rms <= self.stated
 
     @property
     def gap(self) -> np.ndarray:
@@ -100,7 +112,7 @@ def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
     found = list[Difference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
-        a, b = (dict(_netcdf(file) if file.suffix == ".nc" else _table(file)) for file in files)
+        a, b = (dict(_quantities(file)) for file in files)
         notes += _alone(prefix, (files[0], a), (files[1], b))
         found += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
     if not found:
@@ -153,6 +165,28 @@ def _files(folder: Path) -> dict[str, Path]:
 def _tabled(path: Path) -> bool:
     """Whether the CSV beside a netCDF file is the same table: its channels have one axis."""
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
+
+
+def results_of(one: Path, two: Path) -> dict[str, Result]:
+    """The results that are compared, by their files: those of tables are the netCDF files beside them."""
+    files = [file for _, *pair in _pairs(one, two)[0] for file in pair]
+    found = ((str(file), _result(file)) for file in files)
+    return {name: run for name, run in found if run is not None and all(said in run.data.attrs for said in SAID)}
+
+
+def _result(path: Path) -> Result | None:
+    """The saved result of a file, or of the netCDF file beside a table; None where there is none."""
+    beside = path.with_suffix(".nc")
+    return load(beside) if beside.is_file() else None
+
+
+def _quantities(path: Path) -> Iterator[tuple[str, Quantity]]:
+    """Quantities of a file by their names, with the errors that its result states."""
+    run = _result(path)
+    errors = {} if run is None else errors_of(run)
+    for name, quantity in _netcdf(path) if path.suffix == ".nc" else _table(path):
+        stated = errors.get(name.partition(", ")[0])
+        yield name, quantity if stated is None else replace(quantity, error=stated.error)
 
 
 def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
@@ -228,7 +262,9 @@ def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Differen
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
     near = NEAR * np.abs(one.grid).max(initial=0.0)
     if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=0.0, atol=near):
-        return Difference(name, one.unit, one.over, one.grid, one.values, two.values, labels=one.labels)
+        return Difference(
+            name, one.unit, one.over, one.grid, one.values, two.values, "", one.labels, one.error + two.error
+        )
     if one.over != "time [s]":
         rows = "" if len(one.grid) == len(two.grid) else f", {len(two.grid)} instead of {len(one.grid)}"
         raise InputError(file, name, None, f"has rows at other places ({one.over}) than the first{rows}")
@@ -251,7 +287,8 @@ def _in_time(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
     times = coarse.grid[inside]
     pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
     note = f"on {len(times)} common rows, the denser run by a cubic spline"
-    return Difference(name, one.unit, one.over, times, *(pair if fine is one else pair[::-1]), note)
+    both = pair if fine is one else pair[::-1]
+    return Difference(name, one.unit, one.over, times, *both, note, stated=one.error + two.error)
 
 
 def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
@@ -259,16 +296,22 @@ def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
     found, notes = compare(one, two)
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value"))
-        writer.writerows((d.name, d.unit, d.largest, d.where, d.rms, d.share) for d in found)
-    _figure(one, two, found, folder / "compare.png")
+        heads = ("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value")
+        writer.writerow((*heads, "stated error of both"))
+        writer.writerows(
+            (d.name, d.unit, d.largest, d.where, d.rms, d.share, "" if np.isnan(d.stated) else d.stated) for d in found
+        )
+    results = results_of(one, two)
+    _figure(one, two, found, results, folder / "compare.png")
     return {
         "scene": f"{two} less {one}",
         "folder": str(folder),
         "failed": {},
         "names": [each.name for each in found],
         "differences": {name: [getattr(each, name) for each in found] for name in ("largest", "rms", "at", "share")},
+        "within the stated error": [each.name for each in found if each.within],
         "table": [*_lines(found), *(f"  {note}" for note in notes)],
+        "results": results,
     }
 
 
@@ -280,16 +323,21 @@ def _lines(found: list[Difference]) -> list[str]:
     same, more = len(found) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
-        *(f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {d.where}" for d in shown),
+        *(f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {_told(d)}" for d in shown),
         *([f"  {more} more that differ less: compare.csv"] if more else []),
         *([f"  the same to the last bit: {same} of {len(found)}"] if same else []),
         *(f"  {note}" for note in dict.fromkeys(each.note for each in found if each.note)),
     ]
 
 
-def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
+def _told(one: Difference) -> str:
+    """Where a difference is largest, and whether it tells anything."""
+    return f"{one.where}; rms within the stated error of {one.stated:.2g}" if one.within else one.where
+
+
+def _figure(one: Path, two: Path, found: list[Difference], results: Results, path: Path) -> None:
     """Both results and, below, their difference, of the three quantities that differ most."""
-    from models.drawing.figures import plt, save
+    from models.drawing.figures import heading, plt, save
 
     shown = found[:3]
     figure, axes = plt.subplots(2, len(shown), figsize=(4.2 * len(shown) + 0.6, 5.4), sharex="col", squeeze=False)
@@ -299,7 +347,8 @@ def _figure(one: Path, two: Path, found: list[Difference], path: Path) -> None:
         top.set_title(f"{each.name} [{each.unit or '-'}]")
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color="#0072b2")
         below.plot(each.at, each.gap[each.row], "o", color="#0072b2", markersize=5)
-        below.set(title=f"difference, largest {each.largest:.3g} at the mark", xlabel=each.over)
+        error = "\nrms within the stated error" if each.within else ""
+        below.set(title=f"difference, largest {each.largest:.3g} at the mark{error}", xlabel=each.over)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    figure.suptitle(f"Largest differences of {len(found)} quantities", x=0.01, ha="left", fontweight="bold")
+    heading(figure, f"Largest differences of {len(found)} quantities", results)
     save(figure, path)

@@ -7,8 +7,8 @@ from typing import Any
 
 LONGEST = 8
 """A list of more entries is a curve: of that, the largest magnitude and the rms are taken."""
-SKIPPED = ("seconds", "folder", "scene", "table", "failed")
-"""What is no answer: how long it took, and text."""
+SKIPPED = ("seconds", "folder", "scene", "table", "failed", "results")
+"""What is no answer: how long it took, text, and what the numbers are of."""
 FRAMES = ("answer", "runs", "rows", "channels")
 """Keys that only say that what follows is the answer."""
 

@@ -20,16 +20,19 @@ from typing import Any
 
 import numpy as np
 
+from models.core import told
+from models.core.assumptions import broken_of
+from models.core.discretisation import worst_of
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed
 from models.core.whole_files import write_whole
-from models.drawing.figures import COLOURS, LABELS, plt, save
 from models.ensemble.runner import Progress as Done
 from models.ensemble.runner import run_paths
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import processes
 from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
 from studies.command.summary_numbers import numbers
+from studies.command.sweep_figure import Columns, Swept, draw, moves, there
 
 RECORDS, RUNS = "points", "runs"
 """Folders of the records of finished points, and of what each of them left."""
@@ -38,21 +41,15 @@ MOST = 10_000
 WORKERS = 2
 """Processes, if there are so many cores; the results do not depend on it."""
 
-ACROSS, DOWN, PAGES = 3, 4, 4
-"""Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
-DECADES = 30.0
-"""Ratio of the largest to the least value from which on an axis is logarithmic."""
-
 Record = dict[str, Any]
-Columns = dict[str, list[Any]]
-"""Numbers of all points by their names, None where there is none."""
-Failures = list[dict[str, str]]
-"""What failed at each point, by engine."""
 
 
 @dataclass(frozen=True)
 class Points:
-    """Job (see ``models.ensemble.runner``): point i is the scene with the i-th value of the key."""
+    """Job (see ``models.ensemble.runner``): point i is the scene with the i-th value of the key.
+
+    error : whether the error of each point is estimated.
+    """
 
     scene: str
     changes: tuple[str, ...]
@@ -60,6 +57,7 @@ class Points:
     values: tuple[Any, ...]
     engine: str | None
     folder: Path
+    error: bool = True
 
     def __call__(self, paths: range) -> Arrays:
         """``record`` (n,): the record of each point as JSON."""
@@ -68,6 +66,7 @@ class Points:
     def ready(self, i: int) -> tuple[Any, tuple[str, ...], Any]:
         """Scene, engines and study of a point; InputError if it cannot be run."""
         scene = load_scene(self.scene, [*self.changes, f"{self.key}={_written(self.values[i])}"])
+        scene = scene.model_copy(update={"error": scene.error and self.error})
         engine = self.engine or getattr(getattr(scene, "run", None), "engine", None)
         engines = engines_of(engine, scene.system)
         return scene, engines, ready(scene, engines)
@@ -85,14 +84,16 @@ class Points:
             raise first
 
     def record(self, i: int) -> Record:
-        """Numbers of one point by their names, and what failed, by engine where the study told it."""
+        """Numbers of one point by their names, what failed, by engine where the study told it, and what its results say
+        of themselves."""
         try:
             scene, engines, study = self.ready(i)
             with whole_folder(self.folder / RUNS / f"{i:04d}") as own:
                 summary = study.run(scene, engines, own, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed(error)
-        return {"numbers": numbers(summary), "failed": summary.get("failed", {})}
+        said = told.attributes(summary.get("results", {}))
+        return {"numbers": numbers(summary), "failed": summary.get("failed", {}), "results": said}
 
     def facts(self) -> dict[str, Any]:
         """Everything that the points depend on: the scene as written, the files that it names, the code."""
@@ -102,6 +103,7 @@ class Points:
             "sweep": self.key,
             "values": list(self.values),
             "engine": self.engine,
+            "error": self.error,
             "scene": table,
             "files": named_files([table, self.values, self.engine], path.parent),
             "code of studies": code(STUDIES),
@@ -113,7 +115,7 @@ def _array(records: Iterable[Record]) -> Arrays:
 
 
 def _failed(reason: object) -> Record:
-    return {"numbers": {}, "failed": {"": str(reason)}}
+    return {"numbers": {}, "failed": {"": str(reason)}, "results": {}}
 
 
 @contextmanager
@@ -150,10 +152,10 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
     return key, values
 
 
-def points(text: str, scene: str, changes: Sequence[str], engine: str | None) -> Points:
+def points(text: str, scene: str, changes: Sequence[str], engine: str | None, error: bool = True) -> Points:
     """The job of a sweep that was asked for, its folder not yet known; InputError where no point of it can be run."""
     key, values = asked(text)
-    job = Points(scene, tuple(changes), key, values, engine, Path())
+    job = Points(scene, tuple(changes), key, values, engine, Path(), error)
     job.check()
     return job
 
@@ -198,14 +200,12 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
         found = _records(job, progress)
-        quantities = list(dict.fromkeys(name for record in found for name in record["numbers"]))
-        columns = {name: [record["numbers"].get(name) for record in found] for name in quantities}
-        failures = [record["failed"] for record in found]
-        _save(job, columns, failures)
-        pages = draw(job, columns, failures)
+        swept = _swept(job, found)
+        _save(job.folder, swept)
+        pages = draw(swept, job.folder)
     reasons = {
         f"{job.key}={value}{f', {who}' if who else ''}": reason
-        for value, failed in zip(job.values, failures, strict=True)
+        for value, failed in zip(job.values, swept.failures, strict=True)
         for who, reason in failed.items()
     }
     return {
@@ -213,9 +213,23 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
         "failed": reasons,
         "folder": str(job.folder),
         "values": list(job.values),
-        "numbers": columns,
-        "table": _table(columns, pages),
+        "numbers": swept.columns,
+        "table": _table(swept.columns, pages),
+        "results": {
+            f"{job.key}={value} {name}".rstrip(): run
+            for value, own in zip(job.values, swept.results, strict=True)
+            for name, run in own.items()
+        },
     }
+
+
+def _swept(job: Points, records: list[Record]) -> Swept:
+    """The records as columns, and what their results say."""
+    quantities = list(dict.fromkeys(name for record in records for name in record["numbers"]))
+    columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
+    failures = [record["failed"] for record in records]
+    results: list[told.Results] = [told.speaking(record["results"]) for record in records]
+    return Swept(job.scene, job.key, job.values, columns, failures, results)
 
 
 def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:
@@ -235,132 +249,38 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
     return records
 
 
-def _save(job: Points, columns: Columns, failures: Failures) -> None:
+def _save(folder: Path, swept: Swept) -> None:
     """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
+    errors, broken = [_largest(own) for own in swept.results], [_broken(own) for own in swept.results]
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([job.key, *columns, "failed"])
-    for i, value in enumerate(job.values):
-        told = "; ".join(f"{who}: {reason}" if who else reason for who, reason in failures[i].items())
-        writer.writerow([value, *(column[i] for column in columns.values()), told])
-    write_whole(job.folder / "sweep.csv", text.getvalue().encode())
-    content = {"key": job.key, "values": list(job.values), "numbers": columns, "failed": failures}
-    write_whole(job.folder / "sweep.json", json.dumps(content, indent=1).encode())
+    writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
+    for i, value in enumerate(swept.values):
+        failed = "; ".join(f"{who}: {reason}" if who else reason for who, reason in swept.failures[i].items())
+        writer.writerow([value, *(column[i] for column in swept.columns.values()), failed, errors[i], broken[i]])
+    write_whole(folder / "sweep.csv", text.getvalue().encode())
+    content = {"key": swept.key, "values": list(swept.values), "numbers": swept.columns, "failed": swept.failures}
+    content |= {"results": [told.as_json(own) for own in swept.results]}
+    write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
+
+
+def _largest(results: told.Results) -> float | None:
+    """The largest error of a point's results, by its channel's deviation; None where none was estimated."""
+    return max((one.share for run in results.values() if (one := worst_of(run)) is not None), default=None)
+
+
+def _broken(results: told.Results) -> str:
+    """Assumptions that a point's results broke, with the share of the time."""
+    breaches = [(name, one) for name, run in results.items() for one in broken_of(run)]
+    return "; ".join(f"{name}: {one.name} ({100.0 * one.share:.2g} %)" for name, one in breaches)
 
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
-    moving = {name: _there(column) for name, column in columns.items() if _moves(column)}
+    moving = {name: there(column) for name, column in columns.items() if moves(column)}
     lines = [
         f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
         for name, own in list(moving.items())[:12]
     ]
     rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
     return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]
-
-
-def draw(job: Points, columns: Columns, failures: Failures) -> list[str]:
-    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
-    panels = _panels(columns)
-    size, names = ACROSS * DOWN, list[str]()
-    shown = list(panels.items())[: size * PAGES] or [("no number changes", {})]
-    for first in range(0, len(shown), size):
-        name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
-        _page(job, shown[first : first + size], failures, name, f"the {len(panels)} quantities that change")
-        names.append(name)
-    return names
-
-
-def _panels(columns: Columns) -> dict[str, dict[str, list[Any]]]:
-    """Quantities that change -> curve of each implementation, "" where there is but one."""
-    panels: dict[str, dict[str, list[Any]]] = {}
-    for name, column in columns.items():
-        first, _, rest = name.partition(", ")
-        engine, what = (first, rest) if rest and first in LABELS else ("", name)
-        panels.setdefault(what, {})[engine] = column
-    return {what: own for what, own in panels.items() if any(_moves(column) for column in own.values())}
-
-
-def _there(column: list[Any]) -> list[Any]:
-    return [value for value in column if value is not None]
-
-
-def _moves(column: list[Any]) -> bool:
-    return len(set(_there(column))) > 1
-
-
-def _page(
-    job: Points, panels: list[tuple[str, dict[str, list[Any]]]], failures: Failures, name: str, note: str
-) -> None:
-    down = -(-len(panels) // ACROSS)
-    figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
-    at, ticks = _places(job.values)
-    for axis, (what, curves) in zip(axes.flat, panels, strict=False):
-        _panel(axis, at, what, curves, failures, "o" if ticks else "o-")
-        if ticks:
-            axis.set_xticks(at, ticks)
-        elif _spread(at):
-            axis.set_xscale("log")
-        axis.set_xlabel(job.key)
-    for axis in axes.flat[len(panels) :]:
-        axis.set_visible(False)
-    handles: dict[str, Any] = {}
-    for axis in axes.flat:
-        found, labels = axis.get_legend_handles_labels()
-        handles |= dict(zip(labels, found, strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
-    figure.suptitle(f"{job.scene.rpartition('/')[2]} over {job.key}: {note}", x=0.01, ha="left", fontweight="bold")
-    save(figure, job.folder / name)
-
-
-def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
-    """Places on the axis and, for values that are no numbers, what is written there."""
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, float), []
-    return np.arange(float(len(values))), [str(value)[:18] for value in values]
-
-
-def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], failures: Failures, style: str) -> None:
-    order = np.argsort(at)
-    for i, (engine, column) in enumerate(curves.items()):
-        axis.plot(
-            at[order],
-            np.array(column, float)[order],
-            style,
-            color=COLOURS.get(engine, "#0072b2"),
-            markersize=3.5,
-            linewidth=2.2 - 0.6 * min(i, 2),
-            label=LABELS[engine] or None,
-        )
-    if all(_spread(np.array(_there(column), float)) for column in curves.values()):
-        axis.set_yscale("log")
-    else:
-        axis.ticklabel_format(axis="y", useOffset=False)
-    lost = [i for i, failed in enumerate(failures) if failed and any(column[i] is None for column in curves.values())]
-    if lost:
-        axis.plot(
-            at[lost],
-            np.full(len(lost), 0.04),
-            "x",
-            transform=axis.get_xaxis_transform(),
-            color="#cc0000",
-            markersize=8,
-            markeredgewidth=2,
-            clip_on=False,
-            label="failed",
-        )
-    axis.set_title(_title(what), fontsize=9)
-
-
-def _title(what: str) -> str:
-    """The quantity on at most two lines, its unit last."""
-    text, unit = re.fullmatch(r"(.*?)( \[[^\[\]]*\])?", what, re.DOTALL).groups()  # type: ignore[union-attr]
-    if len(what) <= 46:
-        return what
-    cut = text.rfind(", ", 0, 46)
-    cut = cut + 1 if cut > 0 else 46
-    return f"{text[:cut]}\n{text[cut : cut + 46].strip()}{unit or ''}"
-
-
-def _spread(values: np.ndarray) -> bool:
-    return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())

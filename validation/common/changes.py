@@ -35,7 +35,8 @@ def read(path: Path) -> Saved:
 
 def _rows(content: Saved) -> dict[str, Saved]:
     """Rows by id; ValueError for an id that stands there twice: of two rows only one would be compared."""
-    rows = {row["id"]: of_saved({name: row[name] for name in Row.__dataclass_fields__}) for row in content["rows"]}
+    saved = map(of_saved, content["rows"])
+    rows = {row["id"]: {name: row[name] for name in Row.__dataclass_fields__} for row in saved}
     if len(rows) < len(content["rows"]):
         raise ValueError("an id stands there twice")
     return rows

@@ -1,7 +1,9 @@
 """Rows of the validation report: one quantity each, with what was expected and why."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, get_args
+
+from validation.common import grounds
 
 System = Literal[
     "pitch-plane",
@@ -28,7 +30,10 @@ Side = Literal["at most", "at least"]
 
 @dataclass(frozen=True)
 class Row:
-    """One measured quantity. ``value`` and ``expected`` may be text where a behaviour is judged."""
+    """One measured quantity. ``value`` and ``expected`` may be text where a behaviour is judged.
+
+    broken, allowed : assumptions that the runs it rests on broke, without and with leave: see ``grounds``.
+    """
 
     id: str
     system: System
@@ -41,6 +46,15 @@ class Row:
     independence: Independence
     status: Status
     reason: str = ""
+    broken: str = field(default_factory=grounds.broken)
+    allowed: str = field(default_factory=grounds.allowed)
+
+    def grounded(self) -> "Row":
+        """The row, failed where it rests on an assumption that was broken without leave."""
+        if not self.broken or self.status == "not run":
+            return self
+        reason = f"{self.reason}; rests on a run with an {self.broken}".removeprefix("; ")
+        return replace(self, status="failed", reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
         """The row as ``results.json`` keeps it."""
@@ -132,10 +146,11 @@ def aim(
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
     """Row for something that could not be measured here, with the reason."""
-    return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason)
+    return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
 
 
 def of_saved(row: dict[str, Any]) -> dict[str, Any]:
-    """A row of saved results; those of older reports called "passed" what they did not judge."""
+    """A row of saved results; older reports called "passed" what they did not judge, and knew no assumptions."""
     unjudged = row["status"] == "passed" and row["reason"] == "reported, not judged"
+    row = {"broken": "", "allowed": "", **row}
     return row | {"status": "reported", "reason": ""} if unjudged else row

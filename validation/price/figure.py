@@ -29,6 +29,14 @@ SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
 ONCE = 0.5
 """Size of a marker whose seconds are those of one run, by that of the others."""
 FRONT: Style = {"color": "#f0c808", "linewidth": 9, "alpha": 0.45}
+BROKEN: Style = {
+    "marker": "o",
+    "linestyle": "none",
+    "markersize": 11,
+    "markerfacecolor": "none",
+    "markeredgecolor": "#b00020",
+    "markeredgewidth": 0.8,
+}
 LABEL = np.array([0.27, 0.09])
 """Width and height of a default's name, in fractions of the panel."""
 CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.linspace(0.2, 0.92, 17)])
@@ -102,6 +110,9 @@ def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: 
         look = {**style, "linestyle": "none", "markersize": style["markersize"] * (ONCE if once else 1.0)}
         face = "white" if hollow else style["color"]
         ax.plot(*zip(*some, strict=True), **look, markerfacecolor=face, markeredgewidth=0.9)
+    for p, place in zip(points, places, strict=True):
+        if p.broken:
+            ax.plot(*place, **BROKEN)
 
 
 def _floor(ax: Axes, measured: Measured) -> None:
@@ -209,6 +220,8 @@ def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
     names = sorted(styles, key=named)
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
+    for text in dict.fromkeys(text for p in measured.points for text in p.broken):
+        handles.append(Line2D([], [], **BROKEN, label=f"assumption broken: {text}"))
     if any(p.status != "ok" for p in measured.points):
         failed = "no answer to rely on"
         handles.append(Line2D([], [], color="#777777", marker="x", linestyle="none", label=failed))

@@ -99,6 +99,15 @@ def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
 
 
+def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
+    """Assumptions that runs broke with leave, and the rows that rest on these runs."""
+    found: dict[str, list[Saved]] = {}
+    for row in rows:
+        if row["allowed"]:
+            found.setdefault(row["allowed"], []).append(row)
+    return list(found.items())
+
+
 def conventions() -> list[tuple[str, str]]:
     """Heading and text of every paragraph of the conventions page."""
     import models
@@ -188,6 +197,7 @@ def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -
         silent=silent_systems(results["rows"]),
         shares=shares(results),
         independence=independence(results, drawn),
+        allowances=allowances(results["rows"]),
         conventions=conventions(),
         parameters=parameter_tables(),
         provenance=results["provenance"],

@@ -6,7 +6,8 @@ the effect, or the pair where no single one will do, that saves most (logarithm 
 allowed) for what it adds to the error. Work is counted and not timed, so that the choice repeats on any machine. What
 is left is run over the whole scene, beside the scene as it is. Where it is not within the tolerance, steps become
 shorter; if that does not help, the step of the path that breaks it is found by halving and taken back for good, and the
-choice goes on without it. So what is reported was confirmed, always; the scene as it is holds with no error at all.
+choice goes on without it. A run that breaks an assumption which the scene keeps is not within any tolerance. So what is
+reported was confirmed, always; the scene as it is holds with no error at all.
 
 Where quantities are means of samples that are alike, few samples find the set, and all of them tell what it changes.
 The search ends where it has taken as many calls as so many runs of the scene: what it has found by then is confirmed,
@@ -15,7 +16,7 @@ and larger sets were not tried.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -24,6 +25,7 @@ import numpy as np
 from models.advice.choice.answer import added
 from models.advice.choice.screen import Screen
 from models.advice.choice.variants import Set, Variants
+from models.core.assumptions import Broken
 from models.core.errors import InputError
 
 BUDGET = 0.8
@@ -54,7 +56,8 @@ class Choice:
     add so much to that, where quantities are means of samples; kept : each sum of both is within the tolerance. calls
     and seconds (CPU) of the scene, of that with longer steps alone, and of what is left. rounds : runs of the whole
     scene that confirmed or did not; spent : calls of all runs. more : times as many samples would let more go, about, 0
-    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried.
+    where chance alone stands in nothing's way. ended : the search was, before all that might go was tried. barred : by
+    effects that stay, what would be broken without them that the scene keeps.
     """
 
     candidates: tuple[str, ...]
@@ -71,6 +74,7 @@ class Choice:
     spent: int
     more: float
     ended: bool = False
+    barred: dict[str, list[Broken]] = field(default_factory=dict)
 
 
 class Chooser:
@@ -135,9 +139,20 @@ class Chooser:
         return lengths[low], found
 
     def share(self, chosen: Set) -> float:
-        """Largest predicted change, with what may be left out of it, by the tolerance."""
+        """Largest predicted change, with what may be left out of it, by the tolerance; infinite where an assumption
+        would be broken that the scene keeps."""
+        if self.barred(chosen):
+            return math.inf
         error = self.error + self.screen.predicted(chosen) + self.screen.remainder(chosen)
         return float(np.max(error)) / self.tolerance
+
+    def barred(self, chosen: Set) -> bool:
+        """Whether a run without these effects breaks an assumption that the scene keeps; of more than two it is
+        foretold: an effect is missed whose every pair is."""
+        runs = self.screen.variants
+        if len(chosen) <= 2:
+            return bool(runs.breaks(chosen))
+        return any(all(runs.breaks(frozenset([one, other])) for other in chosen - {one}) for one in chosen)
 
     def reach(self, chosen: Set) -> int:
         """Longest step, by the scene's own, that the predictions allow without these effects."""
@@ -159,6 +174,8 @@ class Chooser:
                 self.rounds += 1
                 change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
                 found, chance = self.whole.shares(change), self.whole.chance(change)
+                if self.whole.variants.breaks(chosen, times):
+                    found = np.full_like(found, np.inf)
                 self._confirmed[chosen] = times, found, chance
                 if self.holds(found + chance):
                     break
@@ -232,6 +249,7 @@ class Chooser:
             self._spent(),
             min(self._doubtful, default=0.0),
             self.ended,
+            {name: broken for name in self.effects if (broken := self.teller.variants.breaks(frozenset([name])))},
         )
 
     def _spent(self) -> int:

@@ -9,7 +9,9 @@ from types import ModuleType
 from typing import Any
 
 from models.advice.choice.answer import Answer
+from models.core.assumptions import Broken, breaches, watching
 from models.core.errors import InputError, RunFailed
+from models.core.result import Result
 from models.core.scene_effects import absent, beside, module_of, named, own_table, rebuilt, without
 from models.core.systems import modules_of
 
@@ -51,6 +53,7 @@ class Variants:
     calls: int = 0
     _kept: dict[tuple[Set, int], Answer | None] = field(default_factory=dict)
     _costs: dict[Set, float] = field(default_factory=dict)
+    _broken: dict[tuple[Set, int], dict[str, Broken]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.system = system_of(self.scene)
@@ -84,7 +87,8 @@ class Variants:
         """The run without these effects, with steps so many times as long."""
         key = (frozenset(left_out), times)
         if key not in self._kept:
-            found = self._kept[key] = self._run(*key)
+            with breaches() as self._broken[key]:
+                found = self._kept[key] = self._run(*key)
             self.calls += found.counts["calls"] if found else 0
         return self._kept[key]
 
@@ -93,6 +97,21 @@ class Variants:
             found: Answer = self.system.answer(self.changed(left_out, times), self.engine)
         except (InputError, RunFailed):
             return None
+        return found
+
+    def breaks(self, left_out: Set, times: int = 1) -> list[Broken]:
+        """Assumptions that the run without these effects breaks, and the scene itself keeps."""
+        if self.of(left_out, times) is None or self.of() is None:
+            return []
+        known = self._broken[frozenset(), 1]
+        return [one for name, one in self._broken[left_out, times].items() if name not in known]
+
+    def stated(self, left_out: Set, times: int = 1) -> list[Result]:
+        """The results of a variant with the errors that they state, which takes its runs once more and their
+        estimates."""
+        found: list[Result] = []
+        with suppress(RunFailed), watching(found.append):  # raised where an error is as large as what it is of
+            self.system.answer(self.changed(left_out, times), self.engine, error=True)
         return found
 
     def changed(self, left_out: Set, times: int = 1) -> Any:

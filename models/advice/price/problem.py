@@ -79,5 +79,6 @@ class Problem(Protocol):
         ...
 
     def errors(self, solution: Any) -> dict[str, float]:
-        """Largest error per quantity over the run, in the units of ``units``."""
+        """Largest error per quantity over the run, in the units of ``units``; where it judges the run, too, points of
+        work-precision curves are marked that break an assumption."""
         ...

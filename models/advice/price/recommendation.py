@@ -230,7 +230,7 @@ def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
     i, first = ladder.values.index(one.tried.setting.value), one.tried
     for _ in range(ATTEMPTS):
         now = over.attempt(ladder.setting(i))
-        if now.error <= over.held:
+        if over.meets(now):
             ratio = ladder.work(first.setting.value, now.setting.value)
             return Choice(now, now.error, now.calls, ratio * one.seconds, True, tuple(ratio * s for s in one.rounds))
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0

@@ -18,6 +18,7 @@ import numpy as np
 
 from models.advice.price.curves import HOLLOW, Reach, coinciding, observed_order, pareto, reach
 from models.advice.price.problem import Problem, Setting
+from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import interleave, interval, resamples
 
@@ -45,7 +46,8 @@ DRAWS = 200
 class Point:
     """One setting and what became of it: errors by quantity, counts, seconds of every round, or of the one run.
 
-    changed : whether the last of those rounds counted, or erred by, anything else; None without rounds.
+    changed : whether the last of those rounds counted, or erred by, anything else; None without rounds. broken :
+    assumptions that the run broke, of a problem whose solutions are judged.
     """
 
     setting: Setting
@@ -55,6 +57,7 @@ class Point:
     counts: dict[str, int] = field(default_factory=dict)
     seconds: tuple[float, ...] = ()
     changed: bool | None = None
+    broken: tuple[str, ...] = ()
 
     def cost(self, kind: str) -> float:
         """A count, or the median of the seconds."""
@@ -232,10 +235,15 @@ def measured(problem: Problem, points: Iterable[Point]) -> Measured:
     return Measured(**told, points=list(points))
 
 
+TUPLES = ("seconds", "broken")
+"""What JSON keeps as lists."""
+
+
 def of_saved(saved: dict[str, Any]) -> Measured:
     """The same from what ``dataclasses.asdict`` made of it."""
     points = [
-        Point(**{**p, "setting": Setting(**p["setting"]), "seconds": tuple(p["seconds"])}) for p in saved["points"]
+        Point(**p | {"setting": Setting(**p["setting"])} | {name: tuple(p.get(name, ())) for name in TUPLES})
+        for p in saved["points"]
     ]
     return Measured(**{**saved, "points": points})
 
@@ -246,12 +254,13 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     """
     begun = CLOCK()
     try:
-        solution = problem.build(setting).run()
+        with breaches() as broken:
+            solution = problem.build(setting).run()
+            seconds, errors = CLOCK() - begun, problem.errors(solution)
     except InputError as error:
         return Point(setting, "refused", str(error))
     except RunFailed as error:
         return Point(setting, "raised", str(error))
-    seconds, errors = CLOCK() - begun, problem.errors(solution)
     status: Status = "SILENT"
     first = errors[next(iter(problem.units))]
     if reason := getattr(solution, "doubt", ""):
@@ -262,7 +271,8 @@ def attempt(problem: Problem, setting: Setting) -> Point:
         reason = f"an error of {first:.3g}, more than {problem.bound:.3g}, came back as a result"
     else:
         status = "ok"
-    return Point(setting, status, reason, errors, dict(solution.counts), (seconds,))
+    counts = dict(solution.counts)
+    return Point(setting, status, reason, errors, counts, (seconds,), broken=tuple(one.says for one in broken.values()))
 
 
 def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measured:

@@ -10,6 +10,7 @@ from models.advice.price import Ladder, OwnScene
 from models.advice.price.problem import Setting
 from models.advice.price.runner import Status
 from models.advice.price.truth import Truth
+from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
 
 START = 2e-3
@@ -33,7 +34,8 @@ BEYOND = 10.0
 @dataclass(frozen=True)
 class Tried:
     """One setting and what became of it: error in the quantity's unit, calls (or cells) and seconds of one run, as the
-    processor counts them: other work on the machine is not in them."""
+    processor counts them: other work on the machine is not in them. It is "flagged" where it breaks an assumption that
+    the reference keeps."""
 
     setting: Setting
     status: Status
@@ -70,18 +72,21 @@ class Search:
         """Try one setting, and keep what became of it."""
         begun = time.process_time()
         try:
-            solution = self.scene.solve(setting, self.duration)
+            with breaches() as broken:
+                solution = self.scene.solve(setting, self.duration)
+                seconds, answer = time.process_time() - begun, self.scene.answer(solution)
         except InputError as error:
             found = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
         except RunFailed as error:
             found = Tried(setting, "raised", str(error))
         else:
-            seconds, answer = time.process_time() - begun, self.scene.answer(solution)
             error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
             found = Tried(setting, "ok", "", error_of, calls, seconds)
             if not error_of <= BEYOND * max(self.truth.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
                 found = replace(found, status="SILENT", reason=why)
+            elif alone := self.truth.beside(broken):
+                found = replace(found, status="flagged", reason="; ".join(one.brief() for one in alone))
         self.tried.append(found)
         return found
 
@@ -103,7 +108,7 @@ class Search:
             if i < low or self._hopeless(ladder, i, last) or self._too_long(ladder, i, last):
                 return
             last = self.attempt(ladder.setting(i))
-            if last.error <= self.held:
+            if self.meets(last):
                 high = i
             elif ladder.cells and last.status in ("refused", "raised"):
                 return  # its step is too long, however many cells there are
@@ -112,7 +117,11 @@ class Search:
 
     def meeting(self, engine: str = "") -> list[Tried]:
         """Those that meet the tolerance, of one engine or of all."""
-        return [one for one in self.tried if one.error <= self.held and one.setting.engine.startswith(engine)]
+        return [one for one in self.tried if self.meets(one) and one.setting.engine.startswith(engine)]
+
+    def meets(self, one: Tried) -> bool:
+        """Whether a setting holds the tolerance, and keeps the assumptions that the reference keeps."""
+        return one.status == "ok" and one.error <= self.held
 
     def _elsewhere(self, ladder: Ladder) -> float:
         """The value that the method needs in another engine, 0 where none has it."""

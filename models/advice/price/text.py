@@ -1,6 +1,7 @@
 """A recommendation as a person reads it, and as JSON."""
 
 from collections import defaultdict
+from dataclasses import asdict
 from typing import Any
 
 from models.advice.price.problem import Setting
@@ -31,6 +32,7 @@ def lines(found: Recommendation) -> list[str]:
         *([] if found.whole else [first]),
         *([f"  {own.note}"] if own.note else []),
         *([doubt] if found.tolerance >= found.truth.size else []),
+        *(f"  with every setting: {one.line()}" for one in found.truth.broken),
         "",
         *(_table(found) if found.winners else _none(found)),
         *_defaults(found),
@@ -120,7 +122,7 @@ def _failures(tried: tuple[Tried, ...]) -> list[str]:
         return []
     return [
         "",
-        "  without an answer",
+        "  without an answer to rely on",
         *(
             f"    {status:<9}{method}, {', '.join(dict.fromkeys(one.setting.label() for one in own))}: {own[-1].reason}"
             for (status, method), own in known.items()
@@ -147,6 +149,7 @@ def as_dict(found: Recommendation) -> dict[str, Any]:
         "duration": own.whole,
         "truth": found.truth.how,
         "uncertainty": found.truth.uncertainty,
+        "broken assumptions": [asdict(one) for one in found.truth.broken],
         "cheapest": [
             {"engine": engine or "all", "by": kind, **_choice(one)} for (engine, kind), one in found.winners.items()
         ],

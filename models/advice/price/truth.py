@@ -1,12 +1,14 @@
 """What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from models.advice.price import Answer, Ladder, OwnScene
 from models.advice.price.problem import Setting
+from models.core.assumptions import Broken, breaches
 from models.core.errors import InputError, RunFailed
 
 AGREED = 4.0
@@ -20,7 +22,8 @@ MOST_ROWS = 4_000_000
 @dataclass(frozen=True)
 class Truth:
     """answer : of the reference; uncertainty : in the unit of the quantity; rung : of the reference's ladder; cell : s
-    between kinks of the quantity, 0 where there are none; seconds : that the reference took."""
+    between kinks of the quantity, 0 where there are none; seconds : that the reference took; broken : assumptions that
+    the reference breaks, and with it every setting that is right."""
 
     answer: Answer
     uncertainty: float
@@ -28,6 +31,12 @@ class Truth:
     rung: int
     cell: float = 0.0
     seconds: float = 0.0
+    broken: tuple[Broken, ...] = ()
+
+    def beside(self, broken: Mapping[str, Broken]) -> list[Broken]:
+        """Of assumptions by name, those that the reference keeps."""
+        known = {one.name for one in self.broken}
+        return [one for name, one in broken.items() if name not in known]
 
     def error(self, other: Answer) -> float:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
@@ -69,11 +78,12 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
+    with breaches() as broken:
+        found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
-    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds)
+    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds, tuple(broken.values()))
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))

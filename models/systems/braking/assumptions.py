@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from functools import partial
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -134,7 +135,7 @@ def _of_bodies(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
         )
 
 
-def _springs(vehicle: Braked) -> tuple[object, ...]:
+def _springs(vehicle: Braked) -> tuple[Any, ...]:
     return tuple(vehicle.sprung.handling.vehicle.springs)
 
 

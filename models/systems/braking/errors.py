@@ -105,8 +105,8 @@ def near(path: Path, longer: Path, other: OtherRuns) -> bool:
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
-    said = [other.answered(path, *signals) for signals in ((turning, speed), (shifted, faster))]
-    return not np.array_equal(*said)
+    said, beside = (other.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
+    return not np.array_equal(said, beside)
 
 
 def channels(path: Path, times: np.ndarray) -> Channels:
@@ -137,7 +137,7 @@ def _by_fewer(path: Path, steps: int, others: list[Path], step: float) -> dict[s
     fine, coarse, counts = whole(path, path.times), whole(others[0], path.times), [steps, steps // 2, steps // 4]
     part = path.times[path.times <= others[-1].times[-1]]
     seen = [channels(run, part) for run in (path, *others)]
-    told = {}
+    told = dict[str, Estimate]()
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL
         if len(others) > 1 and name != DISTANCE:

@@ -1,6 +1,6 @@
 """What the theories of one rolling contact take for granted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 
@@ -97,7 +97,7 @@ def _creepages(body: Contact) -> list[Assumption]:
     """That creepages are small and, where friction is constant, that slip is slow."""
     longer = body.lever
 
-    def creepages(run: Result) -> Watched:
+    def creepages(run: Result) -> Mapping[str, np.ndarray]:
         return {"xi_x": np.abs(run["xi_x"]), "xi_y": np.abs(run["xi_y"]), "spin": longer * np.abs(run["spin"])}
 
     if isinstance(body, Linear) or (isinstance(body, Fastsim) and body.choices["falling"] is not None):
@@ -105,7 +105,7 @@ def _creepages(body: Contact) -> list[Assumption]:
     return [_small(creepages), _dry(lambda run: {name: np.abs(run[name]) for name in ("xi_x", "xi_y")})]
 
 
-def _small(watched: Callable[[Result], Watched]) -> Assumption:
+def _small(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "small creepage",
         "creepages, and spin times the semi-axis, are so small that their squares do not count",
@@ -116,7 +116,7 @@ def _small(watched: Callable[[Result], Watched]) -> Assumption:
     )
 
 
-def _dry(watched: Callable[[Result], Watched]) -> Assumption:
+def _dry(watched: Callable[[Result], Mapping[str, np.ndarray]]) -> Assumption:
     return Assumption(
         "constant friction",
         "friction is the same however fast the contact slips",

@@ -138,7 +138,7 @@ def run(
 
 def _result(scene: ContactScene, rolls: Rolls, seconds: float) -> Result:
     body, count, power = rolls.contact, len(rolls.motions), POWERS[scene.method.name]
-    errors = [ERRORS(error) for error in rolls.errors] or [()] * count
+    errors: list[tuple[float, ...]] = [ERRORS(error) for error in rolls.errors] or [()] * count
     rows = zip(rolls.motions, map(FORCES, rolls.rolled), errors, strict=True)
     columns = np.array([[*motion, *forces, *off] for motion, forces, off in rows]).T
     doubt = ""

@@ -1,5 +1,7 @@
 """What the equations of a steered car take for granted."""
 
+from functools import partial
+
 import numpy as np
 
 from models.core.assumptions import Assumption, Watched
@@ -100,13 +102,17 @@ def _travels(handling: Handling) -> list[Assumption]:
                 f"travel {spring.name}",
                 f"the spring {spring.name!r} moves within its travel",
                 remedy,
-                lambda run, column=column, name=spring.name: {name: run["positions"][:, column]},
+                partial(_coordinate, column, spring.name),
                 "m",
                 low,
                 high,
             )
         )
     return listed
+
+
+def _coordinate(column: int, name: str, run: Result) -> Watched:
+    return {name: run["positions"][:, column]}
 
 
 def _by_tyre(values: np.ndarray, handling: Handling) -> Watched:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from models.core.assumptions import judged
-from models.core.discretisation import Estimate, Series, by_steps, rescaled, size_of, stated, summed
+from models.core.discretisation import Estimate, Series, by_cells, by_steps, size_of, stated, summed
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
@@ -32,8 +32,8 @@ UNITS = {"speed": "m/s", "side speed": "m/s", "yaw rate": "rad/s", "load": "N", 
 """Channels whose error is told."""
 EVERY = 50
 """Rows from one to the next at which creep forces of several nets are compared."""
-CELL = "of the patch per cell (1 / tyres.cells)"
-"""What is told to use where the net errs most."""
+MOST_CELLS, CELLS = 200, "tyres.cells"
+"""Most cells per strip, and the key that they are set by."""
 MIDDLE = 0.4
 """Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
 STILL = 1e-6
@@ -131,10 +131,7 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:
-    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets.
-
-    What is told to use, steps or cells, is what the worst channel errs by.
-    """
+    """The result with the error of its motion and of its tyres' forces, by longer steps and by other nets."""
     again, fine = Again(run.data.attrs["engine"], drive, speed), principal(drive)
     still = {"N": STILL * max(drive.handling.held.tyres.values())}
     moving = {
@@ -143,13 +140,9 @@ def _with_error(run: Result, drive: Drive, speed: float) -> Result:
         if np.abs(values).max() > still.get(UNITS[name], STILL * speed)
     }
     by_step, how = by_steps(Series(fine.times, moving), again, ORDER, again.step)
-    by_cells = again.by_cells(list(moving))
-    both = {name: summed(by_step[name], by_cells[name]) for name in moving}
-    worst = max(both, key=lambda name: both[name].share, default="")
-    cells = bool(worst) and by_cells[worst].share > by_step[worst].share
-    steps = by_cells if cells else by_step
-    told = {name: replace(each, unit=UNITS[name], step=steps[name].step) for name, each in both.items()}
-    return stated(run, told, f"{how}, and other nets of the patch", CELL if cells else "s")
+    by_net = again.by_cells(list(moving))
+    told = {name: replace(summed(by_step[name], by_net[name]), unit=UNITS[name]) for name in moving}
+    return stated(run, told, f"{how}, and other nets of the patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +182,7 @@ class Again:
         return principal(read(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
-        """Errors of the net, by a run in the same steps with a third of its cells; ``step`` is 1 / cells.
+        """Errors of the net, by a run in the same steps with a third of its cells.
 
         A net's error does not fall evenly: how many times as large the difference of both runs is as the error, their
         creep forces at the same states tell, beside those of a net with twice as many cells.
@@ -206,7 +199,8 @@ class Again:
         for name in names:
             values = base.channels[name]
             gap = share * float(np.sqrt(np.mean((values - coarse.channels[name]) ** 2)))
-            told[name] = rescaled(Estimate(gap, "", 0.0, NET_ORDER, 1.0 / cells), size_of(values), 1.0 / cells)
+            net = by_cells(gap, size_of(values), UNITS[name], cells, NET_ORDER, MOST_CELLS)
+            told[name] = replace(net, of=CELLS)
         return told
 
     def _creep(self, cells: int) -> np.ndarray:

@@ -44,20 +44,16 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
 def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
     """Of linear springs, mounts and bars, whose travels (m, rad) are told by name."""
     kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
-    of = {kind: {each.name for each in vehicle.elements if each.unit == unit} for kind, unit, _, _ in kinds}
-    return [
-        Assumption(
-            f"{kind} between stops",
-            f"linear {kind} do not meet their stops",
-            remedy,
-            lambda run, kind=kind: {name: values for name, values in travel(run).items() if name in of[kind]},
-            unit,
-            -most,
-            most,
-        )
-        for kind, _, unit, most in kinds
-        if of[kind]
-    ]
+    listed = []
+    for kind, of, unit, most in kinds:
+        names = {each.name for each in vehicle.elements if each.unit == of}
+
+        def watched(run: Result, names: set[str] = names) -> Watched:
+            return {name: values for name, values in travel(run).items() if name in names}
+
+        says = f"linear {kind} do not meet their stops"
+        listed += [Assumption(f"{kind} between stops", says, remedy, watched, unit, -most, most)] if names else []
+    return listed
 
 
 def _on_tyres(vehicle: CutVehicle) -> list[Assumption]:
@@ -149,7 +145,7 @@ def _balanced(vehicle: CutVehicle) -> Assumption:
         "balance",
         "over the run the vertical forces carry the weight",
         "correct the loads of the vehicle file, or the columns of forces.file",
-        lambda run: {"all hubs": carried(sum(_at_hubs(run, vehicle, 2).values()), vehicle, run.times[-1])},
+        lambda run: {"all hubs": carried(sum(_at_hubs(run, vehicle, 2).values(), np.zeros(1)), vehicle, run.times[-1])},
         "of the weight",
         1.0 - BALANCE,
         1.0 + BALANCE,

@@ -122,10 +122,11 @@ def on_road(
 
     march : engine, step and duration (s).
     """
-    (engine, step, duration), tracks = march, [iso8608_road(road.iso8608, road.seed + i) for i in range(2)]
+    engine, step, duration = march
+    left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
     def drive(step: float, steps: int) -> Drive:
-        return replace(two_tracks(vehicle, *tracks, road.speed, step, steps), frame=frame)
+        return replace(two_tracks(vehicle, left, right, road.speed, step, steps), frame=frame)
 
     true = build(engine, vehicle, drive(step, round(duration / step)), step, duration).run()
     return true, errors_of_steps(engine, vehicle, true, drive)[0] if error else {}

@@ -1,58 +1,150 @@
-"""What the equations of the pitch-plane vehicle take for granted."""
+"""What the equations of the pitch-plane vehicle take for granted; an effect says in its own file what it adds."""
 
-import math
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
 
 from models.core.assumptions import Assumption, Watched
+from models.core.errors import InputError
 from models.core.result import Result
 from models.engines.assembly import Assembly
+from models.vehicles.pitch_plane import Parameters
 
-PRINCIPAL = ("z3", "pitch", "f1", "f2", "f3", "f4")
-"""Channels whose error is told."""
 SMALL = 0.3
 """rad: where sines are taken for angles, the pitch may be so large: 1.5 % of the sine."""
+STEEPEST = 0.5
+"""rad: no road is steeper, and the wheels, which only move vertically, are 12 % nearer to each other."""
 PUSHES = 1.0
 """N: a tyre that pulls by less is at its edge."""
+SIDEWALL = 0.12
+"""m: a tyre that is pressed further rests on its rim; a car's sidewall is 0.1 to 0.14 m high."""
+SEATED = 1e-3
+"""m: a spring that is longer than it is free by less is at its edge."""
+ARTIFICIAL = 0.15
+"""Rms of an artificial moment up to 15 Hz by that of I pitch'', and of the force by that of m3 z3'', from which on it
+takes part in the damage: the limit that models/drift/score.py judges stabilisers by."""
 
 
 def assumptions(assembly: Assembly) -> list[Assumption]:
     """What the equations of this scene take for granted."""
-    listed = []
-    if assembly.mode in ("free", "road") and not any(tyre.pushes_only for tyre in assembly.vehicle.tyres):
-        listed.append(
-            Assumption(
-                "tyres press",
-                "linear tyres stay on the road",
-                "name the effect lift_off, whose tyres only push",
-                _wheel_forces,
-                "N",
-                least=-PUSHES,
-            )
-        )
+    lifts = any(tyre.pushes_only for tyre in assembly.vehicle.tyres)
+    listed = _of_tyres(assembly, lifts) if assembly.mode in ("free", "road") else []
+    listed.append(_springs(assembly, lifts))
     if assembly.vehicle.geometry == "linear":
-        listed.append(
-            Assumption(
-                "small angles",
-                "the pitch is so small that its sine is itself",
-                'use vehicle.geometry = "exact"',
-                lambda run: {"chassis": run["pitch"]},
-                "rad",
-                -SMALL,
-                SMALL,
-            )
-        )
-    listed.append(
-        Assumption(
-            "upright",
-            "the chassis pitches by less than a right angle",
-            "stabilise the run, or end it before",
-            lambda run: {"chassis": run["pitch"]},
-            "rad",
-            -math.pi / 2,
-            math.pi / 2,
-        )
+        remedy = 'use vehicle.geometry = "exact"'
+        says = "the pitch is so small that its sine is itself"
+        listed.append(Assumption("small angles", says, remedy, _pitch, "rad", -SMALL, SMALL))
+    listed.append(upright(_remedy(assembly), _pitch))
+    if assembly.vehicle.pitch_springs or assembly.guided:
+        listed.append(_artificial(assembly))
+    return [*listed, *assembly.assumptions]
+
+
+def principal(assembly: Assembly) -> tuple[str, ...]:
+    """Channels whose error is told: neither prescribed motion nor prescribed forces have any."""
+    free = tuple(name for name, place in (("z3", 2), ("pitch", 3)) if place not in assembly.guided)
+    wheels = ("f1", "f2") if assembly.mode in ("free", "road") else ()
+    enforced = {"pitch": ("enforced_moment",), "heave-pitch": ("enforced_force", "enforced_moment")}
+    return (*free, *wheels, "f3", "f4", *enforced.get(assembly.mode, ()))
+
+
+def watching(**channels: str) -> partial[Watched]:
+    """What an assumption watches: channels of a run by the names of the parts that they are of."""
+    return partial(_channels, channels)
+
+
+def _channels(channels: dict[str, str], run: Result) -> Watched:
+    return {name.replace("_", " "): run[channel] for name, channel in channels.items()}
+
+
+_pitch = watching(chassis="pitch")
+
+
+def _of_tyres(assembly: Assembly, lifts: bool) -> list[Assumption]:
+    pressed = Assumption(
+        "tyres not flat",
+        "no tyre is pressed to its rim",
+        "use tyres that are stiffer (vehicle.override), or drive more slowly",
+        partial(_deflections, assembly.parameters),
+        "m",
+        most=SIDEWALL,
     )
-    return listed
+    if lifts:
+        return [pressed]
+    says, remedy = "linear tyres stay on the road", "name the effect lift_off, whose tyres only push"
+    forces = watching(front_wheel="f1", rear_wheel="f2")
+    return [Assumption("tyres press", says, remedy, forces, "N", least=-PUSHES), pressed]
 
 
-def _wheel_forces(run: Result) -> Watched:
-    return {"front wheel": run["f1"], "rear wheel": run["f2"]}
+def _deflections(p: Parameters, run: Result) -> Watched:
+    """Deflection (n,) in m of each tyre as its spring alone would have it under the wheel's force."""
+    return {"front tyre": run["f1"] / p.k1, "rear tyre": run["f2"] / p.k2}
+
+
+def _springs(assembly: Assembly, lifts: bool) -> Assumption:
+    """No vehicle's spring pulls; what its droop stop would do is not in the equations."""
+    remedy = "no effect adds a droop stop: start lower, or excite it less"
+    if assembly.mode not in ("free", "road"):
+        remedy = f"take wheel forces of tyres that only push (lift_off on a road); {remedy}"
+    elif not lifts:
+        remedy = f"name the effect lift_off, whose tyres do not pull the wheels down; else {remedy}"
+    return Assumption(
+        "springs compressed",
+        "no suspension droops beyond its spring's free length",
+        remedy,
+        partial(_compressions, assembly.parameters, assembly.vehicle.geometry == "exact"),
+        "m",
+        least=-SEATED,
+    )
+
+
+def _compressions(p: Parameters, exact: bool, run: Result) -> Watched:
+    """Compression (n,) in m of each suspension's spring."""
+    turned = np.sin(run["pitch"]) if exact else run["pitch"]
+    return {
+        "front suspension": run["z3"] - p.b * turned - run["z1"],
+        "rear suspension": run["z3"] + p.a * turned - run["z2"],
+    }
+
+
+def upright(remedy: str, pitch: Callable[[Result], Watched]) -> Assumption:
+    """The pitch is one of a vehicle on a road."""
+    says = "the chassis pitches less than any road does, as wheels only move vertically"
+    return Assumption("upright", says, remedy, pitch, "rad", -STEEPEST, STEEPEST)
+
+
+def _remedy(assembly: Assembly) -> str:
+    """What keeps the pitch small."""
+    if assembly.guided:
+        return "no effect lifts it: check the file of the prescribed pitch, and its unit"
+    if assembly.mode in ("free", "road"):
+        return "no effect lifts it: drive more slowly, or start nearer to level"
+    return "hold it by prescribed_pitch, kalman_filter or pitch_spring, or end the run before"
+
+
+def _artificial(assembly: Assembly) -> Assumption:
+    """What holds the pitch, or the heave, does little beside the vehicle's own forces."""
+    moved = "the measured motion, or the wheel forces, do not fit the vehicle: smooth it (bandwidth), correct its mass"
+    soft = "soften what holds the pitch, or name kalman_filter with a measured pitch in its place"
+    return Assumption(
+        "little artificial",
+        "what holds the chassis does little beside its own inertia",
+        moved if assembly.guided else soft,
+        partial(_shares, assembly.parameters, assembly.mode == "heave-pitch"),
+        "",
+        most=ARTIFICIAL,
+    )
+
+
+def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
+    """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
+    are too few or too far apart."""
+    from models.drift.score import own_figures
+
+    with suppress(InputError):
+        own = own_figures(run, p)
+        force = {"force": np.array([own.force_share_band])} if heave else {}
+        return {"moment": np.array([own.moment_share_band]), **force}
+    return {}

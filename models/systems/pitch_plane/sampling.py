@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import Assumption
 from models.core.errors import InputError
 from models.core.noise import normal
 from models.core.result import Result
 from models.core.steps import divides, fitting
 from models.core.time_series import write_time_series
 from models.engines.catalogue import CATALOGUE
+from models.systems.pitch_plane.assumptions import watching
 from models.systems.pitch_plane.scene import Scene
 
 SEED = Field(0, ge=0, lt=2**64, description="whole number that names the noise")
@@ -68,6 +70,12 @@ def noisy(p: Any, source: int, times: np.ndarray, values: np.ndarray, scene: Sce
     number = numbers(times, p.sampling_rate)
     noise = p.deviation * normal(p.seed, p.path, int(number[-1]) + 1, 1, source=source)[:, 0]
     return read(times, values, p.sampling_rate, scene, place) + noise[number]
+
+
+def within_range(effect: str, channels: Mapping[str, str], unit: str, limit: float) -> Assumption:
+    """That a sensor reads no more than it can; channels by the names of what reads them."""
+    says, remedy = f"{effect}: readings are within the sensor's range", f"take one of a larger effects.{effect}.range"
+    return Assumption(f"{effect} in range", says, remedy, watching(**channels), unit, -limit, limit)
 
 
 def write(result: Result, columns: Mapping[str, str], rate: float, path: Path) -> None:

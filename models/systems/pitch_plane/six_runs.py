@@ -46,9 +46,10 @@ def options_of(scene: Scene, engines: tuple[str, ...] = ()) -> Options:
     return options
 
 
-def followed(scene: Scene, folder: Path) -> tuple[Result, float, dict[str, Scene]]:
-    """The measurement, the noise's deviation (N), and by name the scenes of runs on the files that it leaves."""
-    options, measured = options_of(scene), measure(scene)
+def followed(scene: Scene, folder: Path, error: bool = False) -> tuple[Result, float, dict[str, Scene]]:
+    """The measurement, the noise's deviation (N), and by name the scenes of runs on the files that it leaves; whether
+    the measurement tells the error of its steps."""
+    options, measured = options_of(scene), measure(scene, error)
     deviation = options.noise_fraction * write_measurement(measured, folder, 1.0 / options.sampling_rate)
     vehicle, follow = scene.vehicle_parameters(), follower(scene, folder)
     paper = perturbed(vehicle)

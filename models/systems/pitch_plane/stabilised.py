@@ -119,7 +119,7 @@ def compare(
     The first engine runs all methods, the others, on the scene's own road, those that it accepts.
     """
     options, failed, rows = options_of(scene, engines), dict[str, str](), list[Row]()
-    benches = [Bench(on_road, road, options, folder) for road, on_road in roads(scene, options).items()]
+    benches = [Bench(on_road, road, options, folder, scene.error) for road, on_road in roads(scene, options).items()]
     for i, bench in enumerate(benches):
 
         def told(text: str, part: float, done: int = i) -> None:
@@ -133,13 +133,15 @@ class Bench:
     """One road: what was measured on it, and the perturbed model's runs on these files.
 
     Known before any run: ``trusted``, until when a free one can be trusted (s); ``holding``, which spring holds (N
-    m/rad).
+    m/rad); ``error``: whether the measurement tells the error of its steps, which all runs have in common; ``results``:
+    the measurement and all runs of methods, by name.
     """
 
-    def __init__(self, scene: Scene, road: str, options: Options, folder: Path) -> None:
+    def __init__(self, scene: Scene, road: str, options: Options, folder: Path, error: bool = False) -> None:
         self.road, self.options, self.folder = road, options, folder / road
         self.folder.mkdir()
-        self.truth, period = measure(scene), 1.0 / options.sampling_rate
+        self.truth, period = measure(scene, error), 1.0 / options.sampling_rate
+        self.results = {f"measurement ({road})": self.truth}
         self.deviation = options.noise_fraction * write_measurement(self.truth, self.folder, period)
         self._write_sensors(stride(scene, options.sampling_rate), period)
         self.override = perturbed(scene.vehicle_parameters(), options.factors)
@@ -213,6 +215,7 @@ class Bench:
             failed[f"{engine}, {self.road}, {name}"] = str(error)
             return []
         seconds = time.perf_counter() - start
+        self.results[f"{engine}: {name} ({self.road})"] = found
         return [{"engine": engine, "road": self.road, **self.row(name, effects, found), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:

@@ -8,10 +8,13 @@ their rate, nothing here can see.
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
 from models.core.signals import Sampled, Smooth
 from models.drift.growth import MEDIAN, growth_rate, growth_until, pitch_rate_of_forces, pitch_variance, rigid_pitch
 from models.engines.assembly import Assembly
@@ -25,6 +28,20 @@ ANGLE = 0.05
 """A pitch error (rad) from which on a run is not trusted: 0.05 rad turn 5 % of a vertical force into the x axis."""
 LEAST = 8
 """Samples that a quintic spline needs, with two to spare."""
+
+
+SMALL = 0.2
+"""rad: the laws are of small errors, and right to 5 % up to here (Monte Carlo)."""
+
+
+def small_errors(angle: float) -> Assumption:
+    """That the error up to which a run is trusted is one for which the laws hold."""
+    says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
+    return Assumption("small errors", says, remedy, partial(_allowed, angle), "rad", most=SMALL)
+
+
+def _allowed(angle: float, run: Result) -> Watched:
+    return {"allowed error": np.array([angle])}
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,9 @@ def perturbed(p: Parameters, factors: Mapping[str, float] = PAPER) -> dict[str, 
     return {name: getattr(p, name) * factor for name, factor in factors.items()}
 
 
-def measure(scene: Scene) -> Result:
-    """The run on the road, in the reference by Runge-Kutta steps."""
-    return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration))
+def measure(scene: Scene, error: bool = False) -> Result:
+    """The run on the road, in the reference by Runge-Kutta steps; ``error`` as in ``run``."""
+    return run(scene, "reference", Settings("RK4", scene.run.step, scene.run.duration), error=error)
 
 
 def check_road(scene: Scene, engines: tuple[str, ...], sampling_rate: float) -> None:

@@ -74,7 +74,7 @@ def with_error_of_sweep(
         known = np.isfinite(own[..., i]) & np.isfinite(again[..., i])
         size = _rms(own[..., i][known])
         if size > 0.0:
-            error = max(SAFETY * _rms((again - own)[..., i][known]), DIGIT / 4.0 * size)
+            error = max(SAFETY * _rms(again[..., i][known] - own[..., i][known]), DIGIT / 4.0 * size)
             told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return stated(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")
@@ -97,9 +97,7 @@ Alone = Callable[[int], np.ndarray]
 """Deviations (time, outputs) as if each speed had always been driven, by every so many of the speeds that are known."""
 
 
-def with_error_of_drive(
-    run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone
-) -> Result:
+def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
     """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
     fewer speeds between which the quasi-stationary ones are straight."""
     assert scene.drive is not None
@@ -193,9 +191,8 @@ def _of_gains(
 ) -> dict[str, Estimate]:
     """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
     beside = [(replaced[speed], each) for speed, each in copies.items()]
-    true, gains = (
-        np.array([pair[i].deviation if i else pair[0].covariance.deviation for pair in beside]) for i in (1, 0)
-    )
+    gains = np.array([each.covariance.deviation for each, _ in beside])
+    true = np.array([each.deviation for _, each in beside])
     scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])
     left = np.array([each.left_out for each, _ in beside])
     errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))

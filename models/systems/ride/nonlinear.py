@@ -4,7 +4,6 @@ Everything nonlinear is there, and gravity where the vehicle has it. Where tyres
 copies and the engines: what stands for the vehicle over speed keeps them on the road.
 """
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -197,6 +196,8 @@ def in_engine(
 
 ORDER, APART = 4, 16
 """Order of the classical Runge-Kutta method; steps from one row to the next by which errors are told."""
+REPEATED, LATEST = 0.9, 0.1
+"""Shares of a run that longer steps repeat, for rows are read beside, and before which the first row lies."""
 
 
 def _with_error_of_steps(
@@ -204,7 +205,8 @@ def _with_error_of_steps(
 ) -> Result:
     """The result with the errors of its outputs, by runs that read the same road at every second and fourth place."""
     names, units = [str(name) for name in run["output"]], run["unit"].tolist()
-    first, steps = APART * math.ceil(skipped / path.step / APART), len(table) // 2
+    steps = len(table) // 2
+    first = APART * int(min(skipped / path.step, LATEST * steps) / APART)
 
     def series(ride: Ride, begin: float) -> Series:
         known = ~np.isnan(ride.outputs).any(axis=0)
@@ -212,7 +214,7 @@ def _with_error_of_steps(
 
     def again(times: float, share: float) -> Series:
         longer, every = replace(path, half=times * path.half), max(1, round(APART / times) if times <= 2.0 else 8)
-        count = int(share * steps / times)
+        count = int(REPEATED * share * steps / times)
         read = table[:: round(times)] if times >= 1.0 else _halved(table)
         begin = first * path.step
         ride = driven(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)

@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
+from models.systems.ride.assumptions import assumptions
 from models.systems.ride.of_scene import excitation_of, half_track_of, placed_wheels, road_of, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import Wheel
@@ -50,7 +52,9 @@ def describe(scene: RideScene) -> str:
         ("outputs", ", ".join(output.name for output in vehicle.outputs)),
         ("weighting", ", ".join(f"{name} by {by}" for name, by in scene.weighting.items()) or "none"),
     ]
-    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene)])
+    replaced = any(spring.bent for spring in vehicle.springs) and not (vehicle.lifts or scene.vehicle.small_motion)
+    assumed = assumption_lines(assumptions(scene, vehicle, replaced=replaced))
+    return "\n".join([scene.title, *(f"  {head:<10} {text}" for head, text in lines), *effect_lines(scene), *assumed])
 
 
 LEFT_RIGHT = {

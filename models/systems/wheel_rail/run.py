@@ -85,12 +85,12 @@ def run(
         begun = time.process_time()
         try:
             contacts.placed.append(held.at(shift, yaw * shift))
-        except (InputError, RunFailed) as error:
-            deep = isinstance(error, InputError) and error.place in TOO_DEEP
+        except (InputError, RunFailed) as failure:
+            deep = isinstance(failure, InputError) and failure.place in TOO_DEEP
             contacts.failed[1e3 * shift] = (
                 f"a load of {held.load:g} N presses wheel and rail more than {1e3 * DEEP:g} mm into each other"
                 if deep
-                else str(error)
+                else str(failure)
             )
         contacts.seconds.append(time.process_time() - begun)
     labelled = judged(_labelled(scene, name, contacts), assumptions(scene, scene.cases[name].friction))

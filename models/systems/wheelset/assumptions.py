@@ -58,7 +58,7 @@ def of_branch(wheelset: Wheelset) -> list[Assumption]:
     return [] if wheelset.profiles else [_flange_way(wheelset, lambda run: {"cycle": run["amplitude"]})]
 
 
-def by_wheel(contacts: Array, values: Array) -> Watched:
+def by_wheel(contacts: Array, values: Array) -> dict[str, Array]:
     """Sums over the patches of each wheel of values (n, patches)."""
     each = contacts.shape[1] // 2
     return {"right wheel": values[:, :each].sum(axis=1), "left wheel": values[:, each:].sum(axis=1)}

@@ -21,7 +21,7 @@ from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
 from validation.price.problems import Curves, apart, curves, each, ms
-from validation.price.problems.road_excited import MUJOCO, SPEED, scene, setting, settings_of
+from validation.price.problems.road_excited import MUJOCO, SPEED, judge, scene, setting, settings_of
 
 DURATION, RATE = 2.0, 100.0
 """Length of the run (s); rate of the samples (Hz), whose period every fixed step divides."""
@@ -119,7 +119,8 @@ class ForceExcited:
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of each quantity at the samples, which every fixed step meets."""
+        """Largest error of each quantity at the samples, which every fixed step meets; the run is judged."""
+        judge(self.assembly, solution)
         return apart(self._sampled(solution), self._true)
 
 

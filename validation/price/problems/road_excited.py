@@ -5,6 +5,7 @@ largest error of any state, over every instant that an integrator returns. The r
 first 40 m, so the second half of the 2 s at 20 m/s runs on nearly full roughness.
 """
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -14,10 +15,14 @@ from scipy.integrate import OdeSolution, solve_ivp
 
 from models.advice.price.problem import Setting
 from models.advice.price.systems.pitch_plane import engine_settings
+from models.core.assumptions import judged
+from models.core.result import Channel, Result, result
 from models.engines.assembly import Assembly, Model, Settings, Trajectory
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
+from models.systems.pitch_plane.assumptions import assumptions
+from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.price.problems import Curves, curves, each, ms
@@ -90,6 +95,14 @@ def scene(duration: float = DURATION):
             "effects": {"road": {"source": "study", "speed": SPEED}},
         }
     )
+
+
+def judge(assembly: Assembly, run: Trajectory) -> Result:
+    """The run as a result that says which assumptions it breaks."""
+    channels = outputs(replace(assembly, sensors=()), run)
+    labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
+    times = {"time": Channel("time", run.times, "s")}
+    return judged(result(assembly.scene, labelled, times), assumptions(assembly))
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
@@ -170,7 +183,8 @@ class RoadExcited:
         return build(setting.engine, self.assembly, settings_of(setting))
 
     def errors(self, solution: Trajectory) -> dict[str, float]:
-        """Largest error of a wheel force (N) and of a state, at the integrator's own instants."""
+        """Largest error of a wheel force (N) and of a state, at the integrator's own instants; the run is judged."""
+        judge(self.assembly, solution)
         return self._largest(solution.states - self._at(solution.times))
 
     def _at(self, times: np.ndarray) -> np.ndarray:

@@ -16,13 +16,13 @@ from models.systems.braking.stop_report import Stop
 ENGINE, WINDOWED = "reference", False
 
 
-def answer(scene: BrakingScene, engine: str) -> Answer:
+def answer(scene: BrakingScene, engine: str, error: bool = False) -> Answer:
     """Drive every procedure; numbers that are not finite, as those of a run that does not stop, are left out."""
     numbers, steps, states, seconds = defaultdict[str, list[np.ndarray]](list), 0, 0, 0.0
     (engine,) = engines_of(scene, (engine,)) or (engine,)
     for name in scene.procedures:
         begun = time.process_time()
-        drive = run(scene, engine, procedure=name)
+        drive = run(scene, engine, procedure=name, error=error)
         seconds += time.process_time() - begun
         path, stop = drive.detail, Stop(drive.detail)
         if len(path.times) < 3:

@@ -11,11 +11,11 @@ ENGINE, WINDOWED = "reference", False
 QUANTITIES = ("fx", "fy", "mz", "dissipation")
 
 
-def answer(scene: ContactScene, engine: str) -> Answer:
+def answer(scene: ContactScene, engine: str, error: bool = False) -> Answer:
     """Press the bodies and roll them at every creepage."""
     if scene.cases is not None:
         raise InputError(scene.file, "cases", None, "is a table of contacts: give the price of one of them")
-    forces = run(scene, error=False)
+    forces = run(scene, error=error)
     quantities = {name: Quantity(forces.data[name].attrs["units"], (forces[name],)) for name in QUANTITIES}
     return Answer(quantities, forces.counts(), forces.seconds)
 

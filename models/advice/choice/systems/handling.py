@@ -14,9 +14,9 @@ TYRES = ("load", "fx", "fy", "mz")
 """Of every tyre, a case each."""
 
 
-def answer(scene: HandlingScene, engine: str) -> Answer:
+def answer(scene: HandlingScene, engine: str, error: bool = False) -> Answer:
     """Drive every manoeuvre."""
-    runs = [run(scene, engine, name) for name in scene.manoeuvres]
+    runs = [run(scene, engine, name, error) for name in scene.manoeuvres]
     drives = [each.detail for each in runs]
     speeds = [drive.velocity() for drive in drives]
     quantities = {name: Quantity(unit, tuple(speed[:, i] for speed in speeds)) for name, (i, unit) in MOTION.items()}

@@ -9,9 +9,9 @@ from models.systems.hub_forces.scene import HubScene
 ENGINE, WINDOWED = "mujoco", True
 
 
-def answer(scene: HubScene, engine: str) -> Answer:
+def answer(scene: HubScene, engine: str, error: bool = False) -> Answer:
     """Measure, and run as the scene holds roll and pitch."""
-    path = run(scene, engine)
+    path = run(scene, engine, error=error)
     quantities = {name: Quantity(unit, (path[name],)) for name, (_, unit) in MOTION.items()}
     names = path.data["element"].values
     quantities |= {str(name): Quantity("N", (path["section_force"][:, i],)) for i, name in enumerate(names)}

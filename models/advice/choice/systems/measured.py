@@ -16,12 +16,12 @@ FINE = 60
 """Steps of which whole numbers make up the shortest part, so that it can be taken in longer steps, too."""
 
 
-def answer(scene: MeasuredScene, engine: str) -> Answer:
+def answer(scene: MeasuredScene, engine: str, error: bool = False) -> Answer:
     """Record, and march; the seconds are those of the march."""
     if scene.vehicle.file is None:
         allowed = "a recording is priced and its effects chosen for a vehicle in space: name vehicle.file"
         raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
-    result = run(scene, engine)
+    result = run(scene, engine, error=error)
     exam: Examination = result.detail
     assert exam.outcome is not None
     forces = [each for each in exam.outcome.answers if each.quantity != "acceleration"]

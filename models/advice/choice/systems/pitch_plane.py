@@ -12,11 +12,11 @@ CALLS = {"RK4": 4, "RK44": 4, "Euler": 1}
 """Calls of a step of methods that do not count them."""
 
 
-def answer(scene: Scene, engine: str) -> Answer:
+def answer(scene: Scene, engine: str, error: bool = False) -> Answer:
     """Run the scene."""
     assembly = assemble(scene)
     begun = time.process_time()
-    found = run(scene, engine, assembly=assembly)
+    found = run(scene, engine, assembly=assembly, error=error)
     seconds = time.process_time() - begun
     told, states = found.counts(), found.detail.states
     counts = {"steps": told.get("steps", len(states) - 1), "states": states.shape[1]}

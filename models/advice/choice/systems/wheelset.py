@@ -13,9 +13,9 @@ from models.systems.wheelset.scene import WheelsetScene
 ENGINE, WINDOWED = "reference", True
 
 
-def answer(scene: WheelsetScene, engine: str) -> Answer:
+def answer(scene: WheelsetScene, engine: str, error: bool = False) -> Answer:
     """Run every path. Of quantities of patches a path begins with the first one, all its times one after the other."""
-    paths = [run(scene, engine, speed) for speed in path_speeds(scene)]
+    paths = [run(scene, engine, speed, error=error) for speed in path_speeds(scene)]
     quantities = {
         str(name): Quantity(
             channel.attrs["units"], tuple(case for path in paths for case in np.atleast_2d(path[str(name)].T))

@@ -14,13 +14,15 @@ from models.core.noise import ACCELEROMETERS, normal
 from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels, Model, Trajectory
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read, within_range
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "sensors": {"one": {"x": 1.0, "z": 0.2}}}
 COUNTS = {"all": {"channels": 3}}
 
 CHANNELS = ("ax1", "ay1", "az1 and so on, three per sensor")
+USUAL = 157.0
+"""m/s^2, 16 g: the largest range of most micromechanical accelerometers."""
 PLACE = "effects.accelerometers.sampling_rate"
 
 
@@ -46,6 +48,9 @@ class Parameters(Strict):
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     sensors: dict[str, Sensor] = Field(min_length=1, description="tables with x, y, z of each sensor, by its name")
     deviation: float = quantity("m/s^2", "standard deviation of each sample's white noise", default=0.0, zero=True)
+    range: float | None = quantity(
+        "m/s^2", "largest reading of each axis; 157, as of most, where none is given", default=None
+    )
     seed: int = SEED
     path: int = PATH
 
@@ -101,4 +106,10 @@ class Accelerometers:
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with accelerometers among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
-    return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)))
+    axes = {
+        f"{sensor}, {axis}": channel
+        for sensor, channels in zip(p.sensors, names(p), strict=True)
+        for axis, channel in zip("xyz", channels, strict=True)
+    }
+    kept = within_range("accelerometers", axes, "m/s^2", p.range or USUAL)
+    return replace(assembly, sensors=(*assembly.sensors, Accelerometers(p)), assumptions=(*assembly.assumptions, kept))

@@ -11,13 +11,15 @@ import numpy as np
 from models.core.noise import GYRO
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly, Channels
-from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy
+from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, noisy, within_range
 
 COST = "one reading after the run; no state in any engine"
 EXAMPLE = {"sampling_rate": 200.0, "deviation": 0.1}
 COUNTS = {"all": {"channels": 1}}
 
 CHANNELS = ("gyro",)
+USUAL = 35.0
+"""rad/s, 2000 deg/s: the largest range of most micromechanical gyros."""
 PLACE = "effects.gyro.sampling_rate"
 
 
@@ -26,6 +28,9 @@ class Parameters(Strict):
 
     sampling_rate: float = quantity("Hz", "samples per second; the run's steps must divide its period")
     deviation: float = quantity("rad/s", "standard deviation of each sample", zero=True)
+    range: float | None = quantity(
+        "rad/s", "largest rate that it reads; 35, as of most, where none is given", default=None
+    )
     seed: int = SEED
     path: int = PATH
 
@@ -45,4 +50,5 @@ class Gyro:
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with a gyro among its results."""
     check_rate(assembly.scene, PLACE, p.sampling_rate)
-    return replace(assembly, outputs=(*assembly.outputs, Gyro(p)))
+    kept = within_range("gyro", {"gyro": "gyro"}, "rad/s", p.range or USUAL)
+    return replace(assembly, outputs=(*assembly.outputs, Gyro(p)), assumptions=(*assembly.assumptions, kept))

@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
+from models.core.result import Result
 from models.core.signals import Sampled, Smooth
 from models.core.steps import divides
 from models.core.strict import Strict, quantity
@@ -102,6 +104,7 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
         guided,
         outputs=(*guided.outputs, partial(_channels, guide, stiffness, damping)),
         doubts=(*guided.doubts, *_doubts(p, guide)),
+        assumptions=(*guided.assumptions, _assumption(guide)),
     )
 
 
@@ -233,6 +236,24 @@ def _doubts(p: Parameters, guide: Guide) -> tuple[str, ...]:
         else f"check {p.file} for a bias, a delay and its unit, the inertia, and the stated deviations"
     )
     return (f"the filter contradicts {p.file}: {guide.consistency}; {known}; {remedy}",)
+
+
+def _assumption(guide: Guide) -> Assumption:
+    """That all figures of the innovations are as a right filter's."""
+    return Assumption(
+        "innovations",
+        "the filter's innovations are as its model and deviations make them",
+        "correct the measured pitch (bias, delay, unit) or the inertia, or state deviations that are true",
+        partial(_places, guide.consistency),
+        "half widths of a right filter's band",
+        -1.0,
+        1.0,
+    )
+
+
+def _places(known: Consistency, run: Result) -> Watched:
+    """Where each figure lies in its interval, from -1 to 1."""
+    return {f.name: np.array([(2.0 * f.value - f.low - f.high) / (f.high - f.low)]) for f in known.figures}
 
 
 def _check_bandwidth(assembly: Assembly, p: Parameters, guide: Guide) -> None:

@@ -1,12 +1,18 @@
 """A road under the wheels (eq. 38): from a formula, an ISO 8608 class, or a measured file."""
 
+from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
+from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.engines.assembly import Assembly
+from models.systems.pitch_plane.assumptions import STEEPEST
 
 EXCLUDES = ("wheel_forces", "prescribed_pitch", "contact_points")
 COST = "height and slope under each wheel, read from a table of half steps"
@@ -22,8 +28,6 @@ OWN = {
 }
 """Which keys belong to which source; a measured road has a grade of its own, which no key may change."""
 NEEDED = {"iso8608": ("road_class",), "opencrg": ("file", "beyond_end"), "csv": ("file", "beyond_end")}
-STEEPEST = 0.5
-"""Slope angles (rad) stay below this: beyond it the vehicle, whose wheels move vertically, is no model any more."""
 
 
 class Parameters(Strict):
@@ -57,7 +61,18 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     distance = p.speed * assembly.scene.run.duration
     profile, kinks = _profile(assembly.scene, p, distance)
     wheelbase = assembly.parameters.a + assembly.parameters.b
-    return assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
+    driven = assembly.with_input("road", RoadUnderWheels(profile, p.speed, wheelbase, kinks))
+    says = "the road is so even that a tyre touches it in one point below its wheel"
+    remedy = "smooth the road over what a tyre's patch feels, some 0.2 m, or take a gentler one"
+    slope = Assumption("even road", says, remedy, partial(_slopes, p.speed), "rad", -STEEPEST, STEEPEST)
+    return replace(driven, assumptions=(*driven.assumptions, slope))
+
+
+def _slopes(speed: float, run: Result) -> Watched:
+    """Slope angle (n,) in rad of the road under each wheel, positive uphill."""
+    metres = speed * run.times
+    slopes = {f"{axle} wheel": -np.gradient(run[f"zeta{i + 1}"], metres) for i, axle in enumerate(("front", "rear"))}
+    return {name: np.arctan(slope) for name, slope in slopes.items()}
 
 
 def _check_keys(file: str, p: Parameters) -> None:

@@ -1,12 +1,15 @@
 """Wheel forces prescribed from a file (eq. 37): the vehicle is cut off the road."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from models.core.assumptions import Assumption, Watched
 from models.core.errors import InputError
+from models.core.result import Result
 from models.core.signals import Interpolation, sampled
 from models.core.strict import Strict
 from models.core.tables import NEWTONS
@@ -15,6 +18,7 @@ from models.systems.pitch_plane.sampling import check_end
 
 if TYPE_CHECKING:
     from models.core.finding import Finding
+    from models.measured.axle_forces import AxleForces
     from models.measured.signal import Signal
 
 EXCLUDES = ("road",)
@@ -47,11 +51,15 @@ def extend(assembly: Assembly, p: Any) -> Assembly:
     check_end(scene, "effects.wheel_forces.file", p.file, signal.end)
     turns = p.frame == "body" and assembly.vehicle.geometry == "exact"
     driven = assembly.without_tyres().with_input("force-body" if turns else "force", signal)
-    return replace(driven, doubts=(*driven.doubts, *_judged(driven, p, values, period)))
+    doubts, assumed = _judged(driven, p, values, period)
+    return replace(driven, doubts=(*driven.doubts, *doubts), assumptions=(*driven.assumptions, *assumed))
 
 
-def _judged(assembly: Assembly, p: Parameters, values: np.ndarray, period: float) -> tuple[str, ...]:
-    """Doubts about forces (n, 2) in N that cannot be this vehicle's; InputError for what is beyond doubt."""
+def _judged(
+    assembly: Assembly, p: Parameters, values: np.ndarray, period: float
+) -> tuple[tuple[str, ...], tuple[Assumption, ...]]:
+    """Doubts about forces (n, 2) in N that cannot be this vehicle's, and that they balance its weight; InputError for
+    what is beyond doubt."""
     from models.measured.axle_forces import IN_FILE, AxleForces, check
     from models.measured.signal import Signal
 
@@ -80,7 +88,36 @@ def _judged(assembly: Assembly, p: Parameters, values: np.ndarray, period: float
             p.file,
             f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(each.text for each in findings)
+    return tuple(each.text for each in findings), _balance(own, p)
+
+
+def _balance(own: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
+    """That the means of the forces carry the weight, and that of each axle, as far as the record can tell."""
+    from models.measured.axle_balance import steady
+
+    means = steady(own)
+    each = (
+        ("weight", "the wheel forces carry the vehicle's weight on average", "m/s^2", "m1, m2, m3"),
+        ("balance", "front and rear wheel forces balance each other on average", "rad/s^2", "a, b"),
+    )
+    return tuple(
+        Assumption(
+            name,
+            says,
+            f"correct the forces' calibration or zero, or {symbols} of the vehicle; "
+            f'if it is meant so: effects.wheel_forces.accept = ["{name}"]',
+            partial(_steady, float(means.accelerations[i])),
+            unit,
+            -float(means.known[i]),
+            float(means.known[i]),
+        )
+        for i, (name, says, unit, symbols) in enumerate(each)
+        if name not in p.accept and own.parameters.g > 0
+    )
+
+
+def _steady(acceleration: float, run: Result) -> Watched:
+    return {"chassis": np.array([acceleration])}
 
 
 def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -> "list[Finding]":

@@ -1,0 +1,87 @@
+"""What the motion that is recovered from accelerometers takes for granted."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from models.core.assumptions import Assumption, Watched
+from models.core.result import Result
+from models.sensors.rigid_body_motion import LIMIT, NOISE_FACTOR, Motion, Quality
+
+UPRIGHT = 1.4
+"""rad (80 degrees): beyond this pitch roll and yaw are hardly told apart, and none of them at a right angle."""
+TURNED = 0.2
+"""rad per sample: cubics through four samples then err by some 1e-5 of a turn in each step."""
+LEVEL = 0.05
+"""rad: a start that is tilted by more turns 0.5 m/s^2 of gravity into a false motion."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Readings (n, sensors, 3) in m/s^2 every ``period`` (s), what was told of them, and whether the motion was taken
+    to begin at rest and level, with gravity in the readings."""
+
+    quality: Quality
+    readings: np.ndarray
+    period: float
+    from_rest: bool
+
+
+def assumptions(record: Record, recovered: Motion) -> list[Assumption]:
+    """What a motion (n samples) recovered from a record takes for granted."""
+    pitch, turned = cardan_pitch(recovered), np.linalg.norm(recovered.rates, axis=1) * record.period
+    listed = [
+        Assumption(
+            "away from gimbal lock",
+            "the pitch is so small that roll, pitch and yaw are told apart",
+            "no angles tell this attitude: read the orientation itself",
+            partial(_as_known, {"body": pitch}),
+            "rad",
+            -UPRIGHT,
+            UPRIGHT,
+        ),
+        Assumption(
+            "fine samples",
+            "the samples are fine enough for the turning",
+            "sample faster (sampling_rate)",
+            partial(_as_known, {"body": turned}),
+            "rad per sample",
+            most=TURNED,
+        ),
+    ]
+    if record.quality.rigid is not None and not record.quality.suspect:
+        listed.append(_rigid(record.quality))
+    if record.from_rest:
+        says, remedy = "the record begins at rest and level", "begin it where the body stands level"
+        tilt = _tilt(record.readings[0].mean(axis=0))
+        listed.append(Assumption("level start", says, remedy, partial(_as_known, {"body": tilt}), "rad", most=LEVEL))
+    return listed
+
+
+def cardan_pitch(recovered: Motion) -> np.ndarray:
+    """Pitch (n,) in rad, which is defined at every attitude."""
+    w, x, y, z = recovered.orientation.T
+    return np.arcsin(np.clip(2.0 * (w * y - x * z) / np.sum(recovered.orientation**2, axis=1), -1.0, 1.0))
+
+
+def _rigid(quality: Quality) -> Assumption:
+    """Sensors move with the body; one that alone does not is left out, and nothing is assumed of it."""
+    size = float(np.sqrt(np.mean(quality.misfit**2))) / quality.share if quality.share > 0.0 else 1.0
+    return Assumption(
+        "rigid body",
+        "the sensors stand still on a rigid body",
+        "mount them stiffer, leave out the one that gives way, or state their noise (deviation)",
+        partial(_as_known, {"misfit": np.array([quality.share])}),
+        "",
+        most=max(LIMIT, NOISE_FACTOR * quality.expected / size),
+    )
+
+
+def _tilt(first: np.ndarray) -> np.ndarray:
+    """Angle (1,) in rad between a specific force (3,) and straight up."""
+    return np.array([np.arctan2(np.hypot(first[0], first[1]), -first[2])])
+
+
+def _as_known(values: dict[str, np.ndarray], run: Result) -> Watched:
+    return values

@@ -1,0 +1,169 @@
+"""Figures of a sweep: every number that changes over the key, with marks where a result must be doubted."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.assumptions import broken_of
+from models.core.discretisation import WARNED, worst_of
+from models.core.told import Results
+from models.drawing.figures import COLOURS, LABELS, heading, plt, save
+
+ACROSS, DOWN, PAGES = 3, 4, 4
+"""Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
+DECADES = 30.0
+"""Ratio of the largest to the least value from which on an axis is logarithmic."""
+FAILED = {"marker": "x", "color": "#cc0000", "markersize": 8, "markeredgewidth": 2, "label": "failed"}
+BROKEN = {"marker": "o", "color": "#b00020", "markersize": 9, "markeredgewidth": 1.5, "label": "assumption broken"}
+WARNING = {
+    "marker": "^",
+    "color": "#e69f00",
+    "markersize": 8,
+    "markeredgewidth": 1.5,
+    "label": f"error above {100.0 * WARNED:g} %",
+}
+"""Marks of points, open but for the cross."""
+
+Columns = dict[str, list[Any]]
+"""Numbers of all points by their names, None where there is none."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What the points of a sweep of ``scene`` over ``key`` gave.
+
+    failures : what failed at each point, by engine; results : of each point, without channels, by their names.
+    """
+
+    scene: str
+    key: str
+    values: tuple[Any, ...]
+    columns: Columns
+    failures: list[dict[str, str]]
+    results: Sequence[Results]
+
+    def broken(self, engine: str) -> list[int]:
+        """Points at which a result of an engine, or any one for "", broke an assumption."""
+        return [i for i, own in enumerate(self.results) if any(map(broken_of, _of(own, engine).values()))]
+
+    def warned(self, engine: str) -> list[int]:
+        """Points at which a result of an engine, or any one for "", has an error that is a warning."""
+        shown = (map(worst_of, _of(own, engine).values()) for own in self.results)
+        return [i for i, worst in enumerate(shown) if any(one is not None and one.warned for one in worst)]
+
+
+def _of(results: Results, engine: str) -> Results:
+    """Results that an engine's curve rests on: its own, and those of none."""
+    others = set(LABELS) - {engine} if engine else set()
+    return {name: run for name, run in results.items() if run.data.attrs["engine"] not in others}
+
+
+def draw(swept: Swept, folder: Path) -> list[str]:
+    """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
+    panels = _panels(swept.columns)
+    size, names = ACROSS * DOWN, list[str]()
+    shown = list(panels.items())[: size * PAGES] or [("no number changes", {})]
+    for first in range(0, len(shown), size):
+        name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
+        _page(swept, shown[first : first + size], folder / name, f"the {len(panels)} quantities that change")
+        names.append(name)
+    return names
+
+
+def _panels(columns: Columns) -> dict[str, dict[str, list[Any]]]:
+    """Quantities that change -> curve of each implementation, "" where there is but one."""
+    panels: dict[str, dict[str, list[Any]]] = {}
+    for name, column in columns.items():
+        first, _, rest = name.partition(", ")
+        engine, what = (first, rest) if rest and first in LABELS else ("", name)
+        panels.setdefault(what, {})[engine] = column
+    return {what: own for what, own in panels.items() if any(moves(column) for column in own.values())}
+
+
+def there(column: list[Any]) -> list[Any]:
+    """Numbers of a column without those that are missing."""
+    return [value for value in column if value is not None]
+
+
+def moves(column: list[Any]) -> bool:
+    """Whether a column has more than one value."""
+    return len(set(there(column))) > 1
+
+
+def _page(swept: Swept, panels: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
+    down = -(-len(panels) // ACROSS)
+    figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
+    at, ticks = _places(swept.values)
+    for axis, (what, curves) in zip(axes.flat, panels, strict=False):
+        _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
+        if ticks:
+            axis.set_xticks(at, ticks)
+        elif _spread(at):
+            axis.set_xscale("log")
+        axis.set_xlabel(swept.key)
+    for axis in axes.flat[len(panels) :]:
+        axis.set_visible(False)
+    handles: dict[str, Any] = {}
+    for axis in axes.flat:
+        found, labels = axis.get_legend_handles_labels()
+        handles |= dict(zip(labels, found, strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
+    heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
+    save(figure, path)
+
+
+def _places(values: tuple[Any, ...]) -> tuple[np.ndarray, list[str]]:
+    """Places on the axis and, for values that are no numbers, what is written there."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array(values, float), []
+    return np.arange(float(len(values))), [str(value)[:18] for value in values]
+
+
+def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], swept: Swept, style: str) -> None:
+    order = np.argsort(at)
+    for i, (engine, column) in enumerate(curves.items()):
+        axis.plot(
+            at[order],
+            np.array(column, float)[order],
+            style,
+            color=COLOURS.get(engine, "#0072b2"),
+            markersize=3.5,
+            linewidth=2.2 - 0.6 * min(i, 2),
+            label=LABELS[engine] or None,
+        )
+        _marks(axis, at, np.array(column, float), swept, engine)
+    if all(_spread(np.array(there(column), float)) for column in curves.values()):
+        axis.set_yscale("log")
+    else:
+        axis.ticklabel_format(axis="y", useOffset=False)
+    lost = [i for i, failed in enumerate(swept.failures) if failed and any(col[i] is None for col in curves.values())]
+    if lost:
+        foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
+        axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED, **foot)
+    axis.set_title(_title(what), fontsize=9)
+
+
+def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:
+    """Open marks around points of a curve whose results broke an assumption, or have an error that is a warning."""
+    for points, look in ((swept.broken(engine), BROKEN), (swept.warned(engine), WARNING)):
+        shown = [i for i in points if np.isfinite(values[i])]
+        if shown:
+            axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
+
+
+def _title(what: str) -> str:
+    """The quantity on at most two lines, its unit last."""
+    text, unit = re.fullmatch(r"(.*?)( \[[^\[\]]*\])?", what, re.DOTALL).groups()  # type: ignore[union-attr]
+    if len(what) <= 46:
+        return what
+    cut = text.rfind(", ", 0, 46)
+    cut = cut + 1 if cut > 0 else 46
+    return f"{text[:cut]}\n{text[cut : cut + 46].strip()}{unit or ''}"
+
+
+def _spread(values: np.ndarray) -> bool:
+    return bool(len(values) and (values > 0).all() and values.max() > DECADES * values.min())

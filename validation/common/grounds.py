@@ -1,0 +1,118 @@
+"""What rows rest on: the assumptions that were broken by the runs which were made before them.
+
+While a case is measured, every result that is judged is noted. A row rests on the results that were judged between the
+rows before it and itself, and so do those that follow it until another result is judged, or until the part of the case
+ends that made both run and row. A row that rests on a broken assumption fails, unless the runs were made within
+``allowing``. Runs in other processes are not seen.
+"""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from models.core.assumptions import Broken, broken_of, watching
+from models.core.result import Result
+
+ANY = ""
+"""In place of a name: every assumption."""
+
+
+@dataclass(frozen=True)
+class Breach:
+    """An assumption that a run broke; ``why`` it may, "" where nobody allowed it."""
+
+    run: str
+    broken: Broken
+    why: str
+
+
+@dataclass
+class Grounds:
+    """Breaches since the last rows; whether rows rest on them already; the part of the case that has run and rows."""
+
+    breaches: list[Breach] = field(default_factory=list)
+    rested: bool = False
+    part: int = 0
+    closed: bool = False
+
+    def note(self, run: Result) -> None:
+        """Take in a result that was judged."""
+        if self.rested:
+            self.breaches, self.rested, self.closed = [], False, False
+        self.part = _part()
+        name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED.get()
+        for one in broken_of(run):
+            self.breaches.append(Breach(name, one, reasons.get(one.name) or reasons.get(ANY, "")))
+
+    def rest(self, allowed: bool) -> str:
+        """What the row that is made now rests on, with or without leave."""
+        own = self.part == _part()
+        self.rested, self.closed = True, self.closed or own
+        return "" if self.closed and not own else self.told(allowed)
+
+    def told(self, allowed: bool) -> str:
+        """Each assumption that was broken once, with or without leave: how often, the longest share, and why it may."""
+        found: dict[str, list[Breach]] = {}
+        for each in self.breaches:
+            if bool(each.why) == allowed:
+                found.setdefault(each.broken.name, []).append(each)
+        return "; ".join(_told(same) for same in found.values())
+
+
+def _told(same: list[Breach]) -> str:
+    worst = max(same, key=lambda each: each.broken.share)
+    runs = f"{len(same)} runs, the longest " if len(same) > 1 else ""
+    return f"{worst.broken.brief()} ({runs}{worst.run}){f': {worst.why}' if worst.why else ''}"
+
+
+_GROUNDS: ContextVar[Grounds | None] = ContextVar("grounds", default=None)
+_ALLOWED: ContextVar[dict[str, str]] = ContextVar("allowed", default={})  # noqa: B039  never changed in place
+
+
+Answer = TypeVar("Answer")
+
+
+def measured(measure: Callable[[], Answer]) -> tuple[Answer, str]:
+    """What a case answers, its rows resting on its runs; and what runs after its last row broke without leave."""
+    grounds = Grounds()
+    before = _GROUNDS.set(grounds)
+    try:
+        with watching(grounds.note):
+            answer = measure()
+    finally:
+        _GROUNDS.reset(before)
+    return answer, "" if grounds.rested else grounds.told(allowed=False)
+
+
+def _part() -> int:
+    """Which part of ``measure`` is at work, by its instruction; it may be decorated."""
+    frame, outer = sys._getframe(), sys._getframe()
+    while frame.f_back is not None and frame.f_code is not measured.__code__:
+        outer = outer if frame.f_globals["__name__"] == "contextlib" else frame
+        frame = frame.f_back
+    return outer.f_lasti
+
+
+@contextmanager
+def allowing(name: str, why: str) -> Iterator[None]:
+    """Runs that are made inside may break an assumption, or all of them (ANY), and why; decorates functions, too."""
+    before = _ALLOWED.set({**_ALLOWED.get(), name: why})
+    try:
+        yield
+    finally:
+        _ALLOWED.reset(before)
+
+
+def broken() -> str:
+    """What the row that is made now rests on and must not."""
+    grounds = _GROUNDS.get()
+    return "" if grounds is None else grounds.rest(allowed=False)
+
+
+def allowed() -> str:
+    """What the row that is made now rests on and may."""
+    grounds = _GROUNDS.get()
+    return "" if grounds is None else grounds.rest(allowed=True)

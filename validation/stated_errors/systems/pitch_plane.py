@@ -1,0 +1,201 @@
+"""Random runs of the pitch-plane vehicle: every integrator, roads, tyres that lift, wheel forces and what holds the
+pitch, in steps from far too fine to as long as is stable. The truth is the reference in Runge-Kutta steps a hundredth
+as long, which shares no integrator with the engines."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.core.result import Result
+from models.core.steps import divides
+from models.core.time_series import write_time_series
+from models.engines.assembly import Settings
+from models.engines.catalogue import CATALOGUE, MISSING
+from models.systems.pitch_plane import run as single
+from models.systems.pitch_plane.scene import Scene, build, parameter_set, settings_of
+from models.systems.pitch_plane.virtual_measurement import measure, write_measurement
+from validation.stated_errors.sample import Sample
+
+FINER, FINEST = 100, 2e-6
+"""Ratio of the run's step to the truth's, and the shortest step (s) of a truth, which that of adaptive methods has."""
+PERIODS = (1e-3, 2e-3, 5e-3)
+"""Sampling periods (s) of wheel forces and pitch."""
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """``count`` runs that were made; scenes that an engine refuses are drawn anew."""
+    drawn = np.random.default_rng([seed, 1])
+    with TemporaryDirectory() as folder:
+        while count:
+            sample = _sample(drawn, Path(folder))
+            if sample is not None:
+                count -= 1
+                yield sample
+
+
+def _sample(drawn: np.random.Generator, folder: Path) -> Sample | None:
+    engine = str(drawn.choice(["reference", "exudyn", "mujoco"]))
+    known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
+    integrator = str(drawn.choice(known))
+    try:
+        scene = _scene(drawn, folder, engine, integrator)
+        with _counted() as calls:
+            run = _run(scene, engine)
+        truth = _truth(scene, engine)
+    except (InputError, RunFailed):  # a step that is unstable, a rule between samples that the method cannot read
+        return None
+    told = errors_of(run)
+    true = {name: float(np.sqrt(np.mean((run[name] - _at(truth, name, run.times)) ** 2))) for name in told}
+    own = settings_of(scene, engine)
+    fine = f"tolerance {own.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{own.step:.3g} s"
+    what = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
+    return Sample(what, engine, told, true, calls[0], sum(calls[1:]))
+
+
+def _run(scene: Scene, engine: str) -> Result:
+    try:
+        return single.run(scene, engine, error=True)
+    except RunFailed as failure:
+        if failure.partial is None:
+            raise
+        return failure.partial
+
+
+def _truth(scene: Scene, engine: str) -> Result:
+    """The run in steps of a whole part of its own."""
+    own = settings_of(scene, engine)
+    step, adaptive = own.step, CATALOGUE[engine][own.integrator].adaptive
+    finer = max(1, round(step / FINEST if adaptive else min(FINER, step / FINEST)))
+    return single.run(scene, "reference", Settings("RK4", step / finer, scene.run.duration))
+
+
+def _at(truth: Result, name: str, times: np.ndarray) -> np.ndarray:
+    """A channel of the truth at times (n,), by a cubic through the four rows about each that is none of its own."""
+    rows = np.clip(np.searchsorted(truth.times, times - 1e-9), 0, len(truth.times) - 1)
+    if np.abs(truth.times[rows] - times).max() < 1e-9:
+        return truth[name][rows]
+    return CubicSpline(truth.times, truth[name])(times)
+
+
+@contextmanager
+def _counted() -> Iterator[list[float]]:
+    """Force calls of every run that is made within."""
+    calls: list[float] = []
+    build_model = single.build
+
+    def counting(*asked: Any) -> Any:
+        model = build_model(*asked)
+        march = model.run
+
+        def run() -> Any:
+            trajectory = march()
+            calls.append(float(trajectory.counts["force calls"]))
+            return trajectory
+
+        setattr(model, "run", run)  # noqa: B010
+        return model
+
+    with patch.object(single, "build", counting):
+        yield calls
+
+
+def _scene(drawn: np.random.Generator, folder: Path, engine: str, integrator: str) -> Scene:
+    table: dict[str, Any] = {
+        "title": "random",
+        "vehicle": {"geometry": str(drawn.choice(["exact", "exact", "linear"])), "override": _vehicle(drawn)},
+        "effects": {},
+        "run": {"duration": float(drawn.choice([1.0, 2.0, 3.0]))},
+    }
+    tolerance = {"tolerance": float(10.0 ** drawn.uniform(-11, -4))} if CATALOGUE[engine][integrator].adaptive else {}
+    table["engines"] = {engine: {"integrator": integrator, **tolerance}}
+    kind = str(drawn.choice(["free", "road", "road", "road", "forces", "forces"]))
+    if kind == "free":
+        table["start"] = {"pitch": float(drawn.uniform(-0.1, 0.1)), "z3": float(drawn.uniform(-0.1, 0.1))}
+        table["effects"] = _lift_off(drawn)
+    elif kind == "road":
+        table["effects"] = {"road": _road(drawn, folder), **_lift_off(drawn)}
+    else:
+        table["effects"] = _forces(drawn, folder, table)
+    period = table.pop("period", None)
+    table["run"]["step"] = _step(drawn, table["run"]["duration"], period)
+    return build(table, "random.toml", folder)
+
+
+def _vehicle(drawn: np.random.Generator) -> dict[str, float]:
+    """A published vehicle whose parameters are all half to twice its own, dampers down to a tenth."""
+    p = parameter_set(str(drawn.choice(["itwm_drift", "asymmetric_twin"])), "", Path())
+    softer = float(drawn.choice([1.0, 0.3, 0.1]))
+    return {
+        name: value * float(2.0 ** drawn.uniform(-0.7, 0.7)) * (softer if name in ("d3", "d4") else 1.0)
+        for name, value in p
+        if name != "g"
+    }
+
+
+def _lift_off(drawn: np.random.Generator) -> dict[str, Any]:
+    return {"lift_off": {}} if drawn.random() < 0.5 else {}
+
+
+def _road(drawn: np.random.Generator, folder: Path) -> dict[str, Any]:
+    speed = float(drawn.uniform(5.0, 35.0))
+    source = str(drawn.choice(["study", "hills", "iso8608", "csv"]))
+    own: dict[str, Any] = {}
+    if source == "iso8608":
+        own = {"road_class": str(drawn.choice(list("ABCDE"))), "seed": int(drawn.integers(1000))}
+    if source == "csv":
+        spacing = float(drawn.choice([0.01, 0.05, 0.2]))
+        stations = spacing * np.arange(round(20.0 / spacing) + 1)
+        heights = np.cumsum(drawn.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
+        lines = [f"{s:.3f}, {h:.6f}, {h:.6f}" for s, h in zip(stations, heights - heights[0], strict=True)]
+        (folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
+        own = {"file": "road.csv", "beyond_end": "mirrored"}
+    return {"source": source, "speed": speed, **own}
+
+
+def _forces(drawn: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:
+    """Wheel forces that a virtual measurement leaves, perhaps with noise, perhaps with the pitch held."""
+    period, duration = float(drawn.choice(PERIODS)), table["run"]["duration"]
+    road = {"source": "study", "speed": float(drawn.uniform(8.0, 25.0))}
+    on_road = build(
+        {
+            **{key: table[key] for key in ("title", "vehicle")},
+            "run": {"duration": duration, "step": 2e-4},
+            "effects": {"road": road, "lift_off": {}},
+        },
+        "measured.toml",
+    )
+    measured = measure(on_road)
+    write_measurement(measured, folder, period)
+    every = round(period / 2e-4)
+    both = {"z3": ("m", measured["z3"][::every]), "pitch": ("rad", measured["pitch"][::every])}
+    write_time_series(folder / "both.csv", both, period)
+    table["period"] = period
+    rule = str(drawn.choice(["held", "linear", "smooth"]))
+    forces = {"file": "wheel_forces.csv", "interpolation": rule, "frame": str(drawn.choice(["inertial", "body"]))}
+    noise = {"force_noise": {"deviation": 30.0, "seed": int(drawn.integers(1000))}} if drawn.random() < 0.5 else {}
+    holds: tuple[dict[str, Any], ...] = (
+        {},
+        {"pitch_spring": {"stiffness": 3e3, "damping": 1e3, "dead_band": float(drawn.choice([0.0, 0.01]))}},
+        {"high_pass": {"cut_off": 0.3}},
+        {"prescribed_pitch": {"file": "pitch.csv", "bandwidth": 10.0}},
+        {"prescribed_heave_and_pitch": {"file": "both.csv", "bandwidth": 10.0}},
+        {"kalman_filter": {"file": "pitch.csv", "force_deviation": 50.0, "pitch_deviation": 2e-3}},
+    )
+    return {"wheel_forces": forces, **noise, **holds[int(drawn.integers(len(holds)))]}
+
+
+def _step(drawn: np.random.Generator, duration: float, period: float | None) -> float:
+    """From 20 microseconds to 8 ms, a whole part of what it must divide."""
+    wanted = float(np.exp(drawn.uniform(np.log(2e-5), np.log(8e-3))))
+    whole = duration if period is None else period
+    step = whole / max(1, round(whole / wanted))
+    assert divides(step, duration)
+    return step

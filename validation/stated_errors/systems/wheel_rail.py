@@ -1,0 +1,62 @@
+"""Random held wheelsets whose stated error is held against four times the cells along each axis.
+
+A call is a cell of a patch. More cells than that are no better a truth: areas are counted in whole cells, and their
+error falls with the first power.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, RunFailed
+from models.systems.contact.stated_error import rms
+from models.systems.wheel_rail.run import EVERY, SUMS, run, sums
+from models.systems.wheel_rail.scene import WheelRailScene, build
+from validation.stated_errors.sample import Sample
+
+FINER, POSITIONS = 4.0, 4
+
+
+def samples(count: int, seed: int) -> Iterator[Sample]:
+    """So many random scenes; those that fail or are refused are drawn anew."""
+    rng, made = np.random.default_rng(seed), 0
+    while made < count:
+        try:
+            sample = _sample(_drawn(rng))
+        except (InputError, RunFailed):
+            continue
+        if sample is not None:
+            made += 1
+            yield sample
+
+
+def _drawn(rng: np.random.Generator) -> WheelRailScene:
+    start = float(rng.uniform(-0.004, 0.004))
+    rolls = rng.random() < 0.6
+    case = {"yaw": float(rng.uniform(0.0, 3.0)), "friction": float(rng.uniform(0.1, 0.5))} if rolls else {}
+    return build(
+        {
+            "title": "a random held wheelset",
+            "system": "wheel-rail",
+            "wheelset": {"load": float(10.0 ** rng.uniform(3.7, 5.0)), "radius": float(rng.uniform(0.35, 0.6))},
+            "profiles": {"inclination": float(rng.choice([0.025, 0.05]))},
+            "positions": {"start": start, "stop": start + 0.004, "count": POSITIONS},
+            "method": {"cells": int(rng.integers(10, 24))},
+            "cases": {"one": case},
+        }
+    )
+
+
+def _sample(scene: WheelRailScene) -> Sample | None:
+    made = run(scene, error=True)
+    told, case = errors_of(made), next(iter(scene.cases.values()))
+    held = scene.contact(case)
+    fine = replace(held, coarser=held.coarser / FINER)
+    placed = made.detail.placed
+    gaps = np.array([sums(one) - sums(fine.at(one.shift, one.yaw)) for one in placed])
+    true = {name: rms(gaps[:, :, k]) for k, name in enumerate(SUMS)}
+    calls, again = len(placed) * scene.method.cells**2, len(placed[::EVERY]) * (scene.method.cells / 2.0) ** 2
+    name = f"{scene.wheelset.load:.3g} N, {scene.method.cells} cells, {'rolling' if case.friction else 'pressed'}"
+    return Sample(name, "", told, {channel: true[channel] for channel in told}, calls, again) if told else None
