@@ -6,7 +6,7 @@ it, at its usual values. Runs take turns in a random order, and seconds are comp
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from models.advice.choice.answer import Answer, by_chance, less, relative, rounding
 from models.advice.choice.variants import Variants, system_of
+from models.core.assumptions import breaches
 from models.core.errors import InputError, RunFailed
 from models.machine.timing import describe, paired_ratio
 from models.systems.ride.of_scene import goes_in_time
@@ -43,7 +44,8 @@ class Price:
 
     counts : steps, calls, states without and with it; micros : CPU microseconds of a step that it adds, median and
     median absolute deviation of the turns; ratio : of seconds with it by those without, and its 95 % interval;
-    changes : of every quantity, the largest relative one first; gone : quantities that are there with it alone.
+    changes : of every quantity, the largest relative one first; gone : quantities that are there with it alone; keeps :
+    assumptions that are broken without it, and kept with it.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Price:
     ratio: tuple[float, float, float] = (np.nan, np.nan, np.nan)
     changes: tuple[Changed, ...] = ()
     gone: tuple[str, ...] = ()
+    keeps: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,18 +88,25 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     all_of_it = Variants(scene, engine)
     variants = all_of_it.window(STEPS)
     short, names = variants.scene, (*variants.effects, *variants.absent)
-    base: Answer = system.answer(short, engine)
+    with breaches() as own:
+        base: Answer = system.answer(short, engine)
     runs: dict[str, Callable[[], Answer]] = {"": partial(system.answer, short, engine)}
-    first, whys = {"": base}, dict[str, str]()
+    first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
     for name in names:
         try:
             other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
-            first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
+            with breaches() as others:
+                first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
+            without, beside = (others, own) if name in variants.effects else (own, others)
+            keeps[name] = tuple(one.says for key, one in without.items() if key not in beside)
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
     micros = _turns(runs)
     prices = [
-        _price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, ""))
+        replace(
+            _price(variants, name, base, first.get(name), micros.get(name), micros[""], whys.get(name, "")),
+            keeps=keeps.get(name, ()),
+        )
         for name in names
     ]
     return PriceList(

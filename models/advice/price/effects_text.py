@@ -60,7 +60,9 @@ def _price(one: Price, quantities: list[str]) -> list[str]:
     plus = "+" if one.micros[0] >= 0.0 else ""
     cost = f"{name}{plus}{_micros(one.micros)} a step, {ratio}{_counts(one)}"
     new = f"; there with it alone: {', '.join(one.gone[:SHOWN])}{', ...' if len(one.gone) > SHOWN else ''}"
-    return [cost, f"    {'':<{WIDTH}} {_changes(one, quantities)}{new if one.gone else ''}"]
+    rows = [f"{_changes(one, quantities)}{new if one.gone else ''}"]
+    rows += [f"keeps an assumption that is broken without it: {says}" for says in one.keeps]
+    return [cost, *(f"    {'':<{WIDTH}} {row}" for row in rows)]
 
 
 def _counts(one: Price) -> str:
