@@ -144,21 +144,19 @@ def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told
 
 
 def test_steps_that_the_road_is_too_fast_for_are_told():
-    """Steps of 5 ms at 120 m/s on class F see a wave of 0.35 m less than once: refused with the step to use, which is
-    taken; on class C at 20 m/s steps of 4 ms are told to be right."""
+    """Steps of 20 ms at 60 m/s pass three waves of the road: refused with the step to use, which is taken; at 20 m/s
+    steps of 2.5 ms are told to be right."""
 
-    def table(speed: float, road: str, step: float) -> dict:
-        of = {"speed": speed, "iso8608": road}
-        return {**ALL, "road": of, "run": {"duration": 1.0, "step": step}, "forces": {"sampling_rate": 200.0}}
+    def table(speed: float, step: float, rate: float) -> dict:
+        forces, run = {"sampling_rate": rate}, {"duration": 1.0, "step": step}
+        return {**ALL, "road": {"speed": speed}, "run": run, "forces": forces}
 
     with pytest.raises(RunFailed, match=r"this is no answer: .* use at most") as refusal:
-        run(scene_of(table(120.0, "F", 5e-3), "s.toml"), "mujoco", error=True)
+        run(scene_of(table(60.0, 0.02, 50.0), "s.toml"), "mujoco", error=True)
     advised = min(each.step for each in errors_of(refusal.value.partial).values())
-    step = 5e-3 / np.ceil(5e-3 / advised)
-    cured = run(scene_of(table(120.0, "F", step), "s.toml"), "mujoco", error=True)
-    assert max(each.share for each in errors_of(cured).values()) < WARNED
-    usual = run(scene_of(table(20.0, "C", 2.5e-3), "s.toml"), "mujoco", error=True)
-    assert max(each.share for each in errors_of(usual).values()) < WARNED
+    for own in (table(60.0, 0.02 / np.ceil(0.02 / advised), 50.0), table(20.0, 2.5e-3, 200.0)):
+        told = run(scene_of(own, "s.toml"), "mujoco", error=True)
+        assert max(each.share for each in errors_of(told).values()) < WARNED
 
 
 def test_a_file_of_ones_own(tmp_path, measured):

@@ -282,11 +282,11 @@ def test_engines_follow_springs_where_they_are_steep(monkeypatch):
     class Ridden(Exception):
         """Enough is known."""
 
-    def ridden(engine, vehicle, path, *rest, **more):
+    def driven(engine, vehicle, path, *rest, **more):
         steps.append(path.step)
         raise Ridden
 
-    monkeypatch.setattr(nonlinear, "ridden", ridden)
+    monkeypatch.setattr(nonlinear, "driven", driven)
     for vehicle in (own, steep):
         with pytest.raises(Ridden):
             nonlinear.in_engine(scene, "mujoco", vehicle, nonlinear.Sampling(speed=20.0))

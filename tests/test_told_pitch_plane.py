@@ -131,6 +131,7 @@ def test_a_stiff_spring_is_told_and_a_soft_one_is_not(files, engine):
     assert "kalman_filter" in held(1e5)["little artificial"].remedy and held(100.0) == {}
 
 
+@pytest.mark.full
 def test_a_filter_that_contradicts_its_sensor_is_told(files):
     folder = files(500.0, 500.0, pitch=0.0)
     truth = run(scene(folder, 2.0, effects=FORCES), "reference")["pitch"]

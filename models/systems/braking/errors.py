@@ -38,8 +38,9 @@ SMOOTH = ("none", "slip_pi")
 """Controllers that switch no valves to and fro."""
 ASKED_ONCE = "what stands behind the port answers one run alone"
 SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
-LONGER = "the controller switches at other samples in longer steps; the study braking_ensemble tells the scatter"
-SHORTER = "in shorter steps the controller may switch at other samples; the study braking_ensemble tells the scatter"
+REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
+LONGER = f"the controller switches at other samples in longer steps: {REMEDY}"
+SHORTER = f"the controller may switch at other samples in shorter steps: {REMEDY}"
 """Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
 distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 45 that did, 7 were near to
 switching otherwise; among them 5 of the 6 whose true pressures were others."""
@@ -142,8 +143,10 @@ def _by_fewer(path: Path, steps: int, others: list[Path], step: float) -> dict[s
         if len(others) > 1 and name != DISTANCE:
             gaps = [_rms(one[name] - two[name]) for one, two in itertools.pairwise(seen)]
             order = observed(gaps[0], gaps[1], counts)
+        least = 0.0
+        if name == DISTANCE:
+            order, least = told["x"].order, told["x"].error
         error = _rms(fine[name] - coarse[name]) / ((counts[0] / counts[1]) ** order - 1.0)
-        least = told["x"].error if name == DISTANCE else 0.0
         told[name] = _estimate(name, fine[name], max(error, least), order, step)
     return told
 
