@@ -22,6 +22,7 @@ from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.random_stops import random_stop
+from validation.common.grounds import allowing
 from validation.common.rows import Row, System, Table, at_most, behaves, within
 
 TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow ones, and what cannot be"
@@ -36,6 +37,7 @@ ROLLING = FivePhase(1, e1=21.21, e2=26.62, e3=20.73, e4=2.07, e5=50.4, falling=7
 """Phases that a fast first application leaves with a release that does not end by the wheel's acceleration."""
 
 
+@allowing("stops at the limits, and random ones: that they end, or say why not, is judged")
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: three of the stops, one speed of the slow ones."""
     ends = [finished(number) for number in range(STOPS[quick])]
