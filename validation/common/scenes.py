@@ -1,7 +1,7 @@
 """Scenes that the cases share, and the measured road where there is one."""
 
 import os
-from contextlib import AbstractContextManager
+from contextlib import ContextDecorator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ COURSE = "detrended_rms_course_2in.crg"
 """The 504 m measured course; it is not part of the repository."""
 
 
-def on_paper_road() -> AbstractContextManager[None]:
+def on_paper_road() -> ContextDecorator:
     """What runs of the paper's vehicle on its road may break, and those that its wheel forces drive."""
     why = "the paper's linear tyres pull on its road at times, on both sides of each comparison alike"
     return allowing(why, "tyres press", "springs compressed")
