@@ -8,6 +8,8 @@ A case module holds
     runs what it needs (a named small share of it where ``quick`` is true); ``data`` is saved as JSON
 ``tables(data) -> [Table]`` and ``draw(data) -> [(caption, Figure)]``, both optional
     what the report shows beside the rows, from the saved data alone: it never simulates
+
+A row that rests on a run which broke an assumption fails; ``validation.common.grounds.allowing`` says why a run may.
 """
 
 CASES = (

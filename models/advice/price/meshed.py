@@ -59,7 +59,7 @@ class Meshed(ABC):
 
     @abstractmethod
     def read(self, run: Any) -> tuple[np.ndarray, np.ndarray, int]:
-        """Times (n,) in s, values (n, k), how often contacts were asked for their forces."""
+        """Times (n,) in s, values (n, k), how often contacts were asked for their forces; the run is judged."""
 
     @abstractmethod
     def lines(self, setting: Setting) -> list[str]:

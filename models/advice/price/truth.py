@@ -78,8 +78,7 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    with breaches() as broken:
-        found, rung, change, seconds = _settled(scene, ladder, tolerance, duration, rung)
+    found, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung)
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
@@ -105,9 +104,9 @@ def _named(setting: Setting) -> str:
 
 def _settled(
     scene: OwnScene, ladder: Ladder, tolerance: float, duration: float, rung: int
-) -> tuple[Answer, int, float, float]:
+) -> tuple[Answer, int, float, float, dict[str, Broken]]:
     """The first answer that the finer rung changed by no more than a part of the tolerance; its rung; the change; the
-    seconds that it took."""
+    seconds that it took; what it broke."""
     before: Answer | None = None
     change, failure = float("inf"), ""
     for i in range(rung, len(ladder.values)):
@@ -115,14 +114,15 @@ def _settled(
             break
         begun = time.perf_counter()
         try:
-            now = scene.answer(scene.solve(ladder.setting(i), duration))
+            with breaches() as broken:
+                now = scene.answer(scene.solve(ladder.setting(i), duration))
         except (InputError, RunFailed) as error:
             before, failure = None, str(error)
             continue
         if before is not None:
             last, change = change, _change(scene, before, now)
             if change <= tolerance / ladder.sure:
-                return now, i, change, time.perf_counter() - begun
+                return now, i, change, time.perf_counter() - begun, broken
             if change > 0.7 * last and change < 1e-6 * float(np.abs(now.values).max()):
                 break  # rounding: finer steps no longer help
         before = now

@@ -110,8 +110,15 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
-    asked, handling = scene.manoeuvres[name], scene.handling(name)
-    drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
+    asked = scene.manoeuvres[name]
+    drive = driven(engine, scene.handling(name), asked.speed, asked.duration, scene.run.step)
+    labelled = judged_drive(scene, engine, name, drive)
+    return _with_error(labelled, drive, asked.speed) if error else labelled
+
+
+def judged_drive(scene: HandlingScene, engine: str, manoeuvre: str, drive: Drive) -> Result:
+    """A drive as the result of a scene's manoeuvre, which says what assumptions it breaks."""
+    vehicle = drive.handling.vehicle
     channels = {
         key: Channel(("time", "coordinate"), getattr(drive.run, key), "m, rad" + per)
         for key, per in (("positions", ""), ("rates", ", per s"))
@@ -119,15 +126,14 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     channels |= {key: Channel(("time", "tyre"), drive[key], *said) for key, (_, *said) in REPORTS.items()}
     axes = {
         "time": Channel("time", drive.run.times, "s"),
-        "coordinate": Channel("coordinate", [".".join(place) for place in handling.vehicle.coordinates()]),
-        "tyre": Channel("tyre", [tyre.name for tyre in handling.vehicle.tyres]),
+        "coordinate": Channel("coordinate", [".".join(place) for place in vehicle.coordinates()]),
+        "tyre": Channel("tyre", [tyre.name for tyre in vehicle.tyres]),
     }
     counts, seconds = drive.run.counts, drive.seconds
     labelled = result(
-        scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=name
+        scene, channels, axes, engine=engine, counts=counts, seconds=seconds, detail=drive, manoeuvre=manoeuvre
     )
-    judged(labelled, assumptions(handling))
-    return _with_error(labelled, drive, asked.speed) if error else labelled
+    return judged(labelled, assumptions(drive.handling))
 
 
 def _with_error(run: Result, drive: Drive, speed: float) -> Result:

@@ -55,12 +55,17 @@ def run(scene: WheelsetScene, engine: str, speed: float | None = None, *, error:
     Channels are states over time and forces of the contacts over time and patch. Raises InputError or RunFailed.
     """
     speed = path_speeds(scene)[0] if speed is None else speed
-    equations, _ = started(scene, engine, speed)
+    started(scene, engine, speed)  # kept: its seconds are none of the path
     begun = time.process_time()
     motion = path(scene, engine, speed)
-    seconds = time.process_time() - begun
-    labelled = judged(_labelled(scene, engine, motion, seconds=seconds), assumptions(equations))
+    labelled = judged_path(scene, engine, speed, motion, seconds=time.process_time() - begun)
     return with_error(labelled, scene, lambda other: path(other, engine, speed)) if error else labelled
+
+
+def judged_path(scene: WheelsetScene, engine: str, speed: float, motion: Path, **more: Any) -> Result:
+    """A motion as the result of a scene at a speed (m/s), which says what assumptions it breaks."""
+    equations, _ = started(scene, engine, speed)
+    return judged(_labelled(scene, engine, motion, **more), assumptions(equations))
 
 
 def path(scene: WheelsetScene, engine: str, speed: float) -> Path:

@@ -12,7 +12,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.engines.spatial_protocol import SpatialRun
 from models.multibody.numbers import Handling
-from models.systems.handling.run import Drive, build, driven, read
+from models.systems.handling.run import Drive, build, driven, judged_drive, read
 from models.systems.handling.scene import HandlingScene
 
 FIRST = 1.0
@@ -38,6 +38,7 @@ def _with_cells(handling: Handling, cells: int) -> Handling:
 class OwnHandling(Meshed):
     """A manoeuvre."""
 
+    scene: HandlingScene
     name: str
     speed: float
     handling: Handling
@@ -66,7 +67,8 @@ class OwnHandling(Meshed):
         return read(handling, SpatialRun(times, path, rates), self.own)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity over time."""
+        """The quantity over time; the drive is judged."""
+        judged_drive(self.scene, self.own, self.name, run)
         values, times = QUANTITIES[self.quantity][0](run), run.run.times
         return times, values.reshape(len(times), -1), 4 * (len(times) - 1) * run.tyres.shape[1]
 
@@ -103,6 +105,7 @@ def own(scene: HandlingScene, quantity: str | None, engines: tuple[str, ...]) ->
         step,
         2.0 * step,
         scene.tyres.cells,
+        scene,
         name,
         manoeuvre.speed,
         scene.handling(name),

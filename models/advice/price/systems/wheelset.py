@@ -10,7 +10,7 @@ from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
 from models.rail.equations import STIFF, Equations, Path
 from models.systems.wheelset.of_scene import path_speeds, started, wheelset_of
-from models.systems.wheelset.run import CONTACTS, STATES, path
+from models.systems.wheelset.run import CONTACTS, STATES, judged_path, path
 from models.systems.wheelset.scene import WheelsetScene
 
 FIRST = 0.25
@@ -43,7 +43,9 @@ class OwnWheelset(Meshed):
         return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
 
     def read(self, run: list[Path]) -> tuple[np.ndarray, np.ndarray, int]:
-        """The quantity of all paths side by side."""
+        """The quantity of all paths side by side; each is judged."""
+        for speed, one in zip(self.speeds, run, strict=True):
+            judged_path(self.scene, self.own, speed, one)
         place, times = QUANTITIES[self.quantity][0], run[0].times
         columns = [one.states[:, [place]] if self.quantity in STATES else one.contacts[:, :, place] for one in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
