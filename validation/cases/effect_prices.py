@@ -18,6 +18,7 @@ from validation.absence.hand_built_braking import ratio_of_stops
 from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
+from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Row, Saved, System, Table, aim, at_most
 
 TITLE = "What the machinery costs, and each effect"
@@ -42,6 +43,7 @@ SHORT = 500
 """Steps of the runs whose seconds tell what an effect adds."""
 
 
+@allowing("what is computed is what is counted, whatever the vehicle does meanwhile")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """The ratio to hand-built models and the price list; a quick run has runs of 2 s instead of 4 s, a tenth of
     the rounds, and each effect in one of the three engines, in turn.

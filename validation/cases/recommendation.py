@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
+from validation.common.grounds import allowing
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, finding, within
 from validation.price import unseen_systems
 from validation.price.unseen import ENGINES, Verdict, drawn, judge
@@ -31,6 +32,7 @@ MET, FACTOR = 0.95, 3.0
 """Least share of scenes whose every recommended setting holds its tolerance; bound of predicted by true error."""
 
 
+@allowing("random scenes: whether settings hold their tolerance is judged, beside a truth that breaks the same")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
     both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
