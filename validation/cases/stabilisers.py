@@ -41,7 +41,7 @@ EXPLICIT = {"exudyn": "RK44", "mujoco": "RK4"}
 BAND = {"pitch_spring": {"stiffness": 3e3, "damping": 200.0, "dead_band": 0.01}}
 
 
-@allowing("masses are wrong on purpose: what they leave to be held is what is measured", "little artificial")
+@allowing("masses are wrong on purpose: what they leave to be held is what is measured")
 @on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Missing mass and misplaced centre on both vehicles; the rest on the asymmetric one; quick: half a second."""

@@ -21,8 +21,8 @@ COURSE = "detrended_rms_course_2in.crg"
 
 def on_paper_road() -> ContextDecorator:
     """What runs of the paper's vehicle on its road may break, and those that its wheel forces drive."""
-    why = "the paper's linear tyres pull on its road at times, on both sides of each comparison alike"
-    return allowing(why, "tyres press", "springs compressed")
+    why = "the paper's linear tyres pull or lie on their rims at times on its road, on both sides of a comparison alike"
+    return allowing(why, "tyres press", "springs compressed", "tyres not flat")
 
 
 def road_scene(
