@@ -127,10 +127,10 @@ def test_a_study_as_a_script_gives_the_same_as_the_command(twinrig):
 
 
 def _failing(engine, error):
-    def simulate(scene, name, *rest):
+    def simulate(scene, name, **how):
         if name == engine:
             raise error
-        return real(scene, name, *rest)
+        return real(scene, name, **how)
 
     real = single_run.simulate
     return simulate

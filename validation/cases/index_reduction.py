@@ -16,7 +16,7 @@ from models.systems.pitch_plane.scene import Scene, assemble
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, at_most, behaves, finding, not_run
-from validation.common.scenes import drive, force_scene
+from validation.common.scenes import drive, force_scene, on_paper_road
 from validation.hard_cases.prescribed_pitch import AsItComes
 
 TITLE = "Drift by index reduction, and drift by noise"
@@ -72,6 +72,7 @@ class Files:
         return assemble(self.scene(prescribed_pitch={"file": file, **values}))
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Gaps from a start off the constraint by formulation, then both drifts by noise; quick: over short runs."""
     with TemporaryDirectory() as name:

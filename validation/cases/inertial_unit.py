@@ -30,7 +30,7 @@ from models.systems.pitch_plane.virtual_measurement import follower, write_measu
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, not_run, within
-from validation.common.scenes import road_scene
+from validation.common.scenes import on_paper_road, road_scene
 from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
 from validation.measured import recording
 
@@ -47,6 +47,7 @@ TEN_MINUTES, RATE, DEVIATION = 600.0, 1000.0, 0.1
 """s, Hz, rad/s per sample: the paper's own example."""
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for clean data, the laws, the ten minutes, the bias, the recording; in full the section forces, too."""
     paths = 200 if quick else 4000

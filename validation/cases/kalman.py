@@ -45,6 +45,7 @@ SENSORS = {"angle": (PITCH,), "rate": (RATE,), "angle and rate": (PITCH, RATE)}
 
 @on_paper_road()
 @allowing("models and deviations are wrong on purpose: the filter is to hold the run all the same", "innovations")
+@allowing("without a measured pitch a run is lost, which is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Consistency, gaps and a short stabilised run; in full also covariances, damage and a gyro alone."""
     place = folder / "kalman"

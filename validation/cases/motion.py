@@ -26,6 +26,7 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.bands import mean_square
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, within
+from validation.common.scenes import on_paper_road
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.spatial.spatial_motion import ARRAYS, PATH, tilted
 from validation.spatial.spatial_motion import readings as readings_on_path
@@ -49,6 +50,7 @@ RIGID = {
 BRACKET = {"x": 0.6, "y": 0.3, "z": 0.0, "bracket": {"frequency": 30.0, "damping": 0.05}}
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
