@@ -6,6 +6,7 @@
 import inspect
 import json
 import pkgutil
+import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from importlib import import_module
@@ -99,13 +100,17 @@ def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
 
 
+NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
+"""What differs between the allowed breaches of alike runs of a case."""
+
+
 def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
-    """Assumptions that runs broke with leave, and the rows that rest on these runs."""
-    found: dict[str, list[Saved]] = {}
+    """Assumptions that runs broke with leave, those of alike runs once, and the rows that rest on these runs."""
+    found: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
         if row["allowed"]:
-            found.setdefault(row["allowed"], []).append(row)
-    return list(found.items())
+            found.setdefault((case_of(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
+    return [(alike[0]["allowed"], alike) for alike in found.values()]
 
 
 def conventions() -> list[tuple[str, str]]:
