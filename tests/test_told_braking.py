@@ -108,7 +108,7 @@ def test_the_error_is_that_against_a_hundred_times_finer_steps(name):
 
 def test_a_stop_on_ice_with_an_anti_lock_system_says_that_it_does_not_repeat():
     told = run(scene({"controller": {"kind": "slip_bang_bang"}, "brakes": {"supply": 6.0}}), error=True)
-    assert errors_of(told) == {} and "other samples" in json.loads(told.data.attrs["error"])["why"]
+    assert errors_of(told) == {} and "otherwise" in json.loads(told.data.attrs["error"])["why"]
 
 
 def test_who_does_not_look_whether_it_repeats_would_be_caught(monkeypatch):
@@ -136,7 +136,7 @@ def test_no_error_is_asked_for_by_itself():
 
 
 def test_orders_are_observed_of_any_numbers_of_steps():
-    for order in (1.0, 2.0):
+    for order in (0.8, 1.4):
         errs = [count**-order for count in (6, 3, 1)]
         assert observed(errs[1] - errs[0], errs[2] - errs[1], [6, 3, 1]) == pytest.approx(order, abs=0.03)
 

@@ -14,12 +14,13 @@ import numpy as np
 from models.brake.plane_vehicle import GRAVITY, Truck
 from models.core.assumptions import Assumption, Watched
 from models.core.result import Result
-from models.systems.braking.errors import SMOOTH
 from models.systems.braking.march import Braked
 from models.systems.braking.of_scene import measured_of, tables_of, vehicle_of
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
 
+WITHOUT_VALVES = ("none", "slip_pi")
+"""Controllers that never switch valves to and fro."""
 PRESSES = 1.0
 """N: a wheel that bears less has left the road."""
 MOVED = 0.3
@@ -206,7 +207,7 @@ def _regular(vehicle: Braked, run: Result) -> Watched:
 
 def _of_brakes(scene: BrakingScene, procedure: str) -> Iterator[Assumption]:
     """Of pressures, torques and what brings them about."""
-    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in SMOOTH
+    port, sets_valves = scene.port, scene.measured is None and scene.controller.kind not in WITHOUT_VALVES
     if sets_valves and scene.pressure is None:
         yield Assumption(
             "chambers",

@@ -21,26 +21,25 @@ from models.systems.braking.march import Path
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import Stop
 
-ORDER, CAREFUL = 2.0, 1.0
-"""Of the steps, and what is taken for it where two runs cannot tell."""
+ORDER, CAREFUL = 1.5, 1.0
+"""Largest that is taken for the order of the steps, two between the kinks of brakes and tables of friction, and what is
+taken where two runs cannot tell."""
 WINDOW, FINE_WINDOW = 0.4, 0.3
 """Shares of a stop that are run again with a quarter of the steps, and with twice as many where there is but one."""
 LATER = 1.1
 """Times of the stop, until which another run may take to stand."""
 ALIKE = 0.01
-"""Rms of the difference of the pressures by their deviation, up to which two runs have switched alike."""
+"""Rms of the difference of the pressures by their deviation, up to which a controller has acted alike in two runs."""
 DISTANCE = "stopping distance"
 UNITS = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", DISTANCE: "m"}
 """Of what is told."""
 LEAST = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
 """m, rad: errors of a course that moves by less are shares of this."""
-SMOOTH = ("none", "slip_pi")
-"""Controllers that switch no valves to and fro."""
 ASKED_ONCE = "what stands behind the port answers one run alone"
-SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
+SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may act otherwise"
 REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
-LONGER = f"the controller switches at other samples in longer steps: {REMEDY}"
-SHORTER = f"the controller may switch at other samples in shorter steps: {REMEDY}"
+LONGER = f"the controller acts otherwise in longer steps: {REMEDY}"
+SHORTER = f"the controller may act otherwise in shorter steps: {REMEDY}"
 """Measured: of 40 random stops that did not repeat in longer steps, the difference missed the error of the stopping
 distance by more than a factor of 3 in 8, and was more than 10 times as large in 13. Of 45 that did, 7 were near to
 switching otherwise; among them 5 of the 6 whose true pressures were others."""
@@ -64,8 +63,8 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     path, steps = run.detail, scene.run.substeps
-    valves = switched(scene, path)
-    if not repeatable(scene) or (valves and steps == 1):
+    loop = controlled(scene, path)
+    if not repeatable(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
     try:
         paths = _others(path, steps, other.again)
@@ -74,9 +73,9 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     step = scene.run.sample / steps
     if steps == 1:
         return stated(run, _by_twice(path, paths[0], step), "a part in half the step")
-    if valves and not alike(path, paths[0]):
+    if loop and not alike(path, paths[0]):
         return not_estimated(run, LONGER)
-    if valves and near(path, paths[0], other):
+    if loop and near(path, paths[0], other):
         return not_estimated(run, SHORTER)
     return stated(run, _by_fewer(path, steps, paths, step), "runs in longer steps")
 
@@ -87,26 +86,29 @@ def repeatable(scene: BrakingScene) -> bool:
     return port is None or (not (port.command or port.port or port.replay) and port.pace == "simulated")
 
 
-def switched(scene: BrakingScene, path: Path) -> bool:
-    """Whether pressures have fallen that a controller sets by valves, or that something unknown sets."""
-    known = scene.measured is not None or (scene.port is None and scene.controller.kind in SMOOTH)
-    return not known and bool((np.diff(path.pressures, axis=0) < 0.0).any())
+def controlled(scene: BrakingScene, path: Path) -> bool:
+    """Whether a controller in the loop, or something unknown behind the port, has let pressures fall."""
+    none = scene.measured is not None or (scene.port is None and scene.controller.kind == "none")
+    return not none and bool((np.diff(path.pressures, axis=0) < 0.0).any())
 
 
 def alike(path: Path, other: Path) -> bool:
-    """Whether two runs have switched alike."""
+    """Whether the controller has acted alike in two runs."""
     pressures = _at(path.times, other, other.pressures)
     return _rms(pressures - path.pressures) <= ALIKE * size_of(path.pressures)
 
 
 def near(path: Path, longer: Path, other: OtherRuns) -> bool:
-    """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps."""
+    """Whether the controller says otherwise to signals that are as far to the other side as those in longer steps:
+    of valves another state of any, of pressures what is not alike."""
     times, speeds = path.times[:-1], [np.hypot(run.states[:, 1, 0], run.states[:, 1, 1]) for run in (path, longer)]
     turning, speed = path.turning[:-1], speeds[0][:-1]
     shifted = 2.0 * turning - _at(times, longer, longer.turning)
     faster = np.maximum(2.0 * speed - np.interp(times, longer.times, speeds[1]), 0.0)
     said, beside = (other.answered(path, *signals) for signals in ((turning, speed), (shifted, faster)))
-    return not np.array_equal(said, beside)
+    if said.dtype.kind == "i":
+        return not np.array_equal(said, beside)
+    return _rms(said - beside) > ALIKE * size_of(said)
 
 
 def channels(path: Path, times: np.ndarray) -> Channels:
