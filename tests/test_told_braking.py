@@ -131,6 +131,11 @@ def test_a_stop_on_ice_that_does_repeat_has_a_number():
     assert 0.0 < told["stopping distance"].error < 0.01 and not told["x"].warned
 
 
+def test_a_vehicle_that_rocks_as_it_comes_to_rest_has_no_error_of_its_distance():
+    told = errors_of(run(scene({"relaxation": {"front": 0.3, "rear": 0.3}}), error=True))
+    assert "x" in told and "stopping distance" not in told
+
+
 def test_no_error_is_asked_for_by_itself():
     assert json.loads(run(scene()).data.attrs["error"]) == {}
 

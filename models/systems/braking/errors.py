@@ -77,7 +77,16 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
         return not_estimated(run, LONGER)
     if loop and near(path, paths[0], other):
         return not_estimated(run, SHORTER)
-    return stated(run, _by_fewer(path, steps, paths, step), "runs in longer steps")
+    told = _by_fewer(path, steps, paths, step)
+    if rocks(scene):
+        told.pop(DISTANCE, None)
+    return stated(run, told, "runs in longer steps")
+
+
+def rocks(scene: BrakingScene) -> bool:
+    """Whether the vehicle comes to rest on springs of its tyres or axles: whether a step finds it there, or it rocks on
+    for a second, does not converge, and some centimetres of the stopping distance with it."""
+    return scene.relaxation is not None or scene.vehicle.file is not None
 
 
 def repeatable(scene: BrakingScene) -> bool:
