@@ -36,6 +36,7 @@ LEAST = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
 """m, rad: errors of a course that moves by less are shares of this."""
 SMOOTH = ("none", "slip_pi")
 """Controllers that switch no valves to and fro."""
+AT_ONCE = "the vehicle stands at once"
 ASKED_ONCE = "what stands behind the port answers one run alone"
 SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may switch at other samples"
 REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
@@ -64,6 +65,8 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     path, steps = run.detail, scene.run.substeps
+    if len(path.times) <= 2:
+        return not_estimated(run, AT_ONCE)
     valves = switched(scene, path)
     if not repeatable(scene) or (valves and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)
