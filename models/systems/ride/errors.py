@@ -7,6 +7,7 @@ Shares are of an output's standard deviation.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,17 +16,19 @@ from models.core.errors import InputError
 from models.core.result import Result
 from models.ride.covariance import stationary
 from models.ride.excited import excited
-from models.ride.nonlinear_copies import Copies, coarser_variances
 from models.ride.speed_profile import SpeedProfile
-from models.ride.statistical_linearisation import StatisticallyLinear
 from models.ride.sweep import Sweep
-from models.ride.varying_speed import REACH, VaryingSpeed, varying_speed
 from models.ride.weighting import weighted
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import Linear
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
+
+if TYPE_CHECKING:  # a ride that none of these serves does not load them
+    from models.ride.nonlinear_copies import Copies
+    from models.ride.statistical_linearisation import StatisticallyLinear
+    from models.ride.varying_speed import VaryingSpeed
 
 CHECKED = 3
 """Speeds of a sweep that are solved again."""
@@ -100,6 +103,8 @@ Alone = Callable[[int], np.ndarray]
 def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
     """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
     fewer speeds between which the quasi-stationary ones are straight."""
+    from models.ride.varying_speed import REACH, varying_speed
+
     assert scene.drive is not None
     drive: VaryingSpeed = run.detail
     profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
@@ -138,8 +143,8 @@ def with_error_of_copies(
     run: Result,
     vehicle: SpatialVehicle,
     road: Excitation,
-    replaced: Mapping[float, StatisticallyLinear],
-    copies: Mapping[float, Copies],
+    replaced: "Mapping[float, StatisticallyLinear]",
+    copies: "Mapping[float, Copies]",
     seed: int,
 ) -> Result:
     """The result with the errors of its deviations, by output.
@@ -174,9 +179,11 @@ def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _of_steps(
-    vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
+    vehicle: SpatialVehicle, road: Excitation, speed: float, fine: "Copies", seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Errors and orders (p,) of the copies' deviations at a speed."""
+    from models.ride.nonlinear_copies import coarser_variances
+
     twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
     count = len(twice)
     own = np.sqrt(fine.about_mean()[:count].mean(axis=0))
@@ -187,7 +194,7 @@ def _of_steps(
 
 
 def _of_gains(
-    replaced: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
+    replaced: "Mapping[float, StatisticallyLinear]", copies: "Mapping[float, Copies]", units: Mapping[str, str]
 ) -> dict[str, Estimate]:
     """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
     beside = [(replaced[speed], each) for speed, each in copies.items()]
