@@ -7,7 +7,7 @@ import numpy as np
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import CaseAnswer, Saved, System, Table, within
-from validation.common.scenes import road_scene
+from validation.common.scenes import on_paper_road, road_scene
 
 TITLE = "Observed order of the largest state error on the study road"
 SYSTEM: System = "pitch-plane"
@@ -60,6 +60,7 @@ def fitted(steps: tuple[float, ...], found: list[float]) -> float:
     return float(np.polyfit(np.log(steps), np.log(found), 1)[0])
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per family; the truth is DOP853 at a tolerance of 1e-13; quick: one halving over half a second."""
     steps, duration = (QUICK_STEPS, QUICK_DURATION) if quick else (STEPS, DURATION)

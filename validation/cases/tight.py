@@ -5,7 +5,7 @@ from pathlib import Path
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
 from validation.common.rows import CaseAnswer, Independence, System, at_most
-from validation.common.scenes import gap, road_scene
+from validation.common.scenes import gap, on_paper_road, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
 SYSTEM: System = "pitch-plane"
@@ -16,6 +16,7 @@ TOLERANCE = 1e-9
 """Of the solution that judges: the two families then differ by 5e-9, a twentieth of what they may; the row says so."""
 
 
+@on_paper_road()
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row for the reference's own uncertainty and one per implementation; quick: half a second."""
     duration = QUICK_DURATION if quick else DURATION

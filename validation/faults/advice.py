@@ -204,7 +204,7 @@ def _numbers_alone(self: Truth, other: Answer) -> float:
 
 
 def _first_rung(scene: Any, ladder: Ladder, tolerance: float, duration: float, rung: int) -> Any:
-    return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0
+    return scene.answer(scene.solve(ladder.setting(0), duration)), 0, 0.0, 0.0, {}
 
 
 FAULTS = (

@@ -35,6 +35,7 @@ UNITS = {"x": "m", "y": "m", "yaw": "rad", "speed": "m/s", "hitch": "rad", DISTA
 """Of what is told."""
 LEAST = {"y": 0.1, "yaw": 0.01, "hitch": 0.01}
 """m, rad: errors of a course that moves by less are shares of this."""
+AT_ONCE = "the vehicle stands at once"
 ASKED_ONCE = "what stands behind the port answers one run alone"
 SINGLE = "one step to a sample leaves no longer ones, and in shorter ones the controller may act otherwise"
 REMEDY = "raise run.substeps, or see the scatter of many stops, study braking_ensemble"
@@ -63,6 +64,8 @@ def with_error(run: Result, scene: BrakingScene, other: OtherRuns) -> Result:
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     path, steps = run.detail, scene.run.substeps
+    if len(path.times) <= 2:
+        return not_estimated(run, AT_ONCE)
     loop = controlled(scene, path)
     if not repeatable(scene) or (loop and steps == 1):
         return not_estimated(run, SINGLE if repeatable(scene) else ASKED_ONCE)

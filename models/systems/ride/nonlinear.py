@@ -24,7 +24,7 @@ from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import StatisticallyLinear, statistically_linear
 from models.road.excitation import Excitation
 from models.systems.ride.assumptions import assumptions
-from models.systems.ride.errors import with_error_of_copies
+from models.systems.ride.errors_in_time import with_error_of_copies
 from models.systems.ride.of_scene import excitation_of, linear_vehicle
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import InTime, Spectral, few, watching

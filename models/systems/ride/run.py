@@ -13,7 +13,7 @@ import numpy as np
 from models.core.assumptions import judged
 from models.core.result import Channel, Result, result
 from models.systems.ride.assumptions import assumptions
-from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_drive, with_error_of_sweep
+from models.systems.ride.errors import CORNERED, DIGIT, with_error_of_sweep
 from models.systems.ride.of_scene import excitation_of, goes_in_time, linear_vehicle, told_by, vehicle_of
 from models.systems.ride.scene import RideScene
 from models.systems.ride.watched import FEW, Along, Spectral, few, own_deviations
@@ -106,6 +106,7 @@ def _swept(
 def _driven(scene: RideScene, engine: str, vehicle: SpatialVehicle, error: bool) -> Result:
     """Standard deviations (time, output) along a drive, and as if each speed had always been driven."""
     from models.ride.varying_speed import quasi_stationary, varying_speed
+    from models.systems.ride.errors_in_time import with_error_of_drive
 
     assert scene.drive is not None
     begun, weightings = time.process_time(), scene.weighting

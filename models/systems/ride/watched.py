@@ -10,8 +10,7 @@ import numpy as np
 
 from models.core.assumptions import Gaussian
 from models.core.errors import InputError
-from models.ride.covariance import stationary
-from models.ride.excited import excited
+from models.ride.sweep import sweep
 from models.road.excitation import Excitation
 from models.systems.ride.of_scene import GRAVITY, Linear
 from models.vehicles.linear_vehicle import LinearVehicle, Output
@@ -92,15 +91,16 @@ class Spectral:
     @cached_property
     def _deviations(self) -> dict[str, np.ndarray]:
         """Standard deviations (speeds,) by name, not finite where there is none."""
-        rows, names = [], tuple[str, ...]()
+        rows, names = [], [output.name for output in self._seen(self.speeds[0]).outputs]
         for speed in self.speeds:
-            seen = watching(self.linear(speed), self.vehicle, speed)
-            names = tuple(output.name for output in seen.outputs)
             try:
-                rows.append(stationary(excited(seen, self.road, speed)).deviation)
+                rows.append(sweep(self._seen, {"own": self.road}, [speed]).deviation[0, 0])
             except InputError:
                 rows.append(np.full(len(names), np.nan))
         return dict(zip(names, np.array(rows).T, strict=True))
+
+    def _seen(self, speed: float) -> LinearVehicle:
+        return watching(self.linear(speed), self.vehicle, speed)
 
 
 @dataclass(frozen=True)

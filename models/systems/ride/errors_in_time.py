@@ -1,0 +1,135 @@
+"""How far rides in time are from steps without length and from endless copies: drives, copies, gains beside them."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from models.core.discretisation import Estimate, Series, by_chance, estimated, observed_order, of_chance, stated
+from models.core.result import Result
+from models.ride.nonlinear_copies import Copies, coarser_variances
+from models.ride.speed_profile import SpeedProfile
+from models.ride.statistical_linearisation import StatisticallyLinear
+from models.ride.varying_speed import REACH, VaryingSpeed, varying_speed
+from models.road.excitation import Excitation
+from models.systems.ride.errors import rms
+from models.systems.ride.scene import RideScene
+from models.vehicles.linear_vehicle import LinearVehicle
+from models.vehicles.spatial import SpatialVehicle
+
+ORDER = 10
+"""Of a drive's points in path."""
+APART = ", each speed by itself"
+COPIES_ORDER = 4
+LEAST_LEFT = 0.25
+"""Error of a deviation, at least, by the share of its variance that gains leave out."""
+
+Alone = Callable[[int], np.ndarray]
+"""Deviations (time, outputs) as if each speed had always been driven, by every so many of the speeds that are known."""
+
+
+def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, road: Excitation, alone: Alone) -> Result:
+    """The result with the errors of its deviations, by the same drive in longer steps that end where its own do, and by
+    fewer speeds between which the quasi-stationary ones are straight."""
+    assert scene.drive is not None
+    drive: VaryingSpeed = run.detail
+    profile, step = scene.drive.profile(scene.file), float(np.diff(drive.time).max())
+    shown = np.isfinite(drive.deviation).all(axis=0)
+
+    def series(time: np.ndarray, deviation: np.ndarray, each: np.ndarray) -> Series:
+        channels = {str(name): deviation[:, i] for i, name in enumerate(drive.names) if shown[i]}
+        apart = {f"{name}{APART}": each[:, i] for i, name in enumerate(drive.names) if np.isfinite(each[:, i]).all()}
+        return Series(time, channels | apart)
+
+    def again(times: float, share: float) -> Series:
+        every = round(times)
+        end = drive.time[0] + share * (drive.time[-1] - drive.time[0])
+        wanted = drive.time[::every][drive.time[::every] <= end + 1e-9]
+        cut = _until(profile, float(wanted[-1]))
+        coarse = varying_speed(
+            linear, road, cut, weightings=scene.weighting, instants=wanted, reach=1.01 * times * REACH
+        )
+        rows = np.abs(coarse.time[:, None] - wanted).argmin(axis=0)
+        return series(coarse.time[rows], coarse.deviation[rows], alone(every)[::every][: len(wanted)])
+
+    units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
+    units |= {f"{name}{APART}": unit for name, unit in units.items()}
+    fine = series(drive.time, drive.deviation, run["quasi_stationary"])
+    return estimated(run, fine, again, ORDER, step, units)
+
+
+def _until(profile: SpeedProfile, end: float) -> SpeedProfile:
+    """The drive up to a time (s)."""
+    before = profile.times < end - 1e-9
+    times = [*profile.times[before], end]
+    return SpeedProfile(times, [*profile.speeds[before], float(profile.speed(end))])
+
+
+def with_error_of_copies(
+    run: Result,
+    vehicle: SpatialVehicle,
+    road: Excitation,
+    replaced: Mapping[float, StatisticallyLinear],
+    copies: Mapping[float, Copies],
+    seed: int,
+) -> Result:
+    """The result with the errors of its deviations, by output.
+
+    Copies: by longer steps of some of them on the same roads, and by chance. Statistical linearisation: by the copies
+    beside it, less what chance makes of their difference; by what its gains leave out where that is more.
+    """
+    first = next(iter(copies.values()))
+    units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
+    size = _over_speeds([each.deviation for each in copies.values()])
+    chance = _over_speeds([each.error / (2.0 * each.deviation) for each in copies.values()])
+    steps = [_of_steps(vehicle, road, speed, each, seed) for speed, each in copies.items()]
+    told = {}
+    for i, name in enumerate(first.names):
+        if size[i] > 0.0:
+            error, order = max(((row[i], orders[i]) for row, orders in steps), key=lambda pair: pair[0])
+            told[f"{name}, copies"] = Estimate(error, units[name], error / size[i], order, first.step)
+    if replaced:
+        told |= _of_gains(replaced, copies, units)
+    stated(run, told, "the copies in longer steps, and gains beside copies")
+    scatter = {
+        f"{name}, copies": by_chance(float(chance[i]), float(size[i]), units[name], len(first.moments[0]))
+        for i, name in enumerate(first.names)
+        if size[i] > 0.0
+    }
+    return of_chance(run, scatter, len(first.moments[0]))
+
+
+def _over_speeds(rows: Sequence[np.ndarray]) -> np.ndarray:
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num(np.sqrt(np.mean(np.square(rows), axis=0)))
+
+
+def _of_steps(
+    vehicle: SpatialVehicle, road: Excitation, speed: float, fine: Copies, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors and orders (p,) of the copies' deviations at a speed."""
+    twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
+    count = len(twice)
+    own = np.sqrt(fine.about_mean()[:count].mean(axis=0))
+    coarse, coarser = np.sqrt(twice.mean(axis=0)), np.sqrt(fourfold.mean(axis=0))
+    pairs = zip(abs(own - coarse), abs(coarse - coarser), strict=True)
+    order = np.array([observed_order(float(a), float(b), COPIES_ORDER) for a, b in pairs])
+    return abs(own - coarse) / (2.0**order - 1.0), order
+
+
+def _of_gains(
+    replaced: Mapping[float, StatisticallyLinear], copies: Mapping[float, Copies], units: Mapping[str, str]
+) -> dict[str, Estimate]:
+    """Errors of deviations by statistical linearisation, beside the copies at their speeds."""
+    beside = [(replaced[speed], each) for speed, each in copies.items()]
+    gains = np.array([each.covariance.deviation for each, _ in beside])
+    true = np.array([each.deviation for _, each in beside])
+    scatter = np.array([each.error / (2.0 * each.deviation) for _, each in beside])
+    left = np.array([each.left_out for each, _ in beside])
+    errors = np.sqrt(np.maximum((gains - true) ** 2 - scatter**2, (LEAST_LEFT * left * gains) ** 2))
+    told = {}
+    for i, name in enumerate(beside[0][1].names):
+        known = np.isfinite(errors[:, i]) & (gains[:, i] > 0.0) & np.isfinite(gains[:, i])
+        if known.any():
+            error, size = rms(errors[known, i]), rms(gains[known, i])
+            told[f"{name}, gains"] = Estimate(error, units[name], error / size, 1.0, 0.0)
+    return told
