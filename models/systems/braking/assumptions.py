@@ -71,10 +71,19 @@ def _of_loads(scene: BrakingScene) -> Iterator[Assumption]:
             "wheels on the road",
             "every wheel stays on the road, as the body in the plane does not roll",
             "use a vehicle on its suspension, vehicle.file",
-            lambda run: _of_wheels(run["load"]),
+            lambda run: _of_wheels(_loads(run)),
             "N",
             least=PRESSES,
         )
+
+
+def _loads(run: Result) -> np.ndarray:
+    """Loads (n, W) in N, without those of the sample in which the vehicle comes to rest: what ends its motion there
+    within a step is no force of a tyre."""
+    loads = np.array(run["load"])
+    if run.detail.stands:
+        loads[-1] = np.nan
+    return loads
 
 
 def _moved(scene: BrakingScene, run: Result) -> Watched:
@@ -172,7 +181,7 @@ def _of_tyres(scene: BrakingScene, vehicle: Braked) -> Iterator[Assumption]:
         "loads of the friction",
         "friction is known at the loads that wheels bear",
         "give tyres.files with tables up to larger loads",
-        lambda run: _of_wheels(run["load"]),
+        lambda run: _of_wheels(_loads(run)),
         "N",
         most=float(largest),
     )

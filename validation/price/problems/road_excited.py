@@ -102,7 +102,7 @@ def judge(assembly: Assembly, run: Trajectory) -> Result:
     channels = outputs(replace(assembly, sensors=()), run)
     labelled = {name: Channel("time", values, unit, meaning) for name, (unit, meaning, values) in channels.items()}
     times = {"time": Channel("time", run.times, "s")}
-    return judged(result(assembly.scene, labelled, times), assumptions(assembly))
+    return judged(result(assembly.scene, labelled, times, mode=assembly.mode), assumptions(assembly))
 
 
 def settings_of(setting: Setting, duration: float = DURATION) -> Settings:
