@@ -47,6 +47,7 @@ def _forces(parameters: str, where: str, measured: Result, steps: tuple[float, .
 
 
 @allowing("edges of measured roads are shorter than a tyre's patch, and both sides read the same heights", "even road")
+@allowing("the forces of a rough road topple a vehicle that nothing holds, on both sides alike", "upright")
 def _course(parameters: str, steps: tuple[float, ...]) -> list[Row]:
     """The measured course, 250 m at 50 m/s, and force-excited by the forces of its rough part."""
     data = data_folder()
