@@ -56,11 +56,25 @@ plt.rcParams.update(
 )
 
 
+REMARK = 8
+"""Size (points) of remarks."""
+
+
 def heading(figure: Figure, title: str, results: Results | None = None) -> None:
     """Title of a whole figure, above its left edge; below the figure what its results must be doubted for."""
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
-        figure.supxlabel("\n".join(told), x=0.01, ha="left", fontsize=8, color="#b00020")
+        lines = "\n".join((*told, *[" "] * _lines_of_legends(figure)))
+        figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color="#b00020")
+
+
+def _lines_of_legends(figure: Figure) -> int:
+    """How many lines of a remark the legends take that lie below a figure's axes."""
+    if figure.legends:
+        figure.draw_without_rendering()
+    tops = [legend.get_window_extent().y1 for legend in figure.legends]
+    lowest = max((top for top in tops if top < figure.bbox.height / 2), default=0.0)
+    return int(np.ceil(lowest / (1.2 * REMARK * figure.dpi / 72)))
 
 
 def save(figure: Figure, path: Path) -> Path:
