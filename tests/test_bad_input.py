@@ -5,6 +5,7 @@ The table of wrong inputs is in ``bad_inputs.py``. ``python tests/test_bad_input
 
 import itertools
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from bad_inputs import CUTS, FORCED, FREE, GOOD, GUIDED, ON_CRG, ON_CSV, ON_ROAD
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.core.errors import InputError
+from models.core.errors import InputError, Refused, RunFailed
 from models.core.systems import SYSTEMS, load
 from models.road.opencrg import write_opencrg
 from models.road.study import study_road
@@ -261,3 +262,17 @@ def read_aloud():
 
 if __name__ == "__main__":
     read_aloud()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("scene.toml", "run.step", 3.0, "must be smaller", ("step",)),
+        Refused("exudyn", "has no such law", "scene.toml"),
+        RunFailed("mujoco", "not finite", 1.5),
+    ],
+)
+def test_errors_cross_the_border_of_a_process(error):
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error) and str(again) == str(error)
+    assert vars(again) == vars(error)

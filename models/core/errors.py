@@ -30,6 +30,10 @@ class InputError(ValueError):
         name = value if isinstance(value, str) else place.rpartition(".")[2]
         super().__init__(f"{where}{_shown(value)}: {allowed}{nearest(name, choices)}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How the error crosses the border of a process: by what made it."""
+        return type(self), (self.file, self.place, self.value, self.allowed, self.choices), vars(self)
+
 
 def _shown(value: Any) -> str:
     """Return `` = value`` as a scene file would hold it, cut to a readable length."""
@@ -81,6 +85,10 @@ class RunFailed(RuntimeError):
         since = "" if time is None else f" (last good state at t = {time:.6g} s)"
         super().__init__(f"{engine}: {reason}{since}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How the error crosses the border of a process: by what made it, with what was recorded."""
+        return type(self), (self.engine, self.reason, self.time, self.state), vars(self)
+
 
 class Refused(InputError):
     """A scene that is well written but asks an engine for something it does not do correctly."""
@@ -88,3 +96,7 @@ class Refused(InputError):
     def __init__(self, engine: str, why: str, file: str = "") -> None:
         self.engine, self.why = engine, why
         super().__init__(file, f"engines.{engine}" if file else engine, None, why)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """How the error crosses the border of a process: by what made it."""
+        return type(self), (self.engine, self.why, self.file), vars(self)
