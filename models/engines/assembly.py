@@ -1,12 +1,13 @@
 """What engines are given of the pitch-plane vehicle, bodies, struts, input and settings, and what they give: a path."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from models.core.assumptions import Assumption
 from models.core.signals import Signal
+from models.core.trajectory import Trajectory
 from models.vehicles import pitch_plane
 from models.vehicles.description import PitchSpring, Vehicle
 
@@ -88,30 +89,6 @@ class Settings:
     def steps(self) -> int:
         """Number of fixed steps that cover the duration."""
         return round(self.duration / self.step)
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """times (n,), states (n, 8), and what the run cost in counts.
-
-    enforced (n, guided coordinates): force on the chassis (N, down), where its heave is prescribed, and moment
-    (N m, nose up); None where nothing is.
-    """
-
-    times: np.ndarray
-    states: np.ndarray
-    enforced: np.ndarray | None = None
-    counts: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def moment(self) -> np.ndarray | None:
-        """Moment (n,) in N m that the prescribed pitch takes."""
-        return None if self.enforced is None else self.enforced[:, -1]
-
-    @property
-    def force(self) -> np.ndarray | None:
-        """Force (n,) in N, positive down, that the prescribed heave takes; None where the pitch alone is prescribed."""
-        return None if self.enforced is None or self.enforced.shape[1] < 2 else self.enforced[:, 0]
 
 
 class Model(Protocol):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.protocol import guard
@@ -23,17 +24,15 @@ UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
 
-@dataclass(frozen=True)
-class HubRun:
-    """A run: times (m,) in s; coordinates and rates (m, 2 n), the chassis' six first.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HubRun(Trajectory):
+    """A run, the chassis' six coordinates first, and its forces.
 
     elements (m, e): forces of springs, mounts and bars in the chassis' axes, compression positive, N or N m
     wrenches (m, hubs, 6): force (N) and moment (N m) at every hub in the drive's frame
     moments (m, 2): of the stabiliser on roll and pitch, N m
     """
 
-    times: np.ndarray
-    states: np.ndarray
     elements: np.ndarray
     wrenches: np.ndarray
     moments: np.ndarray
@@ -104,7 +103,7 @@ class HubModel:
         inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
         wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
         report(self.numbers, times, np.ascontiguousarray(states), inside, wrenches, moments)
-        return HubRun(times, states, inside, wrenches, moments)
+        return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
 
     def forces_at_rest(self, q: np.ndarray) -> np.ndarray:
         """Forces (n,) on all joints (N, N m) by the compiled forces at time 0, at coordinates (n,) without rates."""

@@ -13,7 +13,8 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.engines.assembly import Assembly, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
 from models.engines.protocol import balanced, guard, landings_followed

@@ -16,8 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from models.core.errors import InputError
+from models.core.trajectory import Trajectory
 from models.engines.protocol import guard
-from models.engines.spatial_protocol import SpatialRun
 from models.vehicles.spatial import SpatialVehicle
 
 ENGINES = ("exudyn", "mujoco")
@@ -74,13 +74,12 @@ class FreeModel(ABC):
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where the engine stops."""
 
-    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
+    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> Trajectory:
         """March from positions and rates (n,); states at every step. RunFailed unless all of it is finite and sane."""
         steps = round(duration / step)
         states, times = self.march(q, v, steps, step), step * np.arange(steps + 1)
         guard(self.ENGINE, times, states, steps * step)
-        positions, rates = np.split(states, 2, axis=1)
-        return SpatialRun(times, positions, rates, {"steps": steps, "force calls": 4 * steps})
+        return Trajectory(times, states, counts={"steps": steps, "force calls": 4 * steps})
 
 
 def free_model(engine: str, driven: Driven) -> FreeModel:

@@ -17,7 +17,8 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
-from models.engines.assembly import Assembly, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import guard, landings_followed
 from models.vehicles.description import Strut, Vehicle

@@ -29,8 +29,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from models.core.errors import InputError, RunFailed
+from models.core.trajectory import Trajectory
 from models.engines import protocol
-from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
 from models.engines.protocol import guard
 from models.engines.reference import Reference, derivative_of

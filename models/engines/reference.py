@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 
 from models.core.errors import RunFailed
 from models.core.signals import Stacked
-from models.engines.assembly import Assembly, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import guard, landings_followed
 from models.machine.compiled import named, njit

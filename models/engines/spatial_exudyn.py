@@ -5,6 +5,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.exudyn import counted
 from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, start
@@ -12,7 +13,6 @@ from models.engines.spatial_exudyn_build import RoadTable, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,
     EngineKinematics,
-    SpatialRun,
     curves,
     difference_step,
     linear_vehicle,
@@ -107,7 +107,7 @@ class SpatialExudyn:
             columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
         return np.column_stack(columns)
 
-    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
         """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
         settings = timed("exudyn", self.settings)
         start(self.mbs, self._all(q), self._all(v))

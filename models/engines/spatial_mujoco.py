@@ -9,6 +9,7 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import RunFailed
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.mujoco import CHUNK, INTEGRATORS
 from models.engines.mujoco_callback import installed
@@ -19,7 +20,6 @@ from models.engines.protocol import guard
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
 from models.engines.spatial_protocol import (
     EngineKinematics,
-    SpatialRun,
     curves,
     difference_step,
     jacobian,
@@ -133,7 +133,7 @@ class SpatialMujoco:
         mujoco.mj_jac(self.model, self.data, shift, turn, point, self.numbers.bodies[body])
         return shift[:, self.numbers.columns], turn[:, self.numbers.columns]
 
-    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
         """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
         settings, size = timed("mujoco", self.settings), self.model.nv
         both = 1 + np.concatenate((self.numbers.columns, size + self.numbers.columns))

@@ -7,7 +7,7 @@ All read the road from one table at half steps. Nothing is integrated here.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib import import_module
 from typing import Protocol
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from models.core.errors import InputError, Refused, RunFailed
 from models.core.steps import divides, fitting
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import guard
@@ -36,16 +37,6 @@ SMOOTH_STEP, CORNERED_STEP = 4e-3, 1e-5
 curves with corners and friction need the second, which rounding keeps to 1e-11."""
 
 
-@dataclass(frozen=True)
-class SpatialRun:
-    """times (m,) in s; positions and rates (m, n) in the vehicle's coordinates; what the run cost in counts."""
-
-    times: np.ndarray
-    positions: np.ndarray
-    rates: np.ndarray
-    counts: dict[str, int] = field(default_factory=dict)
-
-
 class SpatialModel(Protocol):
     """A vehicle in space built in one engine."""
 
@@ -57,7 +48,7 @@ class SpatialModel(Protocol):
         """The engine's own linear vehicle about the design position."""
         ...
 
-    def run(self, q: np.ndarray, v: np.ndarray) -> SpatialRun:
+    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
         """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
         ...
 
@@ -227,11 +218,10 @@ def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearV
 
 def sound(
     engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
-) -> SpatialRun:
+) -> Trajectory:
     """The run, where it passes the guard of all runs."""
     guard(engine, times, states, settings.duration, note)
-    positions, rates = np.split(states, 2, axis=1)
-    return SpatialRun(times, positions, rates, counts)
+    return Trajectory(times, states, counts=counts)
 
 
 def timed(engine: str, settings: Settings | None) -> Settings:

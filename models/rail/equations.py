@@ -28,6 +28,7 @@ from models.contact.inputs import Array, number, quantity
 from models.core.errors import InputError, RunFailed
 from models.core.resolved import check_resolved
 from models.core.steps import divides
+from models.core.trajectory import Trajectory
 from models.machine.compiled import inlined, lean, njit
 from models.rail.wheel_forces import (
     LAWS,
@@ -151,12 +152,10 @@ def _march(state, speed, body, rails, step, count, every, path, reports, room, s
     return count
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
-    """times (n,) in s; states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Path(Trajectory):
+    """A run, states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
 
-    times: np.ndarray
-    states: Array
     contacts: Array
 
 
@@ -269,7 +268,7 @@ class Equations:
         """
         count = self._steps(state, duration, step, every)
         states, contacts = self._marched(np.array(state, float), count, step, every)
-        path = Path(np.arange(len(states)) * step * every, states, contacts)
+        path = Path(np.arange(len(states)) * step * every, states, contacts=contacts)
         self.check(path, step, every)
         return path
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.spatial_protocol import INTEGRATORS, SpatialRun, build
+from models.engines.spatial_protocol import INTEGRATORS, build
 from models.ride.road_path import RoadPath, road_path
 from models.systems.ride.of_scene import GRAVITY, excitation_of, vehicle_of
 from models.systems.ride.scene import build as ride_scene
@@ -59,7 +60,7 @@ def _motion(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndar
     zero = np.zeros(len(vehicle.coordinates()))
     gust = np.array([GUST if place == ("body", "y") else 0.0 for place in vehicle.coordinates()])
     run = model.run(zero, gust)
-    kept = SpatialRun(run.times[rows], run.positions[rows], run.rates[rows])
+    kept = Trajectory(run.times[rows], run.states[rows])
     if engine == "exudyn":
         poses = _exudyn(model, kept.positions)
     else:
@@ -78,7 +79,7 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
     return places, {name: turn @ axes[name] for name, turn in turns.items()}  # a mass that slides has other axes
 
 
-def arrows(vehicle: SpatialVehicle, run: SpatialRun, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
+def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
     forces = [
         run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])

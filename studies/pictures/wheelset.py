@@ -53,7 +53,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
     run = not_estimated(simulate(scene, engine, SPEED), "a film shows the path, and the study wheelset its error")
     path: Path = run.detail
     rows = np.rint(times / STEP).astype(int)
-    kept = Path(path.times[rows], path.states[rows], path.contacts[rows])
+    kept = Path(path.times[rows], path.states[rows], contacts=path.contacts[rows])
     joints = to_joints(kept.states)[:, :JOINTS]
     if engine == "mujoco":
         poses = of_mujoco(equations.model, {"wheelset": 1}, joints)

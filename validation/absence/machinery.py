@@ -42,9 +42,10 @@ def wheelsets(steps: int) -> tuple[Callable[[], Path], Callable[[], Path]]:
     theirs = hand_built_wheelset.run(own.wheelset, start, wheelset.SPEED, STEP, steps)
 
     def written() -> Path:
-        found = Path(times, *theirs())
-        own.check(found, STEP, 1)
-        return found
+        states, contacts = theirs()
+        path = Path(times, states, contacts=contacts)
+        own.check(path, STEP, 1)
+        return path
 
     return lambda: own.run(start, steps * STEP, STEP), written
 

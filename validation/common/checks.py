@@ -11,7 +11,8 @@ from functools import partial
 import numpy as np
 
 from models.core.errors import InputError, RunFailed
-from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.catalogue import CATALOGUE, RECOMMENDED
 from models.engines.protocol import build
 from models.vehicles import pitch_plane

@@ -13,7 +13,8 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.signals import Sampled, Smooth, Stacked
-from models.engines.assembly import Assembly, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Settings
 from models.systems.pitch_plane.scene import Scene, assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring

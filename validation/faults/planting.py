@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.protocol import build
 from validation.common.checks import Make
 from validation.faults import changes as change

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from models.core.signals import Sampled
-from models.engines.assembly import Assembly, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly
 from models.systems.pitch_plane.effects.contact_points import contact_points
 from validation.hard_cases.case import Case
 from validation.hard_cases.setups import IMPLICIT, driven, largest, run, vehicle

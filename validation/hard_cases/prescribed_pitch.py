@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 
 from models.core.signals import Sampled, Signal
+from models.core.trajectory import Trajectory
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly, Trajectory
+from models.engines.assembly import Assembly
 from models.engines.mujoco import specification
 from validation.hard_cases import setups
 from validation.hard_cases.case import Case

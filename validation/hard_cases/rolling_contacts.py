@@ -14,11 +14,11 @@ import mujoco
 import numpy as np
 from scipy.integrate import simpson
 
+from models.core.trajectory import Trajectory
 from models.engines.contact_bridge import Wheels, add_forces, check_step
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model, native_law
 from models.engines.mujoco_callback import installed
-from models.engines.spatial_protocol import SpatialRun
 from models.multibody.numbers import Handling, Tyres
 from models.rail import wheel_forces as wf
 from models.rail.energy import ledger
@@ -130,8 +130,7 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
         b = rates(x + 0.5 * step * a)
         c = rates(x + 0.5 * step * b)
         states.append(x + step / 6.0 * (a + 2.0 * b + 2.0 * c + rates(x + step * c)))
-    q_path, v_path = np.split(np.array(states), 2, axis=1)
-    return read(handling, SpatialRun(step * np.arange(len(states)), q_path, v_path))
+    return read(handling, Trajectory(step * np.arange(len(states)), np.array(states)))
 
 
 def wrong(run: Drive) -> bool:
@@ -143,7 +142,7 @@ def wrong(run: Drive) -> bool:
 def left_open(run: Drive) -> float:
     """Energy at the end, by that of the start, that the powers of the run do not account for; its steps are even."""
     times, ends = run.run.times, [0, -1]
-    few = SpatialRun(times[ends], run.run.positions[ends], run.run.rates[ends])
+    few = Trajectory(times[ends], run.run.states[ends])
     first, last = energy(Drive(run.handling, few, run.tyres[ends], run.ledger[ends]))
     return float(abs(last - first - simpson(run.power(), x=times)) / first)
 

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from models.core.signals import Sampled, Signal, Smooth, Stacked
-from models.engines.assembly import Assembly, Mode, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Mode, Settings
 from models.engines.catalogue import RECOMMENDED
 from models.engines.protocol import build
 from models.engines.protocol import unchecked as build_unchecked

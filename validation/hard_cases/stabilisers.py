@@ -12,8 +12,9 @@ import numpy as np
 
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.time_series import write_time_series
+from models.core.trajectory import Trajectory
 from models.engines import exudyn as exudyn_engine
-from models.engines.assembly import Assembly, Trajectory
+from models.engines.assembly import Assembly
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.scene import build as build_scene
 from models.vehicles.description import PitchSpring

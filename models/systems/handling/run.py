@@ -11,8 +11,8 @@ from models.core.discretisation import Estimate, Series, by_cells, by_steps, siz
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
+from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import Driven, FreeModel, free_model
-from models.engines.spatial_protocol import SpatialRun
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
@@ -58,7 +58,7 @@ class Drive:
     CPU seconds of the march."""
 
     handling: Handling
-    run: SpatialRun
+    run: Trajectory
     tyres: np.ndarray
     ledger: np.ndarray
     seconds: float = 0.0
@@ -263,7 +263,7 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
     return read(handling, path, engine, time.process_time() - begun)
 
 
-def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float = 0.0) -> Drive:
+def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
     """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))

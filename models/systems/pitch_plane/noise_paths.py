@@ -22,7 +22,8 @@ from models.core.errors import InputError, RunFailed
 from models.core.scene_effects import module_of
 from models.core.steps import divides
 from models.core.systems import DEFAULT
-from models.engines.assembly import Assembly, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build, guard
 from models.ensemble.runner import PathFailed

@@ -13,7 +13,8 @@ from models.core.assumptions import judged
 from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolerance, size_of
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
-from models.engines.assembly import Assembly, Channels, Model, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Channels, Model, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
 from models.engines.protocol import build
 from models.systems.pitch_plane.assumptions import assumptions, principal

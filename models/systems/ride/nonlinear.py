@@ -15,8 +15,9 @@ from models.core.assumptions import judged
 from models.core.discretisation import Series, estimated
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity
+from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, SpatialRun, build
+from models.engines.spatial_protocol import INTEGRATORS, SpatialModel, build
 from models.ride.covariance import stationary
 from models.ride.excited import excited
 from models.ride.nonlinear_copies import Copies, copies_in_time, followed
@@ -242,7 +243,7 @@ class Ride:
     """
 
     names: tuple[str, ...]
-    run: SpatialRun
+    run: Trajectory
     times: np.ndarray
     outputs: np.ndarray
     rows: np.ndarray
@@ -306,14 +307,14 @@ def _model(engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarr
 
 
 def read_outputs(
-    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: SpatialRun, at: np.ndarray
+    engine: str, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, at: np.ndarray
 ) -> Ride:
     """Outputs of a run at other steps (m,)."""
     return _read(_model(engine, vehicle, road, table), vehicle, road, table, run, at)
 
 
 def _read(
-    model: SpatialModel, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: SpatialRun, at: np.ndarray
+    model: SpatialModel, vehicle: SpatialVehicle, road: RoadPath, table: np.ndarray, run: Trajectory, at: np.ndarray
 ) -> Ride:
     """Outputs of a run at steps (m,)."""
     linear = linearise(vehicle, road.speed)

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from models.advice.price.problem import Setting
+from models.core.trajectory import Trajectory
 from models.engines.catalogue import CATALOGUE
-from models.engines.spatial_protocol import SpatialRun, build
+from models.engines.spatial_protocol import build
 from models.engines.spatial_reference import SpatialReference
 from models.systems.ride.nonlinear import row_of
 from models.vehicles.spatial_linear import linearise
@@ -71,7 +72,7 @@ def heights(place: ArrayLike, track: int) -> tuple[np.ndarray, np.ndarray]:
 class Solver:
     """A run that is ready."""
 
-    run: Callable[[], SpatialRun]
+    run: Callable[[], Trajectory]
 
 
 class FreeVehicle:
@@ -156,7 +157,7 @@ class FreeVehicle:
         rest = np.zeros(len(self.vehicle.coordinates()))
         return Solver(partial(model.run, rest, rest))
 
-    def errors(self, solution: SpatialRun) -> dict[str, float]:
+    def errors(self, solution: Trajectory) -> dict[str, float]:
         """Largest error of any wheel load and of any acceleration, at the instants."""
         every = round(GRID / (solution.times[1] - solution.times[0]))
         states = np.hstack([solution.positions, solution.rates])[::every]

@@ -17,7 +17,8 @@ from models.advice.price.problem import Setting
 from models.advice.price.systems.pitch_plane import engine_settings
 from models.core.assumptions import judged
 from models.core.result import Channel, Result, result
-from models.engines.assembly import Assembly, Model, Settings, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Model, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.protocol import build
 from models.engines.reference import derivative_of

@@ -11,8 +11,8 @@ import numpy as np
 from models.core.discretisation import errors_of
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
+from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import ENGINES, FreeModel
-from models.engines.spatial_protocol import SpatialRun
 from models.multibody.forces import CELLS
 from models.systems.handling.run import Drive, driven, principal, run
 from models.systems.handling.scene import HandlingScene, build
@@ -87,7 +87,7 @@ def counted() -> Iterator[list[float]]:
     """Evaluations of the forces within the block, run by run, each times the cells of its tyres' nets."""
     calls, march = list[float](), FreeModel.run
 
-    def counting(model: FreeModel, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> SpatialRun:
+    def counting(model: FreeModel, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> Trajectory:
         calls.append(4.0 * round(duration / step) * model.numbers[CELLS])
         return march(model, q, v, duration, step)
 

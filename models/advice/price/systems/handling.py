@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from models.advice.price.meshed import TIGHT, Meshed, chosen, first_part, part_of
 from models.advice.price.problem import Setting
 from models.core.errors import RunFailed
-from models.engines.spatial_protocol import SpatialRun
+from models.core.trajectory import Trajectory
 from models.multibody.numbers import Handling
 from models.systems.handling.run import Drive, build, driven, judged_drive, read
 from models.systems.handling.scene import HandlingScene
@@ -63,8 +63,7 @@ class OwnHandling(Meshed):
         )
         if not done.success:
             raise RunFailed(self.own, done.message)
-        path, rates = map(np.ascontiguousarray, np.split(done.y.T, 2, axis=1))
-        return read(handling, SpatialRun(times, path, rates), self.own)
+        return read(handling, Trajectory(times, done.y.T), self.own)
 
     def read(self, run: Drive) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity over time; the drive is judged."""

@@ -73,7 +73,7 @@ def _exact(equations: Equations, start: np.ndarray, step: float, duration: float
     if not done.success:
         raise RunFailed("reference", done.message)
     states = np.ascontiguousarray(done.y.T)
-    return Path(times, states, equations.at(states)[1])
+    return Path(times, states, contacts=equations.at(states)[1])
 
 
 def own(scene: WheelsetScene, quantity: str | None, engines: tuple[str, ...]) -> OwnWheelset:

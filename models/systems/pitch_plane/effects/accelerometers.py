@@ -13,7 +13,8 @@ from pydantic import Field
 from models.core.noise import ACCELEROMETERS, normal
 from models.core.result import Result
 from models.core.strict import Strict, quantity
-from models.engines.assembly import Assembly, Channels, Model, Trajectory
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Assembly, Channels, Model
 from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read, within_range
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
