@@ -36,11 +36,13 @@ def rows(case, quick, folder):
 
 def judged(kind):
     """The row that a tenth of a second of ``kind`` by the true clock gives, judged by the clock that is told."""
-    from validation.common.rows import at_most
+    from validation.common.rows import Observed
 
     clock = getattr(time, kind)
     start, real = clock(), clock.real()
     while clock.real() < real + 0.1:
         clock()
     seconds = 10.0 * (clock() - start)
-    return at_most("planted.seconds", "cost", "seconds of a tenth of one, times ten", seconds, "s", 1.5, "", "none")
+    return Observed("planted.seconds", "cost", "seconds of a tenth of one, times ten", seconds, "s").at_most(
+        1.5, "", "none"
+    )

@@ -6,11 +6,11 @@ import pytest
 
 from models.core.errors import InputError
 from validation.common.changes import KINDS, against, changes, lines, read
-from validation.common.rows import at_most, behaves, within
+from validation.common.rows import Observed, behaves
 from validation.report.page import write
 
-ERROR = at_most("a.error", "drift", "an error", 1e-6, "m", 1e-5, "why", "native")
-VALUE = within("a.value", "drift", "a value", 2.0, "m", 2.0, 0.5, "why", "native")
+ERROR = Observed("a.error", "drift", "an error", 1e-6, "m").at_most(1e-5, "why", "native")
+VALUE = Observed("a.value", "drift", "a value", 2.0, "m").within(2.0, 0.5, "why", "native")
 WORD = behaves("a.word", "drift", "a word", "refused", "refused", "why")
 
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from models.core.errors import InputError
-from validation.common.rows import within
+from validation.common.rows import Observed
 from validation.run import Cases, measured
 
 NAMES = ("a_case", "bad_case", "one_more")
@@ -23,7 +23,9 @@ def cases(monkeypatch):
             done.append(name)
             if name in broken:
                 raise ValueError("no wheel")
-            return [within(f"{name}.third", "drift", "a third", 1 / 3, "m", 0.1, 0.5, "why", "native")], {"name": name}
+            return [Observed(f"{name}.third", "drift", "a third", 1 / 3, "m").within(0.1, 0.5, "why", "native")], {
+                "name": name
+            }
 
         module = types.ModuleType(f"validation.cases.{name}")
         module.measure = measure

@@ -16,7 +16,7 @@ from models.core.errors import InputError
 from validation.cases import point_mass
 from validation.common.changes import changes
 from validation.common.changes import read as read_earlier
-from validation.common.rows import STATUSES, Row, aim, at_most, behaves, finding, not_run, within
+from validation.common.rows import STATUSES, Observed, Row, behaves, not_run
 from validation.report import page as report
 from validation.report import shares
 from validation.report.numbers import margin, number, numeric_columns, powers, share
@@ -24,25 +24,20 @@ from validation.run import save as _save
 from validation.run import say
 
 ODD = '<script>alert("1")</script> & "quotes" µ'
-FAILED = at_most(
-    "audit.mujoco.broken",
-    "pitch-plane",
-    "acceleration of a broken model",
-    3e-3,
-    "of the largest",
-    1e-12,
-    "rounding",
-    "native",
-)
+FAILED = Observed(
+    "audit.mujoco.broken", "pitch-plane", "acceleration of a broken model", 3e-3, "of the largest"
+).at_most(1e-12, "rounding", "native")
 
 
 def rows() -> list[Row]:
     return [
-        within("order.exudyn.RK44", "pitch-plane", "order of RK44", 3.93, "", 4.0, 0.15, "theory", "closed form"),
-        at_most("audit.exudyn.twin", "pitch-plane", "acceleration", 2.5e-16, "1", 1e-12, "rounding", "native"),
+        Observed("order.exudyn.RK44", "pitch-plane", "order of RK44", 3.93, "").within(
+            4.0, 0.15, "theory", "closed form"
+        ),
+        Observed("audit.exudyn.twin", "pitch-plane", "acceleration", 2.5e-16, "1").at_most(1e-12, "rounding", "native"),
         FAILED,
         behaves("guards.nan", "hard-cases", ODD, "raised", "raised", ODD),
-        finding("drift.noisy", "drift", "drift-off", 8.4, "s", "about 10", "one sample"),
+        Observed("drift.noisy", "drift", "drift-off", 8.4, "s").beside("about 10", "one sample"),
         not_run("roads.measured", "pitch-plane", "measured roads", "no folder named"),
         Row("odd.<b>", "effects", "a case that nobody knows", None, "", "", None, "", "none", "failed", ODD),
     ]
@@ -186,7 +181,9 @@ def test_a_quick_report_tells_its_share_of_the_last_full_one(folder, tmp_path, m
 
 
 def test_missing_and_damaged_data_still_give_a_page(folder):
-    own = [at_most(f"{case}.x", "pitch-plane", "q", 0.0, "", 1.0, "w", "native") for case in ("order", "planted")]
+    own = [
+        Observed(f"{case}.x", "pitch-plane", "q", 0.0, "").at_most(1.0, "w", "native") for case in ("order", "planted")
+    ]
     _save(folder, own, {"command": ""})
     (folder / "data" / "planted_faults.json").write_text('{"faults": [{"no": "such key"}], "clean": []}')
     text = report.write(folder).read_text(encoding="utf-8")
@@ -256,7 +253,7 @@ def test_numbers_read_as_an_engineer_writes_them(value, text):
 def test_margin_needs_numbers_and_a_tolerance():
     assert margin(rows()[0].as_dict()) == pytest.approx(0.07 / 0.15)
     assert margin(rows()[3].as_dict()) is None
-    assert margin(within("a.b", "cost", "q", 1, "", 1, 0, "w", "none").as_dict()) is None
+    assert margin(Observed("a.b", "cost", "q", 1, "").within(1, 0, "w", "none").as_dict()) is None
 
 
 def test_shares_and_powers():
@@ -273,9 +270,11 @@ def test_columns_of_numbers_go_to_the_right():
 
 
 def test_page_json_and_csv_say_the_same_of_every_row(tmp_path):
-    missed = aim("fastsim.speed", "contact", "one call", 7.25, "us", 5.0, "asked")
-    reached = aim("braking.speed", "anti-lock", "the truck", 210.0, "times real time", 100.0, "asked", "at least")
-    own = [*rows(), missed, reached, aim("odd.nan", "cost", "nothing", float("nan"), "s", 1.0, "asked")]
+    missed = Observed("fastsim.speed", "contact", "one call", 7.25, "us").aim(5.0, "asked")
+    reached = Observed("braking.speed", "anti-lock", "the truck", 210.0, "times real time").aim(
+        100.0, "asked", "at least"
+    )
+    own = [*rows(), missed, reached, Observed("odd.nan", "cost", "nothing", float("nan"), "s").aim(1.0, "asked")]
     save(tmp_path, own)
     page = report.write(tmp_path).read_text(encoding="utf-8")
     row = r'<tr id="row-.*?<span class="id">([^<]*)</span>.*?<span class="chip [^"]*">([^<]*)</span>'
@@ -291,7 +290,7 @@ def test_page_json_and_csv_say_the_same_of_every_row(tmp_path):
 
 
 def test_missed_aims_are_counted_and_told_in_the_verdict_and_fail_nothing(tmp_path, capsys):
-    own = [rows()[0], aim("fastsim.speed", "contact", "one call", 7.25, "us", 5.0, "asked")]
+    own = [rows()[0], Observed("fastsim.speed", "contact", "one call", 7.25, "us").aim(5.0, "asked")]
     top = report.write(save(tmp_path, own)).read_text(encoding="utf-8").partition("What is not covered</h2>")[0]
     assert "No row failed; 1 stated aim was missed." in top and "7.25 us; the aim is at most 5" in top
     assert say(own, None, tmp_path) == 0

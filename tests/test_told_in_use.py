@@ -24,7 +24,7 @@ from studies.command.sweep_figure import BROKEN, WARNING, Swept, draw
 from studies.command_line import app
 from validation.cases import stated_errors
 from validation.common.grounds import allowing
-from validation.common.rows import at_most, finding, not_run
+from validation.common.rows import Observed, not_run
 from validation.price.problems import road_excited
 from validation.report.page import allowances
 from validation.run import rested
@@ -172,7 +172,7 @@ def test_points_of_work_precision_curves_are_marked():
 
 
 def of(value, id="case.row"):
-    return at_most(id, "effects", "q", value, "N", 1e9, "why", "none")
+    return Observed(id, "effects", "q", value, "N").at_most(1e9, "why", "none")
 
 
 def test_a_row_that_rests_on_a_tyre_that_pulls_fails():
@@ -195,7 +195,7 @@ def again(result):
 def test_rows_rest_on_the_runs_before_them_alone(pulling, pressing):
     def part(result):
         again(result)
-        return [of(1.0), finding("case.told", "effects", "q", 1.0, "", 1.0, "why")]
+        return [of(1.0), Observed("case.told", "effects", "q", 1.0, "").beside(1.0, "why")]
 
     def measure():
         rows = [of(0.0), *part(pressing), not_run("case.none", "effects", "q", "no file")]

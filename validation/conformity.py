@@ -23,7 +23,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common import checks
-from validation.common.rows import Independence, Row, System, at_most, behaves, not_run
+from validation.common.rows import Independence, Observed, Row, System, behaves, not_run
 from validation.common.scenes import VEHICLES, force_scene, road_scene
 from validation.hard_cases.case import Outcome, judge
 from validation.run import save, say
@@ -102,7 +102,7 @@ def _judged(
 ) -> Row:
     """Row of an error; a check that cannot be carried out is failed, with what was raised."""
     try:
-        return at_most(id, SYSTEM, quantity, error(), unit, bound, why, second)
+        return Observed(id, SYSTEM, quantity, error(), unit).at_most(bound, why, second)
     except (InputError, RunFailed) as reason:
         return Row(id, SYSTEM, quantity, None, unit, 0.0, bound, why, second, "failed", str(reason))
 

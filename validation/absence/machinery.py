@@ -16,7 +16,7 @@ from validation.absence import braking, hand_built_wheelset, hub_forces, wheelse
 from validation.absence.bare_cars import cars
 from validation.absence.bare_rides import copies, rides
 from validation.absence.of_systems import bare
-from validation.common.rows import Row, System, at_most
+from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "effects"
 STEP, SHORT = 5e-4, 40
@@ -127,6 +127,6 @@ def rows() -> list[Row]:
         ),
     }
     return [
-        at_most(f"absent.{name}.arrays", SYSTEM, f"arrays that {what}", count, "", 0, why, "none")
+        Observed(f"absent.{name}.arrays", SYSTEM, f"arrays that {what}", count, "").at_most(0, why, "none")
         for name, (what, count) in counted.items()
     ]

@@ -21,7 +21,7 @@ from models.core.errors import Refused
 from models.core.scene_effects import beside, module_of, names_of
 from models.core.systems import SYSTEMS, modules_of
 from validation.absence.probes import registered
-from validation.common.rows import Row, System, at_most, behaves
+from validation.common.rows import Observed, Row, System, behaves
 
 SYSTEM: System = "effects"
 FILES = {system: file for system, file in modules_of("validation.absence").items() if system in SYSTEMS}
@@ -191,16 +191,13 @@ def rows(quick: bool) -> list[Row]:
         ]
     seen_there = found()
     present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]
-    engines = at_most(
+    engines = Observed(
         "absent.references.engines",
         SYSTEM,
         "engines that bare scenes of braking, contact, wheelset and ride import by their references",
         len(seen_there["engines"]),
         "",
-        0,
-        "a fresh process",
-        "none",
-    )
+    ).at_most(0, "a fresh process", "none")
     return [
         *present,
         engines,
@@ -211,16 +208,13 @@ def rows(quick: bool) -> list[Row]:
 def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
     why = "in a fresh process in which none of them could have been imported, nor any effect's file read"
     return [
-        at_most(
+        Observed(
             f"absent.{system}.modules",
             SYSTEM,
             f"{system}: modules of effects that a bare scene imports, and those that no effect imports",
             len(seen_there["imported"]) + len(seen_there["missing"]),
             "",
-            0,
-            why,
-            "none",
-        ),
+        ).at_most(0, why, "none"),
         behaves(
             f"absent.{system}.bits",
             SYSTEM,
@@ -230,12 +224,13 @@ def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
             "to the last bit, in every implementation",
         ),
         *(
-            at_most(
+            Observed(
                 f"absent.{system}.callbacks.{engine}",
                 SYSTEM,
                 f"{system}: callbacks that a bare scene has in {engine} beyond the one whose forces no engine has",
                 count - 1,
                 "",
+            ).at_most(
                 0,
                 "counted over all items of "
                 "the system that marches, or in the engine's globals; no effect adds any but what its file says",

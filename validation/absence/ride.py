@@ -25,7 +25,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
 from validation.absence.probes import user_functions
-from validation.common.rows import Row, System, at_most, behaves
+from validation.common.rows import Observed, Row, System, behaves
 from validation.ride.rides import paper_road
 
 SYSTEM: System = "effects"
@@ -173,7 +173,7 @@ def rows(quick: bool = False) -> list[Row]:
     told = "modules of engines, of the compiler and of other routes that a linear ride of the reference imports"
     counted = () if quick else (len(imported("reference")),)
     return [
-        *(at_most("absent.ride.imports", SYSTEM, told, count, "", 0, why, "none") for count in counted),
+        *(Observed("absent.ride.imports", SYSTEM, told, count, "").at_most(0, why, "none") for count in counted),
         behaves(
             "absent.ride.states",
             SYSTEM,

@@ -19,7 +19,7 @@ from models.systems.pitch_plane.scene import build as build_scene
 from validation.absence import machinery, of_systems, ride, wheelset
 from validation.absence.probes import belongs_to_effects, installed, march, probe, quietest, user_functions
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, System, at_most, behaves
+from validation.common.rows import CaseAnswer, Observed, Row, System, behaves
 
 TITLE = "What is not named is not computed"
 SYSTEM: System = "effects"
@@ -122,19 +122,12 @@ def _imports() -> list[Row]:
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
     kernels = len(found["marches"]) + len(found["derivatives"])
     return [
-        at_most(
-            "absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "", 0, why, "none"
+        Observed("absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "").at_most(
+            0, why, "none"
         ),
-        at_most(
-            "absent.kernels",
-            SYSTEM,
-            "kernels that a bare scene compiles beyond its own march",
-            kernels - 1,
-            "",
-            0,
-            "the same process; the reference compiles one march per kind of scene, when first asked",
-            "none",
-        ),
+        Observed(
+            "absent.kernels", SYSTEM, "kernels that a bare scene compiles beyond its own march", kernels - 1, ""
+        ).at_most(0, "the same process; the reference compiles one march per kind of scene, when first asked", "none"),
     ]
 
 
@@ -148,35 +141,22 @@ def _absence(engine: str, folder: Path) -> list[Row]:
         callbacks += user_functions(model(scene({}, 20, folder), engine))
     why = "20 steps against 2,000 steps of a bare scene, watched around the engine's own march"
     return [
-        at_most(
+        Observed(
             f"absent.frames.{engine}",
             SYSTEM,
             f"{engine}: Python functions entered by 1,980 more steps",
             long.frames - short.frames,
             "",
-            0,
-            why,
-            "none",
-        ),
-        at_most(
+        ).at_most(0, why, "none"),
+        Observed(
             f"absent.memory.{engine}",
             SYSTEM,
             f"{engine}: memory that 1,980 more steps take beside their result",
             long.memory - short.memory,
             "B",
-            1980,
-            f"{why}; less than a byte per step is a wrapper's own",
-            "none",
-        ),
-        at_most(
-            f"absent.callbacks.{engine}",
-            SYSTEM,
-            f"{engine}: callbacks of a bare scene",
-            callbacks,
-            "",
-            0,
-            "counted over all items, and in the engine's globals before, during and after the march",
-            "none",
+        ).at_most(1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
+        Observed(f"absent.callbacks.{engine}", SYSTEM, f"{engine}: callbacks of a bare scene", callbacks, "").at_most(
+            0, "counted over all items, and in the engine's globals before, during and after the march", "none"
         ),
     ]
 

@@ -6,7 +6,7 @@ from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common import checks
 from validation.common.checks import acceleration_gap
-from validation.common.rows import CaseAnswer, System, at_most
+from validation.common.rows import CaseAnswer, Observed, System
 
 TITLE = "Accelerations at 100 random states"
 SYSTEM: System = "pitch-plane"
@@ -34,12 +34,13 @@ def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per engine, vehicle and geometry, the same in quick."""
     rows = [
-        at_most(
+        Observed(
             f"audit.{engine}.{parameters}.{geometry}",
             SYSTEM,
             f"acceleration, {engine} against the equations of the paper, {parameters}, {geometry} geometry",
             difference(engine, parameters, geometry),
             "of the largest",
+        ).at_most(
             1e-12,
             "both sides are a dozen products of doubles; 1e-12 leaves four digits for cancellation",
             "handed over" if (engine, geometry) == ("exudyn", "linear") else "native",

@@ -22,7 +22,7 @@ from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.quarter_stops import FRONT
 from validation.braking.sampled_quarter import own_distance, reference_distance
-from validation.common.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Observed, Row, System, Table, behaves
 
 TITLE = "Brakes and controllers of anti-lock braking"
 SYSTEM: System = "anti-lock"
@@ -99,16 +99,13 @@ def _loop_rows() -> list[Row]:
             sense = sense and bool((np.diff(p) * np.diff(t) >= 0.0).all()) and t.min() >= 0.0
     rise = torques(np.linspace(0.0, 0.75, 100), of_wheels(WIDE))
     return [
-        at_most(
+        Observed(
             "braking_controllers.loop",
             SYSTEM,
             "area of the brake's loop, whole and partial, by its closed form, less 1",
             worst,
             "",
-            1e-3,
-            "two lines and a hold between them",
-            "closed form",
-        ),
+        ).at_most(1e-3, "two lines and a hold between them", "closed form"),
         behaves(
             "braking_controllers.push_out",
             SYSTEM,
@@ -138,16 +135,13 @@ def _supply_row() -> Row:
             for _ in range(500):
                 by_valves(np.full(4, valve), SAMPLE, air, chambers, PAPER_BRAKES, ends)
     left = 8.0 * (reservoir / (reservoir + volumes.sum())) ** 5
-    return at_most(
+    return Observed(
         "braking_controllers.strokes",
         SYSTEM,
         "pressure in the chambers at the fifth full stroke, by p (V / (V + v))^5, less 1",
         float(np.abs(air.pressure / left - 1.0).max()),
         "",
-        1e-6,
-        "p V of reservoir and chambers together is kept but for what is let out",
-        "closed form",
-    )
+    ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
 
 
 def _frozen(inertia: float = FRONT.spin_inertia) -> Frozen:
@@ -158,26 +152,20 @@ def _cycle_rows(name: str) -> list[Row]:
     own, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
     wrong = exact_cycle(_frozen(FRONT.spin_inertia * 1.001), PHASES[name])[0]
     return [
-        at_most(
+        Observed(
             f"braking_controllers.period_{name}",
             SYSTEM,
             f"period of the five-phase limit cycle, {name}, by the exact one, less 1",
             own.period / period - 1.0,
             "",
-            1e-4,
-            "frozen speed; every switch is located",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-4, "frozen speed; every switch is located", "closed form"),
+        Observed(
             f"braking_controllers.utilisation_{name}",
             SYSTEM,
             f"its mean friction by the peak, {name}, less the exact one",
             own.utilisation - used,
             "",
-            1e-3,
-            "as above",
-            "closed form",
-        ),
+        ).at_most(1e-3, "as above", "closed form"),
         behaves(
             f"braking_controllers.planted_{name}",
             SYSTEM,
@@ -186,16 +174,13 @@ def _cycle_rows(name: str) -> list[Row]:
             "told",
             "a planted fault",
         ),
-        finding(
+        Observed(
             f"braking_controllers.sampled_{name}",
             SYSTEM,
             f"period of the same controller sampled every 5.5 ms, {name}, by the continuous one, less 1",
             sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / own.period - 1.0,
             "",
-            0.0,
-            "each switch comes up to a sample late",
-            "native",
-        ),
+        ).beside(0.0, "each switch comes up to a sample late", "native"),
     ]
 
 
@@ -228,16 +213,13 @@ def _longest(flags: np.ndarray) -> int:
 
 def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
     return [
-        at_most(
+        Observed(
             "braking_controllers.locks",
             SYSTEM,
             f"longest lock of any wheel above 15 km/h in {len(stops)} stops of four controllers",
             max(one["locked"] for one in stops.values()),
             "ms",
-            1e3 * BRIEF,
-            "ice, snow and dry at 11.11 and 22.2 m/s; only briefly",
-            "published",
-        ),
+        ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaves(
             "braking_controllers.stands",
             SYSTEM,
@@ -256,17 +238,14 @@ def _substep_rows() -> list[Row]:
         for n in SUBSTEPS:
             own = own_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
-                at_most(
+                Observed(
                     f"braking_controllers.stop_{on}_{n}",
                     SYSTEM,
                     "stopping distance of a quarter vehicle "
                     f"under a sampled controller on {on}, {n} substeps, by the reference, less 1",
                     own / tight - 1.0,
                     "",
-                    1e-2,
-                    "DOP853 at 1e-10 with locking as an event",
-                    "native",
-                )
+                ).at_most(1e-2, "DOP853 at 1e-10 with locking as an event", "native")
             )
     return rows
 
@@ -283,35 +262,26 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
     ]
     level = float(ttest_ind(*found, equal_var=False).pvalue)
     return [
-        at_most(
+        Observed(
             "braking_controllers.ice_mean",
             SYSTEM,
             f"mean stopping distance on ice of {runs} runs with 4 "
             f"substeps, by that of {runs} others with {fine}, less 1",
             float(found[0].mean() / found[1].mean() - 1.0),
             "",
-            1e-2,
-            "speeds drawn within 0.2 %; on ice single runs do not repeat",
-            "shared kernel",
-        ),
-        finding(
+        ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),
+        Observed(
             "braking_controllers.ice_level",
             SYSTEM,
             "chance of a larger difference if their means are the same",
             level,
             "",
-            "above 0.05: no difference is shown",
-            "Welch's test",
-            "none",
-        ),
-        finding(
+        ).beside("above 0.05: no difference is shown", "Welch's test", "none"),
+        Observed(
             "braking_controllers.ice_scatter",
             SYSTEM,
             "standard deviation of the stopping distance on ice",
             float(found[0].std(ddof=1)),
             "m",
-            float(found[1].std(ddof=1)),
-            "4 substeps beside more",
-            "none",
-        ),
+        ).beside(float(found[1].std(ddof=1)), "4 substeps beside more", "none"),
     ]

@@ -18,7 +18,7 @@ from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 from validation.braking.braked_truck import ICE, PLANE, Moving, sideways_with_locked_front_wheels, transfer_errors
 from validation.braking.truck_equations import Turned, turned
-from validation.common.rows import Row, System, Table, aim, at_most
+from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking in a turn, in engines and with a trailer"
 SYSTEM: System = "anti-lock"
@@ -36,12 +36,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     beside = {"written out": turned(PAPER, ICE, STEER, TORQUES, SPEED, until)}
     beside |= {name: turn(until, go=Carried(name, PLANE).advance) for name in ("exudyn", "mujoco")}
     rows = [
-        at_most(
+        Observed(
             f"braking_engines.{name.replace(' ', '_')}",
             SYSTEM,
             f"end of the turn, {name} beside the compiled step at 1 ms",
             float(np.hypot(end.x - compiled.x, end.y - compiled.y)),
             "m",
+        ).at_most(
             5e-3,
             "the same vehicle by other equations and another method",
             "native" if name == "written out" else "shared kernel",
@@ -50,16 +51,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ]
     rows += [*_symmetry_rows(until, compiled), *_load_rows(), *_trailer_rows(quick)]
     rows += [
-        aim(
+        Observed(
             f"braking_engines.speed.{steps}",
             SYSTEM,
             f"compiled truck on ice, slip bang-bang in the loop, samples of 5.5 ms in {steps} step(s), once",
             speed(steps),
             "times real time",
-            100.0,
-            "asked for; by the processor's time, which wanders",
-            "at least",
-        )
+        ).aim(100.0, "asked for; by the processor's time, which wanders", "at least")
         for steps in (1, 4)
     ]
     turns = {"compiled step": compiled, **beside}
@@ -90,30 +88,24 @@ def speed(steps: int) -> float:
 
 def _load_rows() -> list[Row]:
     rows = [
-        at_most(
+        Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
             SYSTEM,
             f"axle loads with the {name} locked",
             error,
             "relative",
-            1e-6,
-            "loads are solved with the forces that they allow, not lagged",
-            "closed form",
-        )
+        ).at_most(1e-6, "loads are solved with the forces that they allow, not lagged", "closed form")
         for name, error in transfer_errors().items()
     ]
     return [
         *rows,
-        at_most(
+        Observed(
             "braking_engines.locked-front",
             SYSTEM,
             "lateral way of a truck with steered, locked front wheels",
             abs(sideways_with_locked_front_wheels()),
             "m",
-            1e-3,
-            "a locked wheel's force is against its way, wherever it points",
-            "closed form",
-        ),
+        ).at_most(1e-3, "a locked wheel's force is against its way, wherever it points", "closed form"),
     ]
 
 
@@ -121,26 +113,16 @@ def _symmetry_rows(until: float, steered: Turned) -> list[Row]:
     mirrored, straight = turn(until, -STEER), turn(until, 0.0)
     apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
     return [
-        at_most(
-            "braking_engines.mirror",
-            SYSTEM,
-            "mirrored turn beside the turn",
-            apart,
-            "m, rad",
-            1e-9,
-            "left and right differ by rounding alone",
-            "closed form",
+        Observed("braking_engines.mirror", SYSTEM, "mirrored turn beside the turn", apart, "m, rad").at_most(
+            1e-9, "left and right differ by rounding alone", "closed form"
         ),
-        at_most(
+        Observed(
             "braking_engines.no_yaw",
             SYSTEM,
             "yaw and lateral way without steering on equal friction",
             abs(straight.heading) + abs(straight.y),
             "m, rad",
-            0.0,
-            "equal forces have no moment",
-            "closed form",
-        ),
+        ).at_most(0.0, "equal forces have no moment", "closed form"),
     ]
 
 
@@ -155,29 +137,15 @@ def _trailer_rows(quick: bool) -> list[Row]:
     """Straight pull at 0.2 m/s; circle of 15 m at 0.5 m/s in the full share."""
     why = "wheels that only roll: low speed, stiff tyres"
     rows = [
-        at_most(
-            "braking_engines.pull",
-            SYSTEM,
-            "drawbar angle on a straight pull, relative",
-            straight_pull(),
-            "",
-            1e-4,
-            why,
-            "closed form",
-        )
+        Observed(
+            "braking_engines.pull", SYSTEM, "drawbar angle on a straight pull, relative", straight_pull(), ""
+        ).at_most(1e-4, why, "closed form")
     ]
     if not quick:
         rows += [
-            at_most(
-                f"braking_engines.circle_{name}",
-                SYSTEM,
-                f"radius of the {name} axle on a circle, relative",
-                off,
-                "",
-                1e-4,
-                why,
-                "closed form",
-            )
+            Observed(
+                f"braking_engines.circle_{name}", SYSTEM, f"radius of the {name} axle on a circle, relative", off, ""
+            ).at_most(1e-4, why, "closed form")
             for name, off in zip(("front", "rear"), circle(), strict=True)
         ]
     return rows

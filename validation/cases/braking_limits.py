@@ -23,7 +23,7 @@ from models.tyre.magic_formula import surface
 from validation.braking.five_phase_exact import exact_cycle
 from validation.braking.random_stops import random_stop
 from validation.common.grounds import allowing
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 
 TITLE = "Limits of braking: stops that finish, vehicles that fall or fold, slow ones, and what cannot be"
 SYSTEM: System = "anti-lock"
@@ -62,7 +62,9 @@ def _stops_row(ends: list[str]) -> Row:
         f"{len(ends)} random legal stops, {len(limits)} of which end by a limit of the vehicle: those that do not "
         f"finish: {'; '.join(wrong[:3])}"
     )
-    return within("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "", 0, 0, "asked for", "none")
+    return Observed("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "").within(
+        0, 0, "asked for", "none"
+    )
 
 
 def _scene(**tables: Any) -> Any:
@@ -98,17 +100,13 @@ def _jackknife_row() -> Row:
     kept = None if end is None or end.partial is None else end.partial.detail.states[:, 0, 2:]
     angle = 0.0 if kept is None else float(np.abs(np.diff(kept, axis=1)).max())
     told = "" if end is None or "jackknifes" not in end.reason else end.reason
-    return within(
+    return Observed(
         "braking_limits.jackknife",
         SYSTEM,
         f"largest angle of a hinge that is kept of a train that folds, limit 1 rad: {told}",
         angle if told else math.nan,
         "rad",
-        1.0,
-        0.02,
-        "a sample before the limit",
-        "closed form",
-    )
+    ).within(1.0, 0.02, "a sample before the limit", "closed form")
 
 
 def _roll_rows() -> list[Row]:
@@ -128,17 +126,9 @@ def _roll_rows() -> list[Row]:
     reason = "" if end is None else end.reason
     limit = float(reason.rpartition("limit ")[2]) if "rolls over" in reason else math.nan
     return [
-        within(
-            "braking_limits.roll_over",
-            SYSTEM,
-            f"limit at which a vehicle rolls over: {reason}",
-            limit,
-            "m/s^2",
-            GRAVITY * track / (2.0 * height),
-            0.005,
-            "g t / (2 h); printed to two digits",
-            "closed form",
-        ),
+        Observed(
+            "braking_limits.roll_over", SYSTEM, f"limit at which a vehicle rolls over: {reason}", limit, "m/s^2"
+        ).within(GRAVITY * track / (2.0 * height), 0.005, "g t / (2 h); printed to two digits", "closed form"),
         behaves(
             "braking_limits.roll_over.kept",
             SYSTEM,
@@ -156,16 +146,13 @@ def _slow_apply_row() -> Row:
     air, torques = still(chambers, 0.01), np.empty((5, 1))
     for _ in range(50):
         by_valves(np.full(1, SLOW), 0.01, air, chambers, of_wheels(LINE), torques)
-    return at_most(
+    return Observed(
         "braking_limits.slow_apply",
         SYSTEM,
         "pressure after 0.5 s of slow apply, by its law, less 1",
         float(air.pressure[0]) / (8.0 * -math.expm1(-0.5 / 1.2)) - 1.0,
         "",
-        1e-12,
-        "supply (1 - exp(-t / slow))",
-        "closed form",
-    )
+    ).at_most(1e-12, "supply (1 - exp(-t / slow))", "closed form")
 
 
 def _cycle_row() -> Row:
@@ -173,16 +160,13 @@ def _cycle_row() -> Row:
     frozen = Frozen(20.0, 16900.0, 0.5, 13.35, LINE, surface("snow"))
     period, _ = exact_cycle(frozen, ROLLING, ROLLING.slow)
     reached = limit_cycle(frozen, replace(ROLLING), 1e-4).period
-    return at_most(
+    return Observed(
         "braking_limits.cycle_from_rolling",
         SYSTEM,
         "period of the limit cycle that a rolling wheel reaches by a fast first application, by the exact one, less 1",
         reached / period - 1.0,
         "",
-        1e-4,
-        "the cycle does not know how it was begun",
-        "closed form",
-    )
+    ).at_most(1e-4, "the cycle does not know how it was begun", "closed form")
 
 
 def _yaw_row(speed: float) -> Row:
@@ -198,12 +182,13 @@ def _yaw_row(speed: float) -> Row:
         )
         return float(run(scene).detail.states[-1, 0, 2])
 
-    return within(
+    return Observed(
         f"braking_limits.yaw.{speed:g}",
         SYSTEM,
         f"yaw of a stop from {speed:g} m/s on split friction, steps of 20 ms by steps of 0.1 ms",
         yaw(1) / yaw(200),
         "",
+    ).within(
         1.0,
         0.05,
         "a long step of a slow vehicle is cut; by whole steps it yaws 1.4 to 5.2 times as far",

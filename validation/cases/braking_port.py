@@ -26,7 +26,7 @@ from models.systems.braking.run import run
 from models.systems.braking.scene import build
 from validation.braking import misbehaving_client
 from validation.common.grounds import allowing
-from validation.common.rows import Row, System, Table, aim, behaves, finding, not_run
+from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 
 TITLE = "The controller port: same bits on every way, and controllers that fail"
 SYSTEM: System = "anti-lock"
@@ -82,16 +82,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = _bits(ways, folder, 0.5 if quick else 4.0)
     costs = _costs(ways, folder, 5 if quick else 40)
     rows += [
-        finding(
+        Observed(
             f"braking_port.cost.{_id(name)}",
             SYSTEM,
             f"one exchange, {name}, 95 % interval {low:.1f} to {high:.1f}",
             cost,
             "us",
-            "",
-            f"median of rounds of {ROUND} in which all ways have their turn",
-            "none",
-        )
+        ).beside("", f"median of rounds of {ROUND} in which all ways have their turn", "none")
         for name, (cost, low, high) in costs.items()
     ]
     told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
@@ -288,14 +285,8 @@ def _fault_rows(one: dict[str, Any]) -> list[Row]:
             one["expected"],
             "named, at its sample, with the path until then",
         ),
-        aim(
-            f"{key}.seconds",
-            SYSTEM,
-            f"{one['kind']}: until the run has ended, once",
-            one["seconds"],
-            "s",
-            2.0 * TIMEOUT,
-            f"twice the time-out of {TIMEOUT:g} s",
+        Observed(f"{key}.seconds", SYSTEM, f"{one['kind']}: until the run has ended, once", one["seconds"], "s").aim(
+            2.0 * TIMEOUT, f"twice the time-out of {TIMEOUT:g} s"
         ),
     ]
 

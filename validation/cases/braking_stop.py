@@ -12,7 +12,7 @@ from models.brake.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
 from models.brake.surfaces import EVEN
 from models.tyre.magic_formula import SURFACES
 from validation.braking.quarter_stops import FRONT, PATIENCE, SCHEMES, STEP, exact, met, steady, stop, stopped
-from validation.common.rows import Row, System, Table, at_most, finding, within
+from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking to a stop"
 SYSTEM: System = "anti-lock"
@@ -90,40 +90,19 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     ours, _ = errors.pop("ours")
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
     rows = [
-        at_most(
-            f"{key}.distance",
-            SYSTEM,
-            f"{name}, 5.5 ms: stopping distance from rolling",
-            ours,
-            "",
-            BOUND,
-            why,
-            "closed form",
+        Observed(f"{key}.distance", SYSTEM, f"{name}, 5.5 ms: stopping distance from rolling", ours, "").at_most(
+            BOUND, why, "closed form"
         ),
-        at_most(
-            f"{key}.steady",
-            SYSTEM,
-            f"{name}, 5.5 ms: stopping distance at constant slip",
-            curve["steady"],
-            "",
-            1e-7,
-            "m v^2 / (2 F); exact in each step but the last, at rest",
-            "closed form",
-        ),
+        Observed(
+            f"{key}.steady", SYSTEM, f"{name}, 5.5 ms: stopping distance at constant slip", curve["steady"], ""
+        ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
     for scheme, (error, left) in errors.items():
         said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
         rows.append(
-            finding(
-                f"{key}.{scheme.split()[-1].lower()}",
-                SYSTEM,
-                f"{name}, 5.5 ms: {scheme}{said}",
-                100.0 * error,
-                "%",
-                f"{100.0 * ours:.1e} % of ours",
-                "the same vehicle, torque and table",
-                "closed form",
-            )
+            Observed(
+                f"{key}.{scheme.split()[-1].lower()}", SYSTEM, f"{name}, 5.5 ms: {scheme}{said}", 100.0 * error, "%"
+            ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
         )
     return rows
 
@@ -133,16 +112,13 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
     tyre, _ = both = met(on)
     torque = steady(quarter, tyre, slip)[1]
     error = stop(quarter, both, torque, speed).distance / exact(quarter, tyre, torque, speed) - 1.0
-    return at_most(
+    return Observed(
         f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
         f"{name} ({on}, {100 * slip:g} % slip, {speed:g} m/s), 5.5 ms: stopping distance",
         error,
         "",
-        BOUND,
-        "as the four above",
-        "closed form",
-    )
+    ).at_most(BOUND, "as the four above", "closed form")
 
 
 def faults_of(found: Stop, radius: float, brakes: bool) -> list[str]:
@@ -177,16 +153,8 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
         f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
     )
-    return within(
-        "braking_stop.sweep",
-        SYSTEM,
-        what.removesuffix(": "),
-        len(wrong),
-        "runs",
-        0,
-        0,
-        "asked for: v = 0 exactly at the end, and less than 1 mm/s after it",
-        "none",
+    return Observed("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs").within(
+        0, 0, "asked for: v = 0 exactly at the end, and less than 1 mm/s after it", "none"
     )
 
 
@@ -197,16 +165,13 @@ def _locked_row() -> Row:
         torque = 2.0 * FRONT.mass * GRAVITY * FRONT.radius * float(tyre[0].mu_x.max())
         way = stop(FRONT, tyre, torque, 11.11, turning=0.0).distance
         errors.append(abs(way * 2.0 * GRAVITY * float(tyre[0].mu_x[0, 0, -1]) / 11.11**2 - 1.0))
-    return at_most(
+    return Observed(
         "braking_stop.locked",
         SYSTEM,
         f"locked wheels on {len(SURFACES)} surfaces: stopping distance against v^2 / (2 mu g)",
         max(errors),
         "",
-        1e-9,
-        "asked for",
-        "closed form",
-    )
+    ).at_most(1e-9, "asked for", "closed form")
 
 
 def _release_row() -> Row:
@@ -217,33 +182,26 @@ def _release_row() -> Row:
         times = step * np.arange(math.ceil(0.8 / step) + 1)
         found = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
         errors.append(abs(found.released - 0.5 * 0.8037))
-    return at_most(
+    return Observed(
         "braking_stop.release",
         SYSTEM,
         f"locked wheels on {len(SURFACES)} surfaces under a torque that "
         "falls, steps of 1, 5.5 and 20 ms: time at which they turn again",
         max(errors),
         "s",
-        1e-3,
-        "asked for: the time at which torque falls to that of sliding",
-        "closed form",
-    )
+    ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
 
 
 def _friction_row(levels: int) -> Row:
     torque = 3.0 * FRONT.mass * GRAVITY * FRONT.radius
     ways = [stop(FRONT, met("ice", float(scale)), torque, 11.11).distance for scale in np.geomspace(0.3, 8.0, levels)]
-    return within(
+    return Observed(
         "braking_stop.friction",
         SYSTEM,
         f"{levels} levels of friction, brakes beyond lock: those at which the stopping distance does not fall",
         sum(b >= a for a, b in pairwise(ways)),
         "",
-        0,
-        0,
-        "asked for",
-        "none",
-    )
+    ).within(0, 0, "asked for", "none")
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

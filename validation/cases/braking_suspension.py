@@ -18,7 +18,7 @@ from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable
 from validation.braking.sprung_box import LOCKS, box, braked, car, constant, pitch_and_transfer, stays, steady
-from validation.common.rows import Row, System, Table, aim, at_most, finding, within
+from validation.common.rows import Observed, Row, System, Table
 
 TITLE = "Braking on the suspension"
 SYSTEM: System = "anti-lock"
@@ -68,47 +68,32 @@ def _locked_rows(mu: float) -> list[Row]:
         moment = plane.mass * GRAVITY * (mu * plane.height + (plane.height - plane.front.radius) * pitch)
         weight = float(path.reports[late, :, LOAD].sum()) / (plane.mass * GRAVITY)
         found += [
-            at_most(
+            Observed(
                 f"braking_suspension.locked.{place}",
                 SYSTEM,
                 f"stopping distance of the {name}, wheels locked, mu = {mu:g}, beside v^2 / (2 mu g)",
                 abs(way / exact - 1.0),
                 "relative",
-                1e-3,
-                "wheels take v / r in J v / (r T) to lock; the centre of mass leans ahead of them",
-                "closed form",
+            ).at_most(
+                1e-3, "wheels take v / r in J v / (r T) to lock; the centre of mass leans ahead of them", "closed form"
             ),
-            at_most(
+            Observed(
                 f"braking_suspension.transfer.{place}",
                 SYSTEM,
                 f"load transfer of the {name} beside m a h / L and its weight that leans",
                 abs(gained * plane.wheelbase / moment - 1.0),
                 "relative",
-                2e-2 if mu == HARD else 2e-3,
-                "pitch takes the weight forwards, and wheels less",
-                "closed form",
-            ),
-            within(
-                f"braking_suspension.weight.{place}",
-                SYSTEM,
-                "loads by the weight, late in braking",
-                weight,
-                "",
-                1.0,
-                1e-4,
-                "the body has come to rest on its springs",
-                "closed form",
-            ),
-            at_most(
+            ).at_most(2e-2 if mu == HARD else 2e-3, "pitch takes the weight forwards, and wheels less", "closed form"),
+            Observed(
+                f"braking_suspension.weight.{place}", SYSTEM, "loads by the weight, late in braking", weight, ""
+            ).within(1.0, 1e-4, "the body has come to rest on its springs", "closed form"),
+            Observed(
                 f"braking_suspension.stays.{place}",
                 SYSTEM,
                 f"speed of the {name} and its rims 2 s after the stop",
                 stays(vehicle, path),
                 "m/s",
-                1e-3,
-                "what stands has no slip, and friction holds it",
-                "closed form",
-            ),
+            ).at_most(1e-3, "what stands has no slip, and friction holds it", "closed form"),
         ]
         if name == "box":
             found += _pitch_rows(mu, pitch, gained)
@@ -118,16 +103,13 @@ def _locked_rows(mu: float) -> list[Row]:
 def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
     exact, bound = pitch_and_transfer(mu * GRAVITY), 2e-2 if mu == HARD else 2e-3
     return [
-        at_most(
+        Observed(
             f"braking_suspension.{what}.box.{mu:g}",
             SYSTEM,
             f"{what} of the box beside springs in series and the weight that leans",
             abs(value / theory - 1.0),
             "relative",
-            bound,
-            "closed form to first order in the pitch angle",
-            "closed form",
-        )
+        ).at_most(bound, "closed form to first order in the pitch angle", "closed form")
         for what, value, theory in zip(("pitch", "axle-loads"), (pitch, gained), exact, strict=True)
     ]
 
@@ -135,16 +117,9 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
 def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
     apart = np.abs(turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
     return [
-        at_most(
-            "braking_suspension.mirror",
-            SYSTEM,
-            "mirrored J-turn of the car beside the J-turn",
-            float(apart),
-            "m, rad",
-            1e-9,
-            "left and right differ by rounding alone",
-            "closed form",
-        )
+        Observed(
+            "braking_suspension.mirror", SYSTEM, "mirrored J-turn of the car beside the J-turn", float(apart), "m, rad"
+        ).at_most(1e-9, "left and right differ by rounding alone", "closed form")
     ]
 
 
@@ -152,42 +127,29 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
     """At 1 ms."""
     ends = [drive(car(), wet, 0.05, HARDER, 15.0, engine, 1e-3).states[-1, 0, :2] for engine in ("mujoco", "exudyn")]
     return [
-        at_most(
+        Observed(
             "braking_suspension.engines",
             SYSTEM,
             "end of a braked turn, Exudyn beside MuJoCo at 1 ms",
             float(np.hypot(*(ends[1] - ends[0]))),
             "m",
-            5e-3,
-            "the same forces around two multibody codes",
-            "shared kernel",
-        )
+        ).at_most(5e-3, "the same forces around two multibody codes", "shared kernel")
     ]
 
 
 def _order_rows(wet: TyreTable) -> list[Row]:
     ways = [drive(car(), wet, 0.05, HARDER, 10.0, substeps=n).states[-1, 0, 0] for n in (1, 4, 16)]
     return [
-        at_most(
+        Observed(
             "braking_suspension.step",
             SYSTEM,
             "stopping distance of a braked turn at 5.5 ms beside 0.34 ms",
             abs(float(ways[0] / ways[2] - 1.0)),
             "relative",
-            5e-4,
-            "order two",
-            "none",
-        ),
-        finding(
-            "braking_suspension.substeps",
-            SYSTEM,
-            "the same at 1.4 ms",
-            abs(float(ways[1] / ways[2] - 1.0)),
-            "relative",
-            5e-4,
-            "four substeps, as a scene has them",
-            "none",
-        ),
+        ).at_most(5e-4, "order two", "none"),
+        Observed(
+            "braking_suspension.substeps", SYSTEM, "the same at 1.4 ms", abs(float(ways[1] / ways[2] - 1.0)), "relative"
+        ).beside(5e-4, "four substeps, as a scene has them", "none"),
     ]
 
 
@@ -200,26 +162,20 @@ def _ice_rows() -> list[Row]:
     ]
     ways = [stop.of_vehicle()["stopping distance [m]"] for stop in stops]
     return [
-        at_most(
+        Observed(
             "braking_suspension.ice.locks",
             SYSTEM,
             "longest lock above 15 km/h on ice, slip bang-bang",
             float(stops[0].locks().longest.max()),
             "s",
-            0.1,
-            "the controller holds the wheels",
-            "none",
-        ),
-        finding(
+        ).at_most(0.1, "the controller holds the wheels", "none"),
+        Observed(
             "braking_suspension.ice.distance",
             SYSTEM,
             "stopping distance on ice beside the plane vehicle's",
             abs(ways[0] / ways[1] - 1.0),
             "relative",
-            0.05,
-            "single runs on ice scatter",
-            "none",
-        ),
+        ).beside(0.05, "single runs on ice scatter", "none"),
     ]
 
 
@@ -242,12 +198,13 @@ def _speed_row(wet: TyreTable) -> Row:
     vehicle, controller = braked(car(), wet, substeps=4, gradient=150.0), _Timed(SlipBangBang(wheels=4))
     vehicle.run(controller, 15.0, 2.0)
     speed = vehicle.sample / float(np.nanquantile(controller.seconds, 0.1))
-    return aim(
+    return Observed(
         "braking_suspension.speed",
         SYSTEM,
         "the car in MuJoCo at four substeps, by the time on the wall, once",
         speed,
         "times real time",
+    ).aim(
         20.0,
         "all of a sample is one call of compiled code, which calls MuJoCo; the swiftest tenth of samples",
         "at least",
@@ -268,16 +225,13 @@ def limit(tyre: TyreTable) -> list[list[float]]:
 
 def _limit_rows(ends: list[list[float]]) -> list[Row]:
     return [
-        at_most(
+        Observed(
             "braking_suspension.limit",
             SYSTEM,
             "how far the box ends a J-turn from the plane vehicle, springs 100 times as stiff by the plain ones",
             ends[-1][1] / ends[0][1],
             "",
-            0.05,
-            "stiff springs are the plane vehicle with algebraic load transfer",
-            "shared kernel",
-        )
+        ).at_most(0.05, "stiff springs are the plane vehicle with algebraic load transfer", "shared kernel")
     ]
 
 

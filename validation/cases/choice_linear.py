@@ -12,7 +12,7 @@ from models.advice.ride_choice.screen import Screen, confirmed
 from models.core.systems import load
 from models.systems.ride.reduced_scene import Effect, without
 from validation.choice.judged import asked, changes_by_frequency, measured_step, worst_nearby
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.drawn_rides import Drawn, drawn
 
 SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "ride_choice.toml"
@@ -98,17 +98,13 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
     second = [one for one in found if one.by_frequency is not None]
     gap = max(float(abs(one.by_frequency - one.choice.confirmed).max()) for one in second)
     return [
-        within(
+        Observed(
             "choice_linear.kept",
             SYSTEM,
             f"share of {len(found)} random scenes whose tolerance is kept after confirmation",
             share,
             "",
-            1.0,
-            0.05,
-            "asked: 95 of 100",
-            "none",
-        ),
+        ).within(1.0, 0.05, "asked: 95 of 100", "none"),
         behaves(
             "choice_linear.honest",
             SYSTEM,
@@ -118,16 +114,13 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
             "never reported as kept when it is not",
             "native",
         ),
-        at_most(
+        Observed(
             "choice_linear.frequency",
             SYSTEM,
             f"confirmed changes against sums over frequencies of M, D, K with singular mass, {len(second)} scenes",
             gap,
             "",
-            1e-3,
-            "what the frequency grid leaves",
-            "native",
-        ),
+        ).at_most(1e-3, "what the frequency grid leaves", "native"),
     ]
 
 
@@ -137,12 +130,13 @@ def _prediction_row(found: list[Judged]) -> Row:
     told = (abs(confirmed_) > TOLD[0]) & (abs(confirmed_) < TOLD[1])
     ratios = predicted[told] / confirmed_[told]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
-    return within(
+    return Observed(
         "choice_linear.predictions",
         SYSTEM,
         f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones",
         share,
         "",
+    ).within(
         1.0,
         0.05,
         "asked: within a factor of 2; where two larger changes cancel, what is left cannot be told that well",
@@ -151,17 +145,14 @@ def _prediction_row(found: list[Judged]) -> Row:
 
 
 def _identity_row(found: list[Judged]) -> Row:
-    return at_most(
+    return Observed(
         "choice_linear.identity",
         SYSTEM,
         "variance of what is left by the whole scene's covariance and the "
         "reduced adjoint, against the reduced covariance, worst of all scenes",
         max(one.identity for one in found),
         "",
-        1e-12,
-        "asked; an identity",
-        "closed form",
-    )
+    ).at_most(1e-12, "asked; an identity", "closed form")
 
 
 def _equal_rows(found: list[Judged]) -> list[Row]:
@@ -170,7 +161,7 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
     gaps = [abs(one.saving / one.measured - 1.0) for one in found]
     saving = [one for one in found if one.choice.left_out]
     return [
-        at_most(
+        Observed(
             "choice_linear.nearby",
             SYSTEM,
             f"largest change by the tolerance, {len(saving)} of {len(found)} "
@@ -178,27 +169,22 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
             "stiffness and damping up to 5 % off at random",
             max(one.nearby for one in found),
             "",
-            1.0,
-            "the tolerance holds nearby, too, or nothing is left out",
-            "native",
-        ),
-        at_most(
+        ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
+        Observed(
             "choice_linear.said",
             SYSTEM,
             f"share of {len(found)} scenes in which all that could go was refused, with its reason",
             told / len(found),
             "",
-            0.1,
-            "asked: at most a tenth",
-            "none",
-        ),
-        at_most(
+        ).at_most(0.1, "asked: at most a tenth", "none"),
+        Observed(
             "choice_linear.equal_accuracy",
             SYSTEM,
             "saving in calls at equal accuracy as it is printed, against "
             f"the covariance of what runs sample, worst of {len(saving)} scenes",
             max(gaps),
             "",
+        ).at_most(
             0.05,
             "asked; "
             "standard deviations within the tolerance of the whole scene's exact ones, by what is left out and by "
@@ -219,17 +205,14 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
 
 def _saving_row(found: list[Judged]) -> Row:
     saved = [one.saving for one in found if one.scene.tolerance == TOLERANCE]
-    return finding(
+    return Observed(
         "choice_linear.saving",
         SYSTEM,
         "calls at equal accuracy, whole scene by what is left, median of "
         f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
         float(np.median(saved)),
         "times",
-        "",
-        "it depends on what is asked of which vehicle: a wheel's force needs the wheel",
-        "none",
-    )
+    ).beside("", "it depends on what is asked of which vehicle: a wheel's force needs the wheel", "none")
 
 
 def _paper() -> Chooser:
@@ -263,17 +246,9 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
             f"together they change body acceleration by {100 * both[0]:.2f} %",
             "none",
         ),
-        within(
-            "choice_linear.pair.step",
-            SYSTEM,
-            "step limit with both left out, by the whole scene's",
-            step,
-            "times",
-            691 / 24,
-            0.6,
-            "published: 691 1/s fall to 24 1/s, as far as these digits go",
-            "published",
-        ),
+        Observed(
+            "choice_linear.pair.step", SYSTEM, "step limit with both left out, by the whole scene's", step, "times"
+        ).within(691 / 24, 0.6, "published: 691 1/s fall to 24 1/s, as far as these digits go", "published"),
     ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}
 
 
@@ -287,25 +262,12 @@ def _activity_rows() -> list[Row]:
     rest = chooser.wholes[0].reduced(without(chooser.scene, [locked]))
     change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
-        finding(
-            "choice_linear.activity",
-            SYSTEM,
-            "share of energy activity that the body's pitch inertia holds",
-            share,
-            "",
-            0.16,
-            "published ranking, of a road whose details differ",
-        ),
-        at_most(
-            "choice_linear.activity.misleads",
-            SYSTEM,
-            "change of body acceleration with pitch locked",
-            change,
-            "",
-            1e-12,
-            "a symmetric body bounces without pitch, however active that is",
-            "closed form",
-        ),
+        Observed(
+            "choice_linear.activity", SYSTEM, "share of energy activity that the body's pitch inertia holds", share, ""
+        ).beside(0.16, "published ranking, of a road whose details differ"),
+        Observed(
+            "choice_linear.activity.misleads", SYSTEM, "change of body acceleration with pitch locked", change, ""
+        ).at_most(1e-12, "a symmetric body bounces without pitch, however active that is", "closed form"),
     ]
 
 

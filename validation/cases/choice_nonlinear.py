@@ -11,7 +11,7 @@ from models.core.errors import InputError
 from validation.choice.drawn_scenes import drawn
 from validation.choice.judged import JudgedByRuns, judged_of
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.ride.drawn_rides import COPIES, Bent, drawn_bent
 
 TITLE = "Effects that a scene run in time calls for, chosen by runs and confirmed"
@@ -76,27 +76,16 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _kept(found: list[JudgedByRuns]) -> list[Row]:
     kept = float(np.mean([one.choice.kept and one.honest for one in found]))
     return [
-        within(
-            "choice_nonlinear.kept",
-            SYSTEM,
-            f"share of {len(found)} random scenes whose tolerance is kept",
-            kept,
-            "",
-            1.0,
-            0.05,
-            "asked: at least 95 of 100",
-            "none",
-        ),
-        at_most(
+        Observed(
+            "choice_nonlinear.kept", SYSTEM, f"share of {len(found)} random scenes whose tolerance is kept", kept, ""
+        ).within(1.0, 0.05, "asked: at least 95 of 100", "none"),
+        Observed(
             "choice_nonlinear.honest",
             SYSTEM,
             "choices reported as kept that two more runs find broken",
             float(sum(not one.honest for one in found)),
             "",
-            0.0,
-            "asked: never",
-            "none",
-        ),
+        ).at_most(0.0, "asked: never", "none"),
     ]
 
 
@@ -129,8 +118,10 @@ def _predictions(found: list[JudgedByRuns], quick: bool) -> Row:
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
     said = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
     if quick:  # too few for a share
-        return finding(name, SYSTEM, said, share, "", "1 within 0.05", f"{asked}; judged in the full share", "none")
-    return within(name, SYSTEM, said, share, "", 1.0, 0.05, asked, "none")
+        return Observed(name, SYSTEM, said, share, "").beside(
+            "1 within 0.05", f"{asked}; judged in the full share", "none"
+        )
+    return Observed(name, SYSTEM, said, share, "").within(1.0, 0.05, asked, "none")
 
 
 def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
@@ -140,36 +131,27 @@ def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
     name = f"choice_nonlinear.saving.{system}"
     note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
     return [
-        aim(
+        Observed(
             name,
             SYSTEM,
             f"calls saved, median of {len(own)} scenes of {system}",
             float(np.median(calls[:, 0] / calls[:, 2])),
             "times",
-            5.0,
-            note,
-            "at least",
-        ),
-        finding(
+        ).aim(5.0, note, "at least"),
+        Observed(
             f"{name}.step",
             SYSTEM,
             "the same by longer steps alone, with all effects",
             float(np.median(calls[:, 0] / calls[:, 1])),
             "times",
-            "",
-            "what is left is due to effects",
-            "none",
-        ),
-        finding(
+        ).beside("", "what is left is due to effects", "none"),
+        Observed(
             f"{name}.seconds",
             SYSTEM,
             "CPU seconds saved, each run once, median of the scenes",
             float(np.median(seconds[:, 0] / seconds[:, 2])),
             "times",
-            "",
-            "of calls, and of what a call takes",
-            "none",
-        ),
+        ).beside("", "of calls, and of what a call takes", "none"),
     ]
 
 

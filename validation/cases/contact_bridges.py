@@ -22,7 +22,7 @@ from models.engines.mujoco_callback import installed
 from models.machine.compiled import njit
 from models.machine.stack import start
 from models.machine.timing import interleave, median, spelled
-from validation.common.rows import Row, System, Table, aim, at_most, behaves
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.contact import slow_wheels
 
 TITLE = "What a contact kernel costs inside an engine"
@@ -241,7 +241,7 @@ def _price_rows(prices: Prices) -> list[Row]:
             f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
             f"{spelled(step, 1e6)} us), {what}, 95 % interval {low:.3f} to {high:.3f}"
         )
-        rows.append(aim(name, SYSTEM, what, value, "", bound, WHY))
+        rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, WHY))
     return rows
 
 
@@ -271,16 +271,13 @@ def _agreement_row() -> Row:
     other = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size
     scale = np.repeat([np.abs(path[:, :size]).max(), np.abs(path[:, size:]).max()], size)
-    return at_most(
+    return Observed(
         "contact_bridges.agreement",
         SYSTEM,
         "state after 0.1 s with FASTSIM in MuJoCo beside Exudyn, by the largest displacement or rate",
         float((np.abs(path[-1] - other) / scale).max()),
         "",
-        1e-10,
-        "the same kernel and method; what differs is rounding",
-        "shared kernel",
-    )
+    ).at_most(1e-10, "the same kernel and method; what differs is rounding", "shared kernel")
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

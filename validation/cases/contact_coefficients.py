@@ -17,7 +17,7 @@ from models.contact.normal_problem import centres
 from models.contact.rolling_operator import FreeSystem, SlipOperator
 from models.contact.rolling_problem import rigid_slip
 from models.core.errors import RunFailed
-from validation.common.rows import Row, System, Table, at_most, behaves
+from validation.common.rows import Observed, Row, System, Table, behaves
 
 TITLE = "Creepage and spin coefficients of the linear theory"
 SYSTEM: System = "contact"
@@ -116,17 +116,14 @@ def _node_rows(nodes: Array) -> list[Row]:
 
 def _worst(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row:
     ratio, nu = nodes[int(off.argmax()), :2]
-    return at_most(
+    return Observed(
         f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
         SYSTEM,
         f"{name} of the published table against the exact theory, {where}: worst of {len(off)}, at "
         f"{ratio:.4g}, nu {nu:g}",
         float(off.max()),
         "",
-        bound,
-        WHY,
-        "published",
-    )
+    ).at_most(bound, WHY, "published")
 
 
 def _misprint(nodes: Array) -> Row:
@@ -154,16 +151,13 @@ def _between_rows(between: Array, nodes: Array) -> list[Row]:
     spans = {"ratios": slice(0, count), "nu": slice(count, None)}
     why = "1 % is asked; the deviation of the nodes on both sides is taken off"
     return [
-        at_most(
+        Observed(
             f"contact_coefficients.between.{span}.{name}",
             SYSTEM,
             f"{name} half-way between tabulated {span}: error of the interpolation, worst",
             float(off[part, i].max()),
             "",
-            0.01,
-            why,
-            "native",
-        )
+        ).at_most(0.01, why, "native")
         for span, part in spans.items()
         for i, name in enumerate(NAMES)
     ]
@@ -183,16 +177,9 @@ def _beyond_rows(beyond: Array) -> list[Row]:
         ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, own),
     ]
     return [
-        at_most(
-            f"contact_coefficients.{place}",
-            SYSTEM,
-            f"{what} against the exact theory, worst",
-            float(values.max()),
-            "",
-            bound,
-            why,
-            "native",
-        )
+        Observed(
+            f"contact_coefficients.{place}", SYSTEM, f"{what} against the exact theory, worst", float(values.max()), ""
+        ).at_most(bound, why, "native")
         for place, what, values, bound, why in parts
     ]
 

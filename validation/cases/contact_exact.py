@@ -13,7 +13,7 @@ from models.contact.normal_problem import NormalSolution, centres, hertzian, sol
 from models.contact.rolling_problem import RollingSolution, solve_rolling, solve_shift
 from models.core.errors import RunFailed
 from models.systems.contact.work_precision import Case
-from validation.common.rows import Row, System, Table, at_most, not_run, within
+from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 
 TITLE = "The exact theory of contact on cells"
@@ -61,7 +61,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def _row(name: str, words: str, value: float, bound: float, why: str, unit: str = "", side: Any = "closed form") -> Row:
-    return at_most(f"contact_exact.{name}", SYSTEM, words, value, unit, bound, why, side)
+    return Observed(f"contact_exact.{name}", SYSTEM, words, value, unit).at_most(bound, why, side)
 
 
 def pressed_by_hertz(ratio: float, cells: int) -> tuple[NormalSolution, Array]:
@@ -86,17 +86,13 @@ def _hertz_rows() -> list[Row]:
             _row(f"{name}.approach", f"{where}: approach", abs(narrow[0]), 2e-4, "of order 2"),
             _row(f"{name}.pressure", f"{where}: greatest pressure", abs(narrow[1]), 4e-4, "of order 2"),
             _row(f"{name}.area", f"{where}: area", abs(narrow[2]), 0.02, "to a part of the cells along its edge"),
-            within(
+            Observed(
                 f"contact_exact.{name}.order",
                 SYSTEM,
                 "order of the greatest pressure, 21 to 63 cells",
                 float(order[1]),
                 "",
-                2.0,
-                0.4,
-                "collocation at the middle of cells",
-                "closed form",
-            ),
+            ).within(2.0, 0.4, "collocation at the middle of cells", "closed form"),
             _row(
                 f"{name}.residual",
                 f"{where}: contact conditions unmet, by the displacement",
@@ -235,17 +231,9 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     order = float(np.log2(changes[0] / changes[-1]) / (len(changes) - 1))
     return [
         *rows,
-        within(
-            "contact_exact.order",
-            SYSTEM,
-            "order in the cells of the rolling forces, mean of the cases",
-            order,
-            "",
-            1.5,
-            0.6,
-            "2 where all slips, 1 where much sticks",
-            "none",
-        ),
+        Observed(
+            "contact_exact.order", SYSTEM, "order in the cells of the rolling forces, mean of the cases", order, ""
+        ).within(1.5, 0.6, "2 where all slips, 1 where much sticks", "none"),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from models.contact.hertz import Hertz, by_approach, by_load
 from models.contact.material import STEEL, Material, Pair
 from models.core.errors import InputError
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 
 TITLE = "Hertz: two smooth bodies touch on an ellipse"
 SYSTEM: System = "contact"
@@ -37,16 +37,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """
     errors = _errors((*RANGE, *NEAR_CIRCLE))
     rows = [
-        at_most(
+        Observed(
             f"contact_hertz.{name}",
             SYSTEM,
             f"{NAMES.get(name, name)}, axis ratios 1e-6 to 1e6: worst relative error",
             max(worst),
             "",
-            BOUND,
-            WHY,
-            "closed form",
-        )
+        ).at_most(BOUND, WHY, "closed form")
         for name, worst in errors.items()
     ]
     return rows + _published() + _behaviour(), {"ratio": [*RANGE, *NEAR_CIRCLE], "errors": errors}
@@ -124,39 +121,23 @@ def _published() -> list[Row]:
     touching, eight = (by_load(1 / 0.92, 1 / 0.6, load, Pair()) for load in (1e5, 8e5))
     why = "CONTACT, half-space solved on cells of 0.25 mm, that is 1/29 of an axis"
     return [
-        within(
+        Observed(
             "contact_hertz.contact.p0",
             SYSTEM,
             "largest pressure of a wheel on a rail, 100 kN",
             float(touching.p0),
             "Pa",
-            1.22674e9,
-            1e6,
-            why,
-            "native",
-        ),
-        within(
-            "contact_hertz.contact.approach",
-            SYSTEM,
-            "approach of the same",
-            float(touching.approach),
-            "m",
-            1.04996e-4,
-            1e-8,
-            why,
-            "native",
-        ),
-        within(
+        ).within(1.22674e9, 1e6, why, "native"),
+        Observed(
+            "contact_hertz.contact.approach", SYSTEM, "approach of the same", float(touching.approach), "m"
+        ).within(1.04996e-4, 1e-8, why, "native"),
+        Observed(
             "contact_hertz.scaling",
             SYSTEM,
             "axes at eight times the load, by the axes",
             float(eight.a / touching.a),
             "",
-            2.0,
-            1e-14,
-            "axes go with the cube root of the load",
-            "closed form",
-        ),
+        ).within(2.0, 1e-14, "axes go with the cube root of the load", "closed form"),
     ]
 
 

@@ -18,7 +18,7 @@ from models.systems.contact.cases_table import answer
 from models.systems.contact.run import Built
 from models.systems.contact.scene import Method
 from models.systems.contact.work_precision import Case, exact
-from validation.common.rows import Row, System, Table, aim, at_most, finding
+from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import FASTSIM, ROUNDING, SHARE, held, kept
 from validation.contact.contact_set import JUDGED, PAIR, POISSON, RATIOS, read, read_drawn, read_wide
 from validation.contact.programs import compare, table
@@ -74,16 +74,13 @@ def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
         now = exact(known[key], (20,) if quick else (40,))
         answers.append(float(np.linalg.norm(now.force - known[key].force)))
     return [
-        at_most(
+        Observed(
             "contact_price.reference",
             SYSTEM,
             f"exact forces computed anew against those kept, {len(answers)} cases, largest difference by mu N",
             max(answers),
             "",
-            REFERENCE[quick],
-            "what the cells leave uncertain after their first order is taken out",
-            "none",
-        )
+        ).at_most(REFERENCE[quick], "what the cells leave uncertain after their first order is taken out", "none")
     ]
 
 
@@ -100,7 +97,7 @@ def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
         ):
             for what, kind, within in zip(("force", "moment"), ("band", "moment"), kept(name, some), strict=True):
                 rows.append(
-                    at_most(
+                    Observed(
                         f"contact_price.{place}{kind}.{name.replace(' ', '-')}",
                         SYSTEM,
                         f"{name}: share "
@@ -108,10 +105,7 @@ def _band_rows(cases: list[Case], quick: bool) -> list[Row]:
                         f"with the {what}",
                         1 - within,
                         "",
-                        most,
-                        f"the band is meant to hold {SHARE:.0%}",
-                        "native",
-                    )
+                    ).at_most(most, f"the band is meant to hold {SHARE:.0%}", "native")
                 )
     return rows
 
@@ -127,17 +121,14 @@ def _total_rows(cases: list[Case]) -> list[Row]:
         stated.append((error.total, error.moment + ROUNDING * limit))
     beyond = np.array(off) > np.array(stated)
     return [
-        at_most(
+        Observed(
             f"contact_price.total.{what}.{nu:g}",
             SYSTEM,
             f"share of {np.count_nonzero(ratios == nu)} unseen "
             f"contacts of a/b 0.1 to 10 and Poisson's ratio {nu:g} whose {what} is off by more than is stated",
             float(beyond[ratios == nu, k].mean()),
             "",
-            1 - SHARE,
-            "what users read: 95 % are covered",
-            "native",
-        )
+        ).at_most(1 - SHARE, "what users read: 95 % are covered", "native")
         for k, what in enumerate(("force", "moment"))
         for nu in POISSON
     ]
@@ -157,18 +148,17 @@ def _moment_rows(cases: list[Case], unseen: list[Case], wide: list[Case]) -> lis
         lever = np.array([max(c.a, c.b) / np.sqrt(c.a * c.b) for c in some])
         error = held(f"blended {bound}", some).moment_error * lever
         for what, value, allowed in (("mean", error.mean(), mean), ("95 %", np.quantile(error, 0.95), most)):
-            given = (
+            observed = Observed(
                 f"contact_price.mz.{bound}.{place}.{what.split()[0]}",
                 SYSTEM,
                 f"{bound} bound, moment of {len(some)} contacts: {words}; {what} of the error",
                 float(value),
                 "mu N sqrt(ab)",
-                allowed,
             )
             rows.append(
-                aim(*given, SLENDER)
+                observed.aim(allowed, SLENDER)
                 if (bound, place) == ("elliptic", "wide")
-                else at_most(*given, "the exact theory, kept", "native")
+                else observed.at_most(allowed, "the exact theory, kept", "native")
             )
     return rows
 
@@ -181,7 +171,7 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
         name = ".".join([f"{cells}", *choices.values()])
         for what, value in zip(("force", "moment"), share, strict=True):
             rows.append(
-                at_most(
+                Observed(
                     f"contact_price.cells.{what}.{name}",
                     SYSTEM,
                     f"FASTSIM at {cells} cells"
@@ -189,10 +179,7 @@ def _cell_rows(cases: list[Case], quick: bool) -> list[Row]:
                     f"whose error of the cells in the {what} is beyond the stated one",
                     value,
                     "",
-                    1 - SHARE,
-                    "what users read: 95 % are covered",
-                    "native",
-                )
+                ).at_most(1 - SHARE, "what users read: 95 % are covered", "native")
             )
     return rows
 
@@ -214,15 +201,9 @@ def _program_rows(answers: dict[str, Any]) -> list[Row]:
     what = "contact and forces by the program of 1983, by the time of the one of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
     return [
-        finding(
-            "contact_price.programs.time",
-            SYSTEM,
-            f"{what}, 95 % interval {low:.3g} to {high:.3g}",
-            ratio,
-            "times",
-            "about 3",
-            why,
-        )
+        Observed(
+            "contact_price.programs.time", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", ratio, "times"
+        ).beside("about 3", why)
     ]
 
 
@@ -246,7 +227,9 @@ def _table_row(folder: Path) -> Row:
     out.unlink()
     assert answers == {"rows": ROWS, "wrong": 0}
     what = f"a CSV of {ROWS:,} contacts answered, with errors and status, once"
-    return finding("contact_price.table", SYSTEM, what, seconds, "s", "seconds", "reported and never gated", "none")
+    return Observed("contact_price.table", SYSTEM, what, seconds, "s").beside(
+        "seconds", "reported and never gated", "none"
+    )
 
 
 def tables(data: dict[str, Any]) -> list[Table]:

@@ -14,7 +14,7 @@ from models.contact.simplified_theory import press
 from models.contact.standard_profiles import s1002, uic60
 from models.contact.wheel_on_rail import Track, wheel_on_rail
 from models.core.errors import InputError
-from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 from validation.contact.contact_shapes import Shape, exact_normal
 
@@ -94,16 +94,13 @@ def _file_rows() -> list[Row]:
     wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
     off = {"S1002": wheel_off(wheel), "UIC60": rail_off(rail)}
     return [
-        at_most(
+        Observed(
             f"contact_profiles.{name}",
             SYSTEM,
             f"built-in {name}, largest distance from the benchmark's file",
             1e3 * value,
             "mm",
-            1e3 * NEAR,
-            "the figure set for the built-in profiles",
-            "published",
-        )
+        ).at_most(1e3 * NEAR, "the figure set for the built-in profiles", "published")
         for name, value in off.items()
     ]
 
@@ -138,50 +135,21 @@ def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
     flange = min(case["shift"] for case in cases if _main(case)["angle"] > 45.0)
     at5 = _main(by[5.0])
     return [
-        within(
-            "contact_profiles.flange",
-            SYSTEM,
-            "shift from which the flange carries the wheel",
-            flange,
-            "mm",
-            FLANGE,
-            0.25,
-            f"{BENCHMARK}; half of its steps",
-            "published",
-        ),
-        within(
-            "contact_profiles.jump_from",
-            SYSTEM,
-            "place of contact on the rail at 4.5 mm",
-            _main(by[4.5])["rail"],
-            "mm",
-            TWO_PATCHES["from"],
-            1.0,
-            f"{BENCHMARK}; where the patch is before it jumps",
-            "published",
-        ),
-        within(
-            "contact_profiles.jump_to",
-            SYSTEM,
-            "place of contact on the rail at 5 mm",
-            at5["rail"],
-            "mm",
+        Observed(
+            "contact_profiles.flange", SYSTEM, "shift from which the flange carries the wheel", flange, "mm"
+        ).within(FLANGE, 0.25, f"{BENCHMARK}; half of its steps", "published"),
+        Observed(
+            "contact_profiles.jump_from", SYSTEM, "place of contact on the rail at 4.5 mm", _main(by[4.5])["rail"], "mm"
+        ).within(TWO_PATCHES["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
+        Observed("contact_profiles.jump_to", SYSTEM, "place of contact on the rail at 5 mm", at5["rail"], "mm").within(
             TWO_PATCHES["to"],
             1.0,
             f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
             "published",
         ),
-        within(
-            "contact_profiles.places",
-            SYSTEM,
-            "places closer than 0.2 mm at 5 mm",
-            float(len(by[5.0]["places"])),
-            "",
-            2.0,
-            0.0,
-            "both ends of the jump",
-            "published",
-        ),
+        Observed(
+            "contact_profiles.places", SYSTEM, "places closer than 0.2 mm at 5 mm", float(len(by[5.0]["places"])), ""
+        ).within(2.0, 0.0, "both ends of the jump", "published"),
     ]
 
 
@@ -192,34 +160,23 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
         for case in cases
     )
     return [
-        at_most(
+        Observed(
             "contact_profiles.load",
             SYSTEM,
             "vertical sum of the patches' loads less the wheel's, at every shift",
             float(vertical),
             "N",
-            1e-6,
-            "patches share the load without loss",
-            "none",
-        ),
-        finding(
+        ).at_most(1e-6, "patches share the load without loss", "none"),
+        Observed(
             "contact_profiles.peak",
             SYSTEM,
             "peak pressure at 5 mm, exact, of the patch that carries most",
             by[5.0]["exact"],
             "MPa",
-            TWO_PATCHES["peak"],
-            BENCHMARK,
-        ),
-        finding(
-            "contact_profiles.flange_peak",
-            SYSTEM,
-            "peak pressure at 6.5 mm, exact",
-            by[FLANGE]["exact"],
-            "MPa",
-            "about 2600",
-            BENCHMARK,
-        ),
+        ).beside(TWO_PATCHES["peak"], BENCHMARK),
+        Observed(
+            "contact_profiles.flange_peak", SYSTEM, "peak pressure at 6.5 mm, exact", by[FLANGE]["exact"], "MPa"
+        ).beside("about 2600", BENCHMARK),
     ]
 
 

@@ -16,7 +16,7 @@ from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Option
 from models.contact.undeformed_distance import quadratic
 from models.machine.seconds import cost
 from models.machine.timing import interleave
-from validation.common.rows import Row, System, Table, at_most, finding
+from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_shapes import (
     CURVATURE,
     FRICTION,
@@ -173,46 +173,35 @@ def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
     worst = {key: max(abs(case[key]) for case in hertz.values()) for key in ("approach", "paper")}
     why = "the figure set for the theory; the closed form is Hertz's"
     rows = [
-        at_most(
+        Observed(
             f"contact_simplified.hertz.{key}",
             SYSTEM,
             f"largest error of the approach, B/A {HERTZ[0]:g} to "
             f"{HERTZ[-1]:g}, {'pressure to the letter of the paper' if key == 'paper' else 'default'}",
             100.0 * value,
             "%",
-            100.0 * APPROACH,
-            why,
-            "closed form",
-        )
+        ).at_most(100.0 * APPROACH, why, "closed form")
         for key, value in worst.items()
     ]
     circle = hertz["1"]
     rows += [
-        at_most(
+        Observed(
             f"contact_simplified.hertz_circle.{key}",
             SYSTEM,
             f"{key} of a circular contact",
             100.0 * abs(circle[key]),
             "%",
-            2.0,
-            "with Hertz's profile the theory contains the circle but for its net",
-            "closed form",
-        )
+        ).at_most(2.0, "with Hertz's profile the theory contains the circle but for its net", "closed form")
         for key in ("area", "peak")
     ]
     return rows
 
 
 def _jump_row(jump: float) -> Row:
-    return at_most(
-        "contact_simplified.continuity",
-        SYSTEM,
-        "largest jump of N(a3), lopsided contact",
-        jump,
-        "N",
-        JUMP,
-        "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory",
-        "none",
+    return Observed(
+        "contact_simplified.continuity", SYSTEM, "largest jump of N(a3), lopsided contact", jump, "N"
+    ).at_most(
+        JUMP, "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory", "none"
     )
 
 
@@ -222,42 +211,21 @@ def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
         place = "contact_simplified." + "_".join(re.findall(r"\w+", name))
         best = case["ways"]["elliptic"]
         rows.append(
-            at_most(
-                f"{place}.approach",
-                SYSTEM,
-                f"error of the approach, {name}",
-                100.0 * abs(best["approach"]),
-                "%",
-                100.0 * APPROACH,
-                FIGURE,
-                "native",
-            )
+            Observed(
+                f"{place}.approach", SYSTEM, f"error of the approach, {name}", 100.0 * abs(best["approach"]), "%"
+            ).at_most(100.0 * APPROACH, FIGURE, "native")
         )
         for key, what in (("area", "area"), ("peak", "peak pressure")):
             rows.append(
-                finding(
-                    f"{place}.{key}",
-                    SYSTEM,
-                    f"error of the {what}, {name}",
-                    100.0 * best[key],
-                    "%",
-                    0.0,
-                    ABOUT,
-                    "native",
+                Observed(f"{place}.{key}", SYSTEM, f"error of the {what}, {name}", 100.0 * best[key], "%").beside(
+                    0.0, ABOUT, "native"
                 )
             )
         asked = f"{case['rolling']} of {case['asked']} creepages"
         rows.append(
-            finding(
-                f"{place}.force",
-                SYSTEM,
-                f"mean error of the force, {name}, {asked}",
-                best["force"],
-                "% of mu N",
-                0.0,
-                ABOUT,
-                "native",
-            )
+            Observed(
+                f"{place}.force", SYSTEM, f"mean error of the force, {name}, {asked}", best["force"], "% of mu N"
+            ).beside(0.0, ABOUT, "native")
         )
     return rows
 
@@ -270,16 +238,13 @@ def _grown_rows(found: dict[str, dict[str, float]]) -> list[Row]:
         errors = {name: abs(case["each"]) for name, case in found.items() if name.startswith("S1002") == chosen}
         worst = max(errors, key=errors.__getitem__)
         rows.append(
-            at_most(
+            Observed(
                 f"contact_simplified.{place}.approach",
                 SYSTEM,
                 f"error of the approach, {len(errors)} {what}, worst: {worst}",
                 100.0 * errors[worst],
                 "%",
-                100.0 * APPROACH,
-                FIGURE,
-                "native",
-            )
+            ).at_most(100.0 * APPROACH, FIGURE, "native")
         )
     return rows
 
@@ -287,26 +252,21 @@ def _grown_rows(found: dict[str, dict[str, float]]) -> list[Row]:
 def _time_rows(times: dict[str, list[float]]) -> list[Row]:
     why = "the paper's program was written for one machine of 1983; compiled marches made FASTSIM alone much cheaper"
     return [
-        finding(
+        Observed(
             "contact_simplified.time.forces",
             SYSTEM,
             f"FASTSIM twice with the refit, {cost(times['roll'])}, by the 1982 program, {cost(times['1982'])}",
             _ratio(times, "roll", "1982"),
             "",
-            "about 3 with the contact, which contact_price compares",
-            why,
-        ),
-        finding(
+        ).beside("about 3 with the contact, which contact_price compares", why),
+        Observed(
             "contact_simplified.time.exact",
             SYSTEM,
             "the exact normal problem at the same fineness, "
             f"{cost(times['exact'])}, by this one, {cost(times['press'])}",
             _ratio(times, "exact", "press"),
             "",
-            "",
-            "what the theory saves",
-            "none",
-        ),
+        ).beside("", "what the theory saves", "none"),
     ]
 
 

@@ -22,7 +22,7 @@ from models.systems.pitch_plane.trust import ANGLE, Curve, interpolation, model,
 from models.systems.pitch_plane.virtual_measurement import PAPER, perturbed
 from models.vehicles.pitch_plane import Parameters
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "When a force-excited run drifts off, predicted before it starts"
@@ -154,7 +154,7 @@ def _row(found: Saved) -> Row:
         f"(half of them {scatter}) by the prediction {found['predicted']:.2f} s"
     )
     why = f"10 % is asked; the median lies in {found['low']:.2f} to {found['high']:.2f} s at 95 %"
-    return within(key, SYSTEM, what, found["median"] / found["predicted"], "", 1.0, 0.1, why, "closed form")
+    return Observed(key, SYSTEM, what, found["median"] / found["predicted"], "").within(1.0, 0.1, why, "closed form")
 
 
 def tables(data: Saved) -> list[Table]:

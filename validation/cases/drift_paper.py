@@ -10,7 +10,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.six_runs import followed, row
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Saved, System, Table, finding, within
+from validation.common.rows import CaseAnswer, Observed, Saved, System, Table
 from validation.common.scenes import on_paper_road
 
 TITLE = "The paper's six runs"
@@ -90,18 +90,19 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     scene = load(SCENE, QUICK if quick else ())
     found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
-        finding(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit, paper, why)
+        Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit).beside(paper, why)
         for name, which, what, words, unit, paper, why in FIGURES
         if found[which][what] is not None
     ]
     lacking = found["guided, perturbed"]
     rows.append(
-        within(
+        Observed(
             "drift.moment.ratio",
             SYSTEM,
             "enforced moment by inertia term, perturbed model alone",
             lacking["moment max"] / lacking["inertia max"],
             "",
+        ).within(
             0.052,
             0.003,
             "the model lacks 5 % of the inertia: A = -0.05 / 0.95 I beta'', plus what the start takes",
@@ -111,17 +112,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     rates = {} if quick else {rate: _at_rate(rate) for rate in RATES}
     if rates:
         rows.append(
-            within(
+            Observed(
                 "drift.moment.order",
                 SYSTEM,
                 "order in which the undisturbed moment falls with the period, 1000 to 2000 Hz",
                 log2(rates[1000.0]["moment max"] / rates[2000.0]["moment max"]),
                 "",
-                2.0,
-                0.2,
-                "linear interpolation errs by f'' T^2 / 8",
-                "closed form",
-            )
+            ).within(2.0, 0.2, "linear interpolation errs by f'' T^2 / 8", "closed form")
         )
     return rows, {
         "duration": scene.run.duration,

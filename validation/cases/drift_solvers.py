@@ -22,7 +22,7 @@ from models.fatigue.damage import damage_ratio
 from models.systems.pitch_plane.scene import assemble
 from models.systems.pitch_plane.trust import Curve
 from models.vehicles.pitch_plane_equations import suspension_loads
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, finding, within
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
 from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "What drift depends on: samples and noise, not solvers"
@@ -195,12 +195,13 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
         for one in own[1:]:
             solver = f"{one['engine']} {one['method']} {one['value']:g}"
             rows.append(
-                within(
+                Observed(
                     f"drift_solvers.{name}.{solver.replace(' ', '.')}",
                     SYSTEM,
                     f"drift-off of the {name} run by that of the first solver ({first:.2f} s), {solver}",
                     one["drift-off"] / first,
                     "",
+                ).within(
                     1.0,
                     LOOSE if one["value"] >= 1e-5 and one["method"] in ADAPTIVE else TIGHT,
                     "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
@@ -211,18 +212,14 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
     linear = solvers[0]["error"]
     return [
         *rows,
-        within(
+        Observed(
             "drift_solvers.interpolation",
             SYSTEM,
             "largest pitch error at the end by any accurate "
             "solver with samples joined by a spline, by that of the reference with straight lines",
             max(smooth) / linear,
             "",
-            0.0,
-            0.2,
-            "interpolation is what drifts",
-            "native",
-        ),
+        ).within(0.0, 0.2, "interpolation is what drifts", "native"),
     ]
 
 
@@ -232,24 +229,20 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
     for one in smoothing:
         key = one["name"].replace(" ", "-").replace(",", "")
         rows += [
-            within(
+            Observed(
                 f"drift_solvers.growth.{key}",
                 SYSTEM,
                 f"growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s, {one['name']}, by the closed law",
                 one["growth"] / one["law"],
                 "",
-                1.0,
-                0.1,
-                f"the same {PATHS} noise files in all; their own chance is 3 %",
-                "closed form",
-            )
+            ).within(1.0, 0.1, f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form")
         ]
         for axis, what in (
             ("f3z", f"damage of the front section force, body z, {one['name']}, no noise, by the truth's"),
             ("f3x", f"the same, body x, {one['name']}"),
         ):
             id, damage = f"drift_solvers.bias.{key}.{axis}", one[f"damage {axis}"]
-            rows.append(finding(id, SYSTEM, what, damage, "", "1", "what smoothing takes away", "none"))
+            rows.append(Observed(id, SYSTEM, what, damage, "").beside("1", "what smoothing takes away", "none"))
     return rows
 
 

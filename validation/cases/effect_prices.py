@@ -19,7 +19,7 @@ from validation.absence.hand_built_contact import ratio_of_contacts
 from validation.absence.machinery import ratio_of_wheelsets
 from validation.cases.absent import EFFECTS, ENGINES, STEP, change, changes, model, pair, scene, write_files
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, aim, at_most
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table
 
 TITLE = "What the machinery costs, and each effect"
 SYSTEM: System = "effects"
@@ -94,16 +94,13 @@ def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
         "machinery costs where no effect is named"
     )
     return [
-        at_most(
+        Observed(
             f"effect_prices.same.{engine}",
             SYSTEM,
             f"{engine}: states of a bare scene against a hand-built model",
             found["gap"],
             "m, rad, m/s, rad/s",
-            0.0,
-            "the same items in the same order give the same numbers",
-            "native",
-        ),
+        ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
         slower(
             f"effect_prices.ratio.{engine}",
             f"{engine}: time of a bare scene by that of a hand-built model whose result passes the same guard",
@@ -122,24 +119,21 @@ def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
 def slower(row: str, what: str, ratio: tuple[float, float, float], why: str) -> Row:
     """A ratio of seconds with its interval."""
     value, low, high = ratio
-    return aim(row, SYSTEM, f"{what}, 95 % interval {low:.3f} to {high:.3f}", value, "", DEAREST, why)
+    return Observed(row, SYSTEM, f"{what}, 95 % interval {low:.3f} to {high:.3f}", value, "").aim(DEAREST, why)
 
 
 def _wheelset(steps: int, quick: bool) -> list[Row]:
     """A free wheelset with linear creep on cones, against one that was written for that alone."""
     gap, ratio = ratio_of_wheelsets(steps, ROUNDS[quick])
     return [
-        at_most(
+        Observed(
             "effect_prices.same.wheelset",
             SYSTEM,
             "states of a bare wheelset, and its contact forces by their "
             "load, against one written out for linear creep on cones alone",
             gap,
             "m, rad, m/s, rad/s",
-            1e-11,
-            "the same equations, sums in another order",
-            "none",
-        ),
+        ).at_most(1e-11, "the same equations, sums in another order", "none"),
         slower(
             "effect_prices.ratio.wheelset",
             "time of a bare wheelset by that of the written one, whose path passes the same checks",
@@ -159,12 +153,13 @@ def _rides(quick: bool) -> list[Row]:
     for engine, steps in RIDES.items():
         gap, ratio = ratio_of_rides(engine, steps[quick], 3 if quick else ROUNDS[quick])
         rows += [
-            at_most(
+            Observed(
                 f"effect_prices.same.ride.{engine}",
                 SYSTEM,
                 f"{engine}: states of a bare ride against those of {WRITTEN[engine]}",
                 gap,
                 "m, rad, m/s, rad/s",
+            ).at_most(
                 1e-11,
                 "the same vehicle on the same road; forces are summed in another order",
                 "none" if engine == "reference" else "native",
@@ -187,17 +182,14 @@ def _cars(steps: int, quick: bool) -> list[Row]:
     """
     gap, ratio = ratio_of_cars(steps, ROUNDS[quick])
     return [
-        at_most(
+        Observed(
             "effect_prices.same.handling",
             SYSTEM,
             "MuJoCo: states of a bare car of a scene of handling against "
             "those of one written for its springs, bars, mounts and brush tyres alone",
             gap,
             "m, rad, m/s, rad/s",
-            1e-11,
-            "the same equations, sums in another order",
-            "native",
-        ),
+        ).at_most(1e-11, "the same equations, sums in another order", "native"),
         slower(
             "effect_prices.ratio.handling",
             "MuJoCo: time of a bare car of a scene of handling by that of the "
@@ -216,17 +208,14 @@ def _stops(quick: bool) -> list[Row]:
     """
     gap, ratio = ratio_of_stops(3.0 if quick else 10.0, ROUNDS[quick])
     return [
-        at_most(
+        Observed(
             "effect_prices.same.braking",
             SYSTEM,
             "states, wheels, forces and brakes of a bare stop against those "
             "of one written for a truck of fixed loads on one surface alone",
             gap,
             "m, rad, m/s, rad/s, shares",
-            1e-11,
-            "the same equations, sums in another order",
-            "none",
-        ),
+        ).at_most(1e-11, "the same equations, sums in another order", "none"),
         slower(
             "effect_prices.ratio.braking",
             "time of a bare stop by that of the written one",
@@ -241,16 +230,13 @@ def _contact(quick: bool) -> list[Row]:
     ``fastsim.speed.plain``."""
     gap, ratio = ratio_of_contacts(ROUNDS[quick])
     return [
-        at_most(
+        Observed(
             "effect_prices.same.contact",
             SYSTEM,
             "forces of FASTSIM on a bare ellipse, by friction times load, against one written out for that alone",
             gap,
             "",
-            1e-13,
-            "the same cells, sums in another order",
-            "none",
-        ),
+        ).at_most(1e-13, "the same cells, sums in another order", "none"),
         slower(
             "effect_prices.ratio.contact",
             "time of a call of FASTSIM on a bare ellipse by that of the written one",

@@ -16,7 +16,7 @@ from models.systems.pitch_plane.virtual_measurement import perturbed, write_whee
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import equilibrium
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.common.scenes import VEHICLES, drive, force_scene, on_paper_road
 
 TITLE = "Enforced moment of a prescribed pitch"
@@ -94,12 +94,13 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
         for engine, settings in BEST.items():
             route = "Lagrange multiplier" if engine == "exudyn" else "reduced model and inverse dynamics"
             rows.append(
-                at_most(
+                Observed(
                     f"moment.{engine}.{parameters}",
                     SYSTEM,
                     f"enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
                     relative(moment(scene, engine, settings), true),
                     "of its rms",
+                ).at_most(
                     BOUND,
                     f"the rms is {np.sqrt(np.mean(true**2)):.0f} N m; a second-order scheme leaves (2 pi f h)^2 / 12, "
                     "which is 2e-5 at 2.7 Hz and 1 ms",
@@ -112,16 +113,13 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
 def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
     """The eliminated form by a solver of another family, adaptive at a tolerance of 1e-11."""
     other = moment(scene, "reference", Settings("DOP853", PERIOD, DURATION, 1e-11))
-    return at_most(
+    return Observed(
         "moment.reference",
         SYSTEM,
         "uncertainty of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
         relative(other, true),
         "of its rms",
-        BOUND / 100,
-        "a hundredth of the bound that it has to judge",
-        "shared kernel",
-    )
+    ).at_most(BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
 
 
 def _ringing(folder: Path) -> CaseAnswer:
@@ -138,27 +136,25 @@ def _ringing(folder: Path) -> CaseAnswer:
         paths[f"consistent start, spectral radius {radius}"] = consistent[first].tolist()
     peak = {name: float(np.abs(path).max()) for name, path in paths.items() if name != "time"}
     rows = [
-        finding(
+        Observed(
             "moment.ringing",
             SYSTEM,
             "largest error of Exudyn's multiplier in the first 0.1 s, left to its own initial accelerations, "
             f"spectral radius 0.6 (0.9: {peak['inconsistent start, spectral radius 0.9']:.0f} N m)",
             peak["inconsistent start, spectral radius 0.6"],
             "N m",
+        ).beside(
             "rings and dies out",
             "Exudyn starts without the constraint's own acceleration, I beta'' = 2,221 N m here",
             "native",
         ),
-        at_most(
+        Observed(
             "moment.consistent",
             SYSTEM,
             "the same with the accelerations that belong to the pitch",
             peak["consistent start, spectral radius 0.6"],
             "N m",
-            2.221,
-            "a thousandth of the moment that the start demands",
-            "native",
-        ),
+        ).at_most(2.221, "a thousandth of the moment that the start demands", "native"),
     ]
     return rows, paths
 
@@ -185,12 +181,13 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
             settings = Settings(best.integrator, step, ROUGH, spectral_radius=best.spectral_radius)
             table.append([engine, best.integrator, step, relative(moment(scene, engine, settings)[20:], true[20:])])
     rows = [
-        finding(
+        Observed(
             f"moment.rough.{engine}",
             SYSTEM,
             f"the same on the study road at 1 ms, {engine}, perturbed model",
             next(row[3] for row in table if row[0] == engine and row[2] == STEP),
             "of its rms",
+        ).beside(
             BOUND,
             "40 Hz of roughness at 1 ms: (2 pi f h)^2 / 12 is 5e-3 of I beta'', twenty times the moment; the "
             "table shows the step that it takes",

@@ -17,7 +17,7 @@ from models.ensemble.workers import processes
 from models.systems.pitch_plane.noise_paths import NoisePaths, gap, mujoco_threads, noise_paths
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import drive, force_scene
 
 TITLE = "Noise paths by the thousand"
@@ -86,17 +86,13 @@ def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
     """Path 7 is the scene that names it."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - found["states"][7]).max())
-    return within(
+    return Observed(
         "ensemble.path",
         SYSTEM,
         "path 7 of the ensemble against the scene with path = 7, any state",
         worst,
         "m, rad, m/s, rad/s",
-        0.0,
-        0.0,
-        "the same samples through the same march: the same bits",
-        "shared kernel",
-    )
+    ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
 def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
@@ -223,10 +219,13 @@ def _scale_rows(large: Saved) -> list[Row]:
         ),
     )
     steps, failed, kept = (
-        within(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit, expected, 0.0, why, "none")
+        Observed(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit).within(expected, 0.0, why, "none")
         for id, words, value, unit, expected, why in counted
     )
-    aims = [aim(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", *rest) for id, words, *rest in aimed]
+    aims = [
+        Observed(f"ensemble.scale.{id}", SYSTEM, f"{what}: {words}", value, unit).aim(bound, why)
+        for id, words, value, unit, bound, why in aimed
+    ]
     return [steps, failed, *aims, kept]
 
 
@@ -248,15 +247,8 @@ def _engines(
         prices[way] = (time.perf_counter() - start) / (count * (len(truth) - 1))
         what = f"{count} of the reference's paths in {way}: any state before drift-off, by the largest"
         rows.append(
-            at_most(
-                f"ensemble.engines.{_slug(way)}",
-                SYSTEM,
-                what,
-                gap(found, paths, times),
-                "",
-                1e-9,
-                "the same tableau on the same samples: rounding, grown by the instability",
-                "native",
+            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(found, paths, times), "").at_most(
+                1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native"
             )
         )
     return rows, prices
@@ -264,16 +256,9 @@ def _engines(
 
 def _price_rows(prices: dict[str, float]) -> list[Row]:
     return [
-        finding(
-            f"ensemble.price.{_slug(way)}",
-            SYSTEM,
-            f"wall time by paths and steps, {way}, once",
-            1e9 * price,
-            "ns",
-            "",
-            "seconds are reported",
-            "none",
-        )
+        Observed(
+            f"ensemble.price.{_slug(way)}", SYSTEM, f"wall time by paths and steps, {way}, once", 1e9 * price, "ns"
+        ).beside("", "seconds are reported", "none")
         for way, price in prices.items()
     ]
 
@@ -289,16 +274,13 @@ def _half_step_row(forces: Path) -> Row:
         for step in (STEP, STEP / 2)
     ]
     change = float(np.abs(pitch[0] - pitch[1]).max() / pitch[1].std())
-    return at_most(
+    return Observed(
         "ensemble.half-step",
         SYSTEM,
         "100 paths, pitch at 10 s with steps of 1 and 0.5 ms: largest difference by the standard deviation",
         change,
         "",
-        1e-4,
-        "the samples are the same, so only the integrator's error differs",
-        "shared kernel",
-    )
+    ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")
 
 
 def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Saved, prices: dict[str, float]) -> Saved:

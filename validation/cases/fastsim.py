@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import coefficients
 from models.contact.linear_theory import forces as linear_forces
 from models.contact.material import Pair
-from validation.common.rows import Row, System, Table, aim, at_most
+from validation.common.rows import Observed, Row, System, Table
 from validation.contact.contact_bands import held
 from validation.contact.contact_set import JUDGED, read, read_drawn
 from validation.contact.fastsim_speed import speed
@@ -113,27 +113,25 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
             if march == "plain":
                 continue
             rows.append(
-                at_most(
+                Observed(
                     f"fastsim.cells.{bound}",
                     SYSTEM,
                     f"largest error at 21 cells per strip, {bound} bound, {len(truth)} cases",
                     float(errors[1].max()),
                     "mu N",
-                    0.004,
-                    WHY,
-                    "none",
-                )
+                ).at_most(0.004, WHY, "none")
             )
             mean = np.array([np.sqrt(np.mean(e**2)) for e in errors])
             order = float(np.log(mean[0] / mean[-1]) / np.log(CELLS[-1] / CELLS[0]))
             if bound == "parabolic":
                 rows.append(
-                    at_most(
+                    Observed(
                         "fastsim.order",
                         SYSTEM,
                         "2 less the observed order, 11 to 81 cells per strip",
                         max(0.0, 2.0 - order),
                         "",
+                    ).at_most(
                         0.2,
                         "order 1.8 or more; root mean square over all "
                         "cases, because single ones jump as cells begin to slip",
@@ -167,15 +165,13 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
     }
     total = batches * count
     return [
-        at_most(
+        Observed(
             f"fastsim.always.{name.replace(' ', '_')}",
             SYSTEM,
             f"{what[name]}, worst of {total:,} random contacts",
             value,
             "mu N",
-            *ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")),
-            "none",
-        )
+        ).at_most(*ALLOWED.get(name, (ROUNDING, "rounding of some hundred sums")), "none")
         for name, value in answers.items()
     ]
 
@@ -198,35 +194,22 @@ def _limits() -> list[Row]:
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
     short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
     return [
-        at_most(
+        Observed(
             "fastsim.slope",
             SYSTEM,
             "forces at a millionth of the linear scale against the linear theory",
             float(slope.max()),
             "of them",
-            0.004,
-            "error of 21 cells: strips of finite width",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(0.004, "error of 21 cells: strips of finite width", "closed form"),
+        Observed(
             "fastsim.sliding.direction",
             SYSTEM,
             f"angle from the force to minus the slip, all sliding, {slides.sum()} cases from where that begins",
             float(off),
             "deg",
-            0.3,
-            "one flexibility in full sliding makes it rounding; 0.3 asked for",
-            "closed form",
-        ),
-        at_most(
-            "fastsim.sliding.size",
-            SYSTEM,
-            "force in full sliding less mu N",
-            float(short),
-            "mu N",
-            ROUNDING,
-            "pressures of the cells sum up to the load",
-            "closed form",
+        ).at_most(0.3, "one flexibility in full sliding makes it rounding; 0.3 asked for", "closed form"),
+        Observed("fastsim.sliding.size", SYSTEM, "force in full sliding less mu N", float(short), "mu N").at_most(
+            ROUNDING, "pressures of the cells sum up to the load", "closed form"
         ),
     ]
 
@@ -244,26 +227,14 @@ def _spun() -> list[Row]:
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
         name = f"fastsim.spun.{bound}"
         rows.append(
-            aim(
-                name,
-                SYSTEM,
-                what,
-                beyond,
-                "of it",
+            Observed(name, SYSTEM, what, beyond, "of it").aim(
                 0.0,
                 "Hertz's own pressure on 21 cells, whose sum errs "
                 "by their area; the friction on the cells is never exceeded",
             )
             if bound == "elliptic"
-            else at_most(
-                name,
-                SYSTEM,
-                what,
-                max(0.0, beyond),
-                "of it",
-                0.0,
-                "pressures of these bounds lie closer to the centre",
-                "closed form",
+            else Observed(name, SYSTEM, what, max(0.0, beyond), "of it").at_most(
+                0.0, "pressures of these bounds lie closer to the centre", "closed form"
             )
         )
     return rows
@@ -279,12 +250,13 @@ def _derivatives() -> list[Row]:
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
     share = np.quantile(np.max(off, axis=(0, 2)), 0.98)
     return [
-        at_most(
+        Observed(
             "fastsim.derivatives",
             SYSTEM,
             f"derivatives to creepages, spin and load against differences, 98 % of {len(known.forces)} cases",
             float(share),
             "mu N, mu N c",
+        ).at_most(
             1e-7,
             "differences over 2e-6 of a scale err by 1e-9; where a cell begins to slip within them forces jump",
             "none",
@@ -307,16 +279,13 @@ def _drawn() -> list[Row]:
     error = held("blended intermediate", read_drawn(JUDGED)).error
     why = "exact theory with its cells' first order taken out, kept; the target of the regular set"
     return [
-        at_most(
+        Observed(
             f"fastsim.drawn.{name}",
             SYSTEM,
             f"{what} error of the model on {len(error)} contacts drawn at random",
             float(value),
             "mu N",
-            most,
-            why,
-            "native",
-        )
+        ).at_most(most, why, "native")
         for name, what, value, most in (("mean", "mean", error.mean(), 0.02), ("max", "largest", error.max(), 0.09))
     ]
 
@@ -332,8 +301,8 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
     why = "exact theory with its cells' first order taken out, kept; the case of the price solves some of them anew"
     what = f"error of the model against the exact theory, {len(one.error)} contacts of five ellipses"
     return [
-        at_most("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N", 0.02, why, "native"),
-        at_most("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N", 0.09, why, "native"),
+        Observed("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N").at_most(0.02, why, "native"),
+        Observed("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N").at_most(0.09, why, "native"),
     ], table
 
 

@@ -30,7 +30,7 @@ from models.systems.pitch_plane.tangent import covariance, measured_growth, path
 from models.systems.pitch_plane.virtual_measurement import perturbed, write_measurement
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from models.vehicles.pitch_plane import STATES
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.common.scenes import drive, force_scene, on_paper_road, road_scene
 
 TITLE = "Why a force-excited vehicle runs away: growth of errors and of noise"
@@ -143,60 +143,46 @@ def _spread_rows(spread: Saved) -> list[Row]:
     by = f"Monte Carlo of {PATHS} paths" if seen == "pitch" else "covariance along the path"
     why = "5 % is asked; " + ("1.3 % is chance" if seen == "pitch" else "no chance in it")
     rows = [
-        within(
+        Observed(
             f"growth.spread.pitch.{t}s",
             SYSTEM,
             f"standard deviation of the pitch at {t} s, {by}, by the closed law",
             found / expected,
             "",
-            1.0,
-            0.05,
-            why,
-            "closed form",
-        )
+        ).within(1.0, 0.05, why, "closed form")
         for t, found, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
     ]
     miss = spread[seen][-1] / spread["t^1.5"][-1]
     rows.append(
-        within(
+        Observed(
             "growth.spread.linear",
             SYSTEM,
             f"the same at {spread['time'][-1]} s by t^1.5, the law without growth",
             miss,
             "",
-            4.0,
-            0.5,
-            "what the paper's law leaves out",
-            "closed form",
-        )
+        ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
     )
     heave = np.array(spread["heave" if "heave" in spread else "heave covariance"]) / spread["heave law"]
     rows.append(
-        within(
+        Observed(
             "growth.spread.heave",
             SYSTEM,
             "standard deviation of the heave by t^1.5, 1 to 10 s, worst",
             float(heave[np.abs(heave - 1).argmax()]),
             "",
-            1.0,
-            0.05,
-            "momentum alone moves the heave; 3.3 times the chance of 1.3 %",
-            "closed form",
-        )
+        ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
     )
     alone = np.array(spread["covariance"]) / spread["law, forces"]
     return [
         *rows,
-        within(
+        Observed(
             "growth.spread.forces",
             SYSTEM,
             "covariance along the path by the closed law from the wheel forces alone, 1 to 10 s, worst",
             float(alone[np.abs(alone - 1).argmax()]),
             "",
-            1.0,
-            0.08,
-            "rigid struts make the rate 1 % too small: 4 % at 10 s, beside the law's own",
-            "closed form",
+        ).within(
+            1.0, 0.08, "rigid struts make the rate 1 % too small: 4 % at 10 s, beside the law's own", "closed form"
         ),
     ]
 
@@ -206,53 +192,35 @@ def _growth_rows(roads: Saved) -> list[Row]:
     for name, road in roads.items():
         key = name.replace(" ", "-").replace(",", "")
         rows += [
-            within(
+            Observed(
                 f"growth.rate.{key}",
                 SYSTEM,
                 f"growth rate along the true path, {name}, by the rms of the fast pitch rate",
                 road["measured"] / road["run"],
                 "",
-                1.0,
-                0.03,
-                LAW,
-                "closed form",
-            ),
-            within(
+            ).within(1.0, 0.03, LAW, "closed form"),
+            Observed(
                 f"growth.forces.{key}",
                 SYSTEM,
                 f"growth rate from the wheel forces alone, {name}, by the same",
                 road["forces"] / road["run"],
                 "",
-                1.0,
-                0.03,
-                "struts that give way are left out: 1 %",
-                "closed form",
-            ),
+            ).within(1.0, 0.03, "struts that give way are left out: 1 %", "closed form"),
             _body_row(f"growth.body.{key}", f"growth rate with body-fixed forces, {name}", road),
-            finding(
-                f"growth.swing.{key}",
-                SYSTEM,
-                f"frequency of that swing, {name}",
-                road["swing"],
-                "rad/s",
-                f"{road['swing law']:.3g}",
-                "sqrt(J / (I + J)) times the rms of the fast pitch rate",
-                "closed form",
+            Observed(f"growth.swing.{key}", SYSTEM, f"frequency of that swing, {name}", road["swing"], "rad/s").beside(
+                f"{road['swing law']:.3g}", "sqrt(J / (I + J)) times the rms of the fast pitch rate", "closed form"
             ),
         ]
     worst = max(abs(rate / road["run"] - 1) for road in roads.values() for rate in road["cut-offs"])
     return [
         *rows,
-        at_most(
+        Observed(
             "growth.cut-off",
             SYSTEM,
             f"change of the growth rate by half or twice the cut-off of {CUTOFF} Hz, largest",
             worst,
             "",
-            0.05,
-            "the choice must not matter",
-            "none",
-        ),
+        ).at_most(0.05, "the choice must not matter", "none"),
     ]
 
 
@@ -264,17 +232,9 @@ def _body_row(key: str, what: str, road: Saved) -> Row:
     """
     if road["coupling"] != 0.0:
         why = "its wheels' weight leaves a moment that changes with the pitch of the hills: a true, small growth"
-        return finding(key, SYSTEM, what, road["body"], "1/s", "small", why, "none")
-    return within(
-        key,
-        SYSTEM,
-        what,
-        road["body"],
-        "1/s",
-        0.0,
-        road["body error"],
-        "zero within its error; the wheels' inertia makes a slow swing of it",
-        "closed form",
+        return Observed(key, SYSTEM, what, road["body"], "1/s").beside("small", why, "none")
+    return Observed(key, SYSTEM, what, road["body"], "1/s").within(
+        0.0, road["body error"], "zero within its error; the wheels' inertia makes a slow swing of it", "closed form"
     )
 
 
@@ -287,7 +247,7 @@ def _twin_row(folder: Path) -> Row:
     expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = "asymmetric twin: covariance along the path at 5 s by the closed law", "as for the published vehicle"
-    return within("growth.twin", SYSTEM, what, float(found / expected), "", 1.0, 0.05, why, "closed form")
+    return Observed("growth.twin", SYSTEM, what, float(found / expected), "").within(1.0, 0.05, why, "closed form")
 
 
 def _engine_rows(folder: Path) -> list[Row]:
@@ -300,17 +260,14 @@ def _engine_rows(folder: Path) -> list[Row]:
     size = float(np.abs(base.states[before]).max())
     gaps = {engine: float(np.abs(run.states[before] - base.states[before]).max()) for engine, run in runs.items()}
     return [
-        at_most(
+        Observed(
             f"growth.engines.{engine}",
             SYSTEM,
             f"{engine} and the reference on the same noise file before "
             f"drift-off at {base.times[before.stop - 1]:.2f} s, by the largest state",
             gap / size,
             "",
-            1e-9,
-            "the same method; only rounding grows",
-            "native",
-        )
+        ).at_most(1e-9, "the same method; only rounding grows", "native")
         for engine, gap in gaps.items()
         if engine != "reference"
     ]
@@ -324,7 +281,7 @@ def _step_row(folder: Path) -> Row:
     }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
     what = "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread"
-    return at_most("growth.step", SYSTEM, what, gap, "", 1e-4, "noise belongs to the samples", "closed form")
+    return Observed("growth.step", SYSTEM, what, gap, "").at_most(1e-4, "noise belongs to the samples", "closed form")
 
 
 def _linear_row(folder: Path) -> Row:
@@ -338,7 +295,7 @@ def _linear_row(folder: Path) -> Row:
     off = float(np.abs(run["pitch"] - true["pitch"]).max())
     what = "largest pitch error of the perturbed model, linearised, in 60 s"
     why = "drift needs the cosine: with it this run drifts off after 12 s"
-    return at_most("growth.linear", SYSTEM, what, off, "rad", 0.05, why, "none")
+    return Observed("growth.linear", SYSTEM, what, off, "rad").at_most(0.05, why, "none")
 
 
 def tables(data: Saved) -> list[Table]:

@@ -12,7 +12,7 @@ from models.core.errors import InputError, RunFailed
 from models.engines.assembly import Assembly
 from models.engines.catalogue import CATALOGUE, MISSING
 from validation.common import full_disk, wrong_engines
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
 from validation.hard_cases import prescribed_pitch, sampled_input, setups
 
 TITLE = "Guards against silent wrong answers"
@@ -139,16 +139,13 @@ def _outside_rows() -> list[Row]:
     silent, right = wrong_engines.passed(), wrong_engines.passed((wrong_engines.Right,))
     names = ", ".join(kind.__name__ for kind in wrong_engines.WRONG)
     return [
-        at_most(
+        Observed(
             "guards.outside.silent",
             SYSTEM,
             f"wrong integrators from outside the tree that run without a word, of {names}",
             len(silent),
             "",
-            0.0,
-            "every such run is held against the reference",
-            "native",
-        ),
+        ).at_most(0.0, "every such run is held against the reference", "native"),
         behaves(
             "guards.outside.right",
             SYSTEM,
@@ -162,16 +159,13 @@ def _outside_rows() -> list[Row]:
 
 def _disk_row(folder: Path) -> Row:
     """Files that a full disk leaves half written."""
-    return at_most(
+    return Observed(
         "guards.full_disk",
         SYSTEM,
         f"moments, of {full_disk.MOMENTS}, at which a full disk leaves a file that is not whole, or goes unnoticed",
         full_disk.damage(folder),
         "",
-        0.0,
-        "files are written whole or not at all",
-        "none",
-    )
+    ).at_most(0.0, "files are written whole or not at all", "none")
 
 
 def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
@@ -181,16 +175,13 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
     endings[engine] = {"checked": checked, "unchecked": past}
     total = sum(checked.values())
     return [
-        at_most(
+        Observed(
             f"guards.unstable.{engine}",
             SYSTEM,
             f"silent answers of {total} runs at 2 to 10 ms, every fixed-step integrator, {engine}",
             checked["SILENT"],
             "runs",
-            0.0,
-            "a step beyond the stability limit is refused with the limit named",
-            "native",
-        ),
+        ).at_most(0.0, "a step beyond the stability limit is refused with the limit named", "native"),
         behaves(
             f"guards.unstable.{engine}.unchecked",
             SYSTEM,
@@ -246,16 +237,13 @@ def _input_rows(engine: str) -> list[Row]:
 def _reduced_row(engine: str) -> Row:
     """Reference and MuJoCo have no constraint in the model: an explicit solver is right there."""
     error = prescribed_pitch.explicit(engine, Path())
-    return at_most(
+    return Observed(
         f"guards.constraint.{engine}",
         SYSTEM,
         f"enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
         error,
         "of its rms",
-        1e-4,
-        "the project's bound at 1 ms",
-        "closed form",
-    )
+    ).at_most(1e-4, "the project's bound at 1 ms", "closed form")
 
 
 def tables(data: Saved) -> list[Table]:

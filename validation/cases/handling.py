@@ -23,7 +23,7 @@ from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
 from validation.braking.load_transfer import braked_error, sliding, turning, turning_error
 from validation.braking.sprung_box import box
-from validation.common.rows import Row, System, aim, at_most, behaves, finding
+from validation.common.rows import Observed, Row, System, behaves
 from validation.spatial.cars import cornering_error, mirrored
 
 TITLE = "A car on four rolling tyres"
@@ -67,16 +67,13 @@ def _gap(a: Drive, b: Drive) -> float:
 
 
 def _engines_row(drives: dict[str, Drive]) -> Row:
-    return at_most(
+    return Observed(
         "handling.engines",
         SYSTEM,
         "lane change on a rough road: positions and rates of the two engines",
         _gap(drives["mujoco"], drives["exudyn"]),
         "m, rad, m/s, rad/s",
-        1e-10,
-        "the same tableau, step and forces around two engines' own trees: rounding alone",
-        "shared kernel",
-    )
+    ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
 
 
 def locked_error() -> float:
@@ -90,26 +87,20 @@ def locked_error() -> float:
 
 def _tyre_rows() -> list[Row]:
     return [
-        at_most(
+        Observed(
             "handling.cornering",
             SYSTEM,
             "cornering stiffness at small slip, by the ride vehicle's, less 1",
             cornering_error(Handling(R19)),
             "",
-            1e-3,
-            "the bristles are those of the ride vehicle's tyres",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-3, "the bristles are those of the ride vehicle's tyres", "closed form"),
+        Observed(
             "handling.locked",
             SYSTEM,
             "force on a wheel that does not turn, beside mu N against its sliding, by mu N",
             locked_error(),
             "",
-            1e-9,
-            "all bristles slide one way",
-            "closed form",
-        ),
+        ).at_most(1e-9, "all bristles slide one way", "closed form"),
     ]
 
 
@@ -135,16 +126,13 @@ def mirror_gap(handling: Handling, duration: float) -> float:
 
 def _mirror_row(duration: float) -> Row:
     inclined = Handling(R19, Tyres(inclination=-0.02))
-    return at_most(
+    return Observed(
         "handling.mirror",
         SYSTEM,
         "step steer to the left beside the mirror image of one to the right, with inclined wheels",
         mirror_gap(inclined, duration),
         "m, rad",
-        1e-10,
-        "a symmetric vehicle",
-        "none",
-    )
+    ).at_most(1e-10, "a symmetric vehicle", "none")
 
 
 def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 20.0) -> float:
@@ -160,24 +148,15 @@ def turn_error(change: Callable[[Handling], None] | None = None, speed: float = 
 def _turn_rows() -> list[Row]:
     turn = steady_turn(Handling(NO_DRAG), 20.0)
     return [
-        at_most(
+        Observed(
             "handling.turn",
             SYSTEM,
             "yaw gain of a steady turn of small slip at 20 m/s, by the single-track vehicle's, less 1",
             turn_error(),
             "",
-            1e-3,
-            "linear tyres, with trail and turning slip",
-            "closed form",
-        ),
-        finding(
-            "handling.understeer",
-            SYSTEM,
-            "its understeer gradient",
-            turn.understeer,
-            "s^2/m",
-            "positive: understeering",
-            "closed form at the static loads",
+        ).at_most(1e-3, "linear tyres, with trail and turning slip", "closed form"),
+        Observed("handling.understeer", SYSTEM, "its understeer gradient", turn.understeer, "s^2/m").beside(
+            "positive: understeering", "closed form at the static loads"
         ),
     ]
 
@@ -190,26 +169,20 @@ def _stop_rows() -> list[Row]:
     left = drive["fx"] + drive.grip()
     stopped = friction_distance(speed, mu) - friction_distance(ahead[-1], mu)
     return [
-        at_most(
+        Observed(
             "handling.slide",
             SYSTEM,
             "braking force of four locked wheels beside mu N, by mu N",
             float(np.abs(left / drive.grip()).max()),
             "",
-            1e-9,
-            "at every step of a stop",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-9, "at every step of a stop", "closed form"),
+        Observed(
             "handling.stop",
             SYSTEM,
             "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), less 1",
             float(drive.path[-1, 0] / stopped - 1.0),
             "",
-            1e-2,
-            "wheel loads swing about the weight when the body dives",
-            "closed form",
-        ),
+        ).at_most(1e-2, "wheel loads swing about the weight when the body dives", "closed form"),
     ]
 
 
@@ -220,27 +193,21 @@ def _transfer_rows() -> list[Row]:
         braking = braked_error(driven("mujoco", sliding(vehicle, GENTLE), 10.0, 2.0), GENTLE)
         turn = turning_error(driven("mujoco", turning(vehicle, 2e-3), SPEED, 3.0))
         rows += [
-            at_most(
+            Observed(
                 f"handling.transfer.{name}",
                 SYSTEM,
                 f"load transfer of the {name} between its axles, wheels "
                 f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1",
                 braking,
                 "",
-                5e-3,
-                "first order in the pitch angle; 2 s of settling",
-                "closed form",
-            ),
-            at_most(
+            ).at_most(5e-3, "first order in the pitch angle; 2 s of settling", "closed form"),
+            Observed(
                 f"handling.transfer_aside.{name}",
                 SYSTEM,
                 f"the same of the {name} between its sides in a steady turn of 0.4 m/s^2, by m_total a h / t",
                 turn,
                 "",
-                1e-3,
-                "first order in the roll angle",
-                "closed form",
-            ),
+            ).at_most(1e-3, "first order in the roll angle", "closed form"),
         ]
     return rows
 
@@ -250,16 +217,9 @@ def _slope_row() -> Row:
     drive = driven("mujoco", handling, 0.0, 2.0, 1e-4)
     last = slice(-2000, None)
     drift = float(np.abs(drive["slip_x"][last].mean(axis=0)).max())
-    return at_most(
-        "handling.slope",
-        SYSTEM,
-        f"drift of locked wheels at rest on a slope of {SLOPE:g} rad",
-        1e3 * drift,
-        "mm/s",
-        1.0,
-        "bristles that do not roll are dampers, relative to 0.1 m/s",
-        "none",
-    )
+    return Observed(
+        "handling.slope", SYSTEM, f"drift of locked wheels at rest on a slope of {SLOPE:g} rad", 1e3 * drift, "mm/s"
+    ).at_most(1.0, "bristles that do not roll are dampers, relative to 0.1 m/s", "none")
 
 
 def _energy_rows() -> list[Row]:
@@ -271,12 +231,13 @@ def _energy_rows() -> list[Row]:
     whole = energy(drive)[0]
     order = np.log2(gaps["held", 1e-3] / gaps["held", 5e-4])
     return [
-        at_most(
+        Observed(
             "handling.ledger",
             SYSTEM,
             "energy of the lane change that nothing accounts for, by all of it",
             gaps["sliding", 1e-3] / whole,
             "",
+        ).at_most(
             1e-7,
             "springs, dampers, tyres, drag and steering are summed up by "
             "Simpson's rule; bristles that begin to slide limit its order",
@@ -338,16 +299,14 @@ def _price_row() -> Row:
     jobs = _march(car, steps), _march(bare, steps), lambda: _repeat_tyres(4 * steps)
     full, none, kernel = interleave(jobs, ROUNDS, 0.001, clock=time.process_time)
     ratio, low, high = median(full / (none + kernel) - 1.0)
-    return aim(
+    return Observed(
         "handling.price",
         SYSTEM,
         "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
         f"and what the kernel takes alone, less 1, 95 % interval {low:.3g} to {high:.3g}",
         ratio,
         "",
-        0.3,
-        "seconds of the processor, median of interleaved rounds",
-    )
+    ).aim(0.3, "seconds of the processor, median of interleaved rounds")
 
 
 def _threads_row() -> Row:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, within
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
 from validation.hard_cases import cases_by_family
 from validation.hard_cases.case import IMPLEMENTATIONS, WORDS, Case, Outcome, judge
 from validation.hard_cases.catalogue import COVERED, beyond
@@ -39,37 +39,27 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     counted = sum(family not in FILES for family, _ in known)
     share = f"{len(data)} of {len(known)}" if quick else f"all {len(known)}"
     rows += [
-        at_most(
+        Observed(
             "hard.silent",
             SYSTEM,
             f"silent wrong answers in {share} cases, {sum(map(len, words))} outcomes",
             sum(own.count("SILENT") for own in words),
             "",
-            0.0,
-            "a finite wrong answer without a word is never accepted",
-            "none",
-        ),
-        within(
+        ).at_most(0.0, "a finite wrong answer without a word is never accepted", "none"),
+        Observed(
             "hard.passed",
             SYSTEM,
             "hard cases that every implementation answers right, refuses or says it failed",
             sum("SILENT" not in own for own in words),
             "cases",
-            len(data),
-            0,
-            f"every one; {share} were run",
-            "none",
-        ),
-        at_most(
+        ).within(len(data), 0, f"every one; {share} were run", "none"),
+        Observed(
             "hard.count",
             SYSTEM,
             "by how much fewer than 80 there are, all measurement files counted as one",
             max(0, LEAST - counted - 1),
             "cases",
-            0.0,
-            f"{counted} cases without measurement files",
-            "none",
-        ),
+        ).at_most(0.0, f"{counted} cases without measurement files", "none"),
     ]
     return rows, {"cases": data, "known": [(family, case.name) for family, case in known]}
 
@@ -86,7 +76,7 @@ def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
     quantity = f"{case.name}{'' if case.once else f', {implementation}'}: {case.check}"
     if case.wanted(implementation) == "right" and outcome.error is not None:
         error, judged = outcome.error, case.independence(implementation)
-        return at_most(id, SYSTEM, quantity, error, case.unit, case.tolerance, case.why, judged)
+        return Observed(id, SYSTEM, quantity, error, case.unit).at_most(case.tolerance, case.why, judged)
     return behaves(id, SYSTEM, quantity, outcome.word, case.wanted(implementation), case.hard)
 
 

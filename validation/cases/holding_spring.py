@@ -24,7 +24,7 @@ from models.systems.pitch_plane.trust import growth
 from models.systems.pitch_plane.virtual_measurement import perturbed
 from models.vehicles.parameters.itwm_drift import PARAMETERS
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, behaves, finding, within
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import drive, force_scene, on_paper_road
 
 TITLE = "The smallest spring that holds a force-excited run"
@@ -128,8 +128,10 @@ def _smallest(one: Setting, measured: FreeRuns) -> float:
 def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
     key, what = f"holding_spring.found.{index + 1}", f"predicted stiffness by the smallest found by bisection, {name}"
     if index >= len(JUDGED):
-        return finding(key, SYSTEM, what, law / stiffness, "", "1 for little damping and no noise", "said, not judged")
-    return within(key, SYSTEM, what, law / stiffness, "", 1.0, 0.3, "30 % is asked", "closed form")
+        return Observed(key, SYSTEM, what, law / stiffness, "").beside(
+            "1 for little damping and no noise", "said, not judged"
+        )
+    return Observed(key, SYSTEM, what, law / stiffness, "").within(1.0, 0.3, "30 % is asked", "closed form")
 
 
 def tables(data: Saved) -> list[Table]:

@@ -23,7 +23,7 @@ from models.systems.hub_forces.tilt_filter import estimate
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.spatial.cars import anywhere, by_jacobians, r19, shaken, static, twin
 
 TITLE = "A car of 19 freedoms on noisy hub forces"
@@ -73,26 +73,20 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
     expected -= GRAVITY * np.eye(len(q))[Z]
     return [
-        at_most(
+        Observed(
             f"hub_forces.accelerations_{name}",
             SYSTEM,
             "accelerations of Exudyn and MuJoCo beside the written-out equations at random states, relative",
             worst,
             "1",
-            1e-10,
-            "one callback, three mass matrices",
-            "shared kernel",
-        ),
-        at_most(
+        ).at_most(1e-10, "one callback, three mass matrices", "shared kernel"),
+        Observed(
             f"hub_forces.free_fall_{name}",
             SYSTEM,
             "accelerations of the freely falling, turning tree beside a second set of equations",
             float(np.abs(written - expected).max()),
             "m/s^2, rad/s^2",
-            1e-9,
-            "written separately; gravity moves all alike",
-            "native",
-        ),
+        ).at_most(1e-9, "written separately; gravity moves all alike", "native"),
     ]
 
 
@@ -107,16 +101,13 @@ def _wrenches(vehicle: CutVehicle) -> Row:
         expected = by_jacobians(built, q, drive.hubs[0], frame)
         off = np.abs(built.forces_at_rest(q) - bare.forces_at_rest(q) - expected).max()
         worst = max(worst, float(off / np.abs(expected).max()))
-    return at_most(
+    return Observed(
         "hub_forces.wrenches",
         SYSTEM,
         "joint forces of six components per hub in two frames beside MuJoCo's own Jacobians, relative",
         worst,
         "1",
-        1e-12,
-        "places, axes, frames",
-        "native",
-    )
+    ).at_most(1e-12, "places, axes, frames", "native")
 
 
 def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
@@ -131,23 +122,21 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
     fall = -0.5 * GRAVITY * np.array([np.sin(TILT), 1 - np.cos(TILT)]) * run.times[:, None] ** 2
     preloads = np.array([element.held for element in vehicle.elements])
     return [
-        at_most(
+        Observed(
             "hub_forces.gravity_error",
             SYSTEM,
             "position of the chassis on body-fixed forces at a roll of 0.1 rad "
             "beside -g sin(roll) t^2/2 and -g (1 - cos(roll)) t^2/2 over 1 s",
             float(np.abs(run.states[:, [Y, Z]] - fall).max()),
             "m",
-            1e-9,
-            "forces turn with it, gravity does not",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-9, "forces turn with it, gravity does not", "closed form"),
+        Observed(
             "hub_forces.equivalence",
             SYSTEM,
             "change of any section force by that tilt, of the weight",
             float(np.abs(run.elements - preloads).max() / vehicle.loads.sum()),
             "1",
+        ).at_most(
             1e-10,
             "uniform gravity cannot be told from an acceleration: body-fixed forces leave the inside alone",
             "closed form",
@@ -159,17 +148,13 @@ def _toppling(vehicle: CutVehicle) -> Row:
     """Forces that keep their directions carry the vehicle from below: it topples like a pendulum."""
     run, expected = _tilted(vehicle, "inertial", 1e-6, 2.0), float(rigid(vehicle).toppling()[0])
     late = np.abs(run.states[[1000, 2000], ROLL])
-    return within(
+    return Observed(
         "hub_forces.toppling",
         SYSTEM,
         "growth rate of a roll error on forces of the inertial frame beside sqrt(m g h / I) of the rigid car",
         float(np.log(late[1] / late[0])),
         "1/s",
-        expected,
-        0.02 * expected,
-        "springs that give change it by less than one per cent",
-        "closed form",
-    )
+    ).within(expected, 0.02 * expected, "springs that give change it by less than one per cent", "closed form")
 
 
 def _together(vehicle: CutVehicle, duration: float) -> Row:
@@ -178,16 +163,13 @@ def _together(vehicle: CutVehicle, duration: float) -> Row:
     drive = static(vehicle, steps + 1)
     noisy = HubForces(drive.hubs, STEP, "hub").noisy(np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs)), SEED)
     paths = [model(engine, vehicle, noisy, STEP, duration).run().states for engine in ENGINES]
-    return at_most(
+    return Observed(
         "hub_forces.engines_on_noise",
         SYSTEM,
         f"coordinates and rates of three implementations on noise of 50 N and 5 N m, {duration:g} s",
         max(float(np.abs(p - paths[0]).max()) for p in paths[1:]),
         "m, rad, 1/s",
-        1e-9,
-        "same tableau, same step",
-        "shared kernel",
-    )
+    ).at_most(1e-9, "same tableau, same step", "shared kernel")
 
 
 def _rough(vehicle: CutVehicle, duration: float) -> Drive:
@@ -209,27 +191,20 @@ def _reproduced(vehicle: CutVehicle) -> list[Row]:
             off[interpolation, every] = float(np.abs((run.states - true.states)[:, [ROLL, PITCH]]).max())
     order = np.log2(off["linear", 4] / off["linear", 2])
     return [
-        within(
+        Observed(
             "hub_forces.hold",
             SYSTEM,
             "order in the sampling period of roll and pitch on linear samples of hub forces, 250 and 500 Hz",
             float(order),
             "1",
-            2.0,
-            0.5,
-            "linear interpolation errs by the square",
-            "closed form",
-        ),
-        at_most(
+        ).within(2.0, 0.5, "linear interpolation errs by the square", "closed form"),
+        Observed(
             "hub_forces.reproduced",
             SYSTEM,
             "error of roll and pitch on a cubic spline through samples at 500 Hz, 2 s of a class C road",
             off["smooth", 2],
             "rad",
-            1e-5,
-            "the cut vehicle is the one on the road",
-            "shared kernel",
-        ),
+        ).at_most(1e-5, "the cut vehicle is the one on the road", "shared kernel"),
     ]
 
 
@@ -250,12 +225,13 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
     low, high = chi2.ppf([5e-4, 1 - 5e-4], COPIES) / COPIES
     named = [("roll", ROLL, law[0]), ("pitch", PITCH, law[1]), ("heading", HEADING, law[2]), ("y", Y, sliding)]
     return [
-        within(
+        Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
             f"mean square of {name} after {LASTING:g} s on white noise by its law, {COPIES} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
+        ).within(
             (low + high) / 2,
             (high - low) / 2,
             "99.9 % of chi-square; q t^3/3, and g^2 q t^7/252 beside it for y",
@@ -275,52 +251,38 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     """Engines before drift-off, both angles with the filter, and the damage that each run leaves."""
     off = np.abs(comparison.errors(comparison.runs[FILTER])).max(axis=0)
     rows = [
-        at_most(
+        Observed(
             f"hub_forces.engines_{frame}",
             SYSTEM,
             f"engines apart before drift-off, noisy road run of 8 s, frame {frame!r}",
             comparison.engines_apart(),
             "m, rad, 1/s",
-            1e-9,
-            "same tableau, same step",
-            "shared kernel",
-        ),
+        ).at_most(1e-9, "same tableau, same step", "shared kernel"),
         *(
-            at_most(
+            Observed(
                 f"hub_forces.filter_{name}_{frame}",
                 SYSTEM,
                 f"largest error of {name} with the filter, frame {frame!r}",
                 float(off[i]),
                 "rad",
-                0.01,
-                "demanded",
-                "none",
-            )
+            ).at_most(0.01, "demanded", "none")
             for i, name in enumerate(("roll", "pitch"))
         ),
-        finding(
+        Observed(
             f"hub_forces.drift_off_{frame}",
             SYSTEM,
             f"free run leaves the true roll or pitch by 0.05 rad; 8 s: never, frame {frame!r}",
             min(comparison.drift_off(comparison.runs["free, mujoco"]), 8.0),
             "s",
-            "",
-            "stated",
-        ),
+        ).beside("", "stated"),
     ]
     for name in (name for name in comparison.runs if "exudyn" not in name):
         ratios = comparison.damages(comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
             what = f"{end} damage of {len(ratios)} springs, mounts and bars by the true one; {name}, frame {frame!r}"
             rows.append(
-                finding(
-                    f"hub_forces.damage_{end}_{name.split(',')[0]}_{frame}",
-                    SYSTEM,
-                    what,
-                    value,
-                    "1",
-                    1.0,
-                    "body-frame section forces, slope 5",
+                Observed(f"hub_forces.damage_{end}_{name.split(',')[0]}_{frame}", SYSTEM, what, value, "1").beside(
+                    1.0, "body-frame section forces, slope 5"
                 )
             )
     return rows
@@ -334,16 +296,13 @@ def _exact(frame: str, comparison: Comparison) -> Row:
     drive = with_angles(measurement.forces.drive(STEP, steps), measurement.truth.states[:, [ROLL, PITCH]], STEP, STEP)
     run = build("mujoco", measurement.vehicle, drive, STEP, steps * STEP).run()
     ratios = np.array([*comparison.damages(run.elements).values()])
-    return at_most(
+    return Observed(
         f"hub_forces.prescribed_{frame}",
         SYSTEM,
         f"largest deviation from 1 of a damage ratio, true roll and pitch prescribed, frame {frame!r}",
         float(np.abs(ratios - 1).max()),
         "1",
-        0.1,
-        "force noise of 0.2 % alone changes lightly loaded bushes by some per cent",
-        "none",
-    )
+    ).at_most(0.1, "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")
 
 
 def _faults(scene: HubScene) -> list[Row]:

@@ -15,7 +15,7 @@ from models.engines.reference import derivative_of
 from models.systems.pitch_plane.scene import Scene, assemble
 from models.vehicles.description import matrices
 from models.vehicles.pitch_plane_equations import numbers
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, at_most, behaves, finding, not_run
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, behaves, not_run
 from validation.common.scenes import drive, force_scene, on_paper_road
 from validation.hard_cases.prescribed_pitch import AsItComes
 
@@ -154,16 +154,13 @@ def _laws(files: Files) -> dict[str, tuple[np.ndarray, str]]:
 def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str]], duration: float) -> list[Row]:
     start = f"from a start off by {OFF:g} rad and {RATE_OFF:g} rad/s"
     rows = [
-        at_most(
+        Observed(
             f"index_reduction.law.{_id(name)}",
             SYSTEM,
             f"{name}: gap {start} against its law",
             float(np.abs(gaps[name] - law).max() / OFF),
             "of the start's",
-            1e-3,
-            why,
-            "closed form",
-        )
+        ).at_most(1e-3, why, "closed form")
         for name, (law, why) in laws.items()
     ]
     none = {
@@ -173,29 +170,23 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
         "eliminated, mujoco": "the pitch is no unknown",
     }
     rows += [
-        at_most(
+        Observed(
             f"index_reduction.none.{_id(name)}",
             SYSTEM,
             f"{name}: gap after the first step, {start}",
             float(np.abs(gaps[name][1:]).max()),
             "rad",
-            1e-12,
-            why,
-            "closed form",
-        )
+        ).at_most(1e-12, why, "closed form")
         for name, why in none.items()
     ]
     rows.append(
-        finding(
+        Observed(
             "index_reduction.gain",
             SYSTEM,
             f"index 1: gap after {duration:g} s by that of the start",
             float(gaps["index 1"][-1] / OFF),
             "",
-            1 + RATE_OFF / OFF * duration,
-            "it never stops",
-            "none",
-        )
+        ).beside(1 + RATE_OFF / OFF * duration, "it never stops", "none")
     )
     return [*rows, _index_two_refused()]
 
@@ -244,29 +235,19 @@ def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> 
         paths = np.array(list(errors.values()))
         size = float(np.sqrt(np.mean(paths[-1] ** 2)))
         rows.append(
-            finding(
-                f"index_reduction.{id}.size",
-                SYSTEM,
-                f"{words}: rms error of the pitch",
-                size,
-                "rad",
-                "not zero",
-                "noise, integrated once or twice: the data itself drifts",
-                "none",
+            Observed(f"index_reduction.{id}.size", SYSTEM, f"{words}: rms error of the pitch", size, "rad").beside(
+                "not zero", "noise, integrated once or twice: the data itself drifts", "none"
             )
         )
         apart = float(np.ptp(paths, axis=0).max()) / size
         rows.append(
-            at_most(
+            Observed(
                 f"index_reduction.{id}",
                 SYSTEM,
                 f"{words}: largest difference of the error between {len(paths)} formulations, by its rms",
                 apart,
                 "",
-                0.05,
-                why,
-                "native",
-            )
+            ).at_most(0.05, why, "native")
         )
     return rows
 

@@ -29,7 +29,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.virtual_measurement import follower, write_measurement
 from models.systems.pitch_plane.virtual_measurement import measure as measure_road
 from validation.common.bands import mean_square
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, not_run, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, not_run
 from validation.common.scenes import on_paper_road, road_scene
 from validation.drift.attitudes import SEED, START, apart, cone, errors, standard_errors, turning
 from validation.measured import recording
@@ -76,7 +76,7 @@ def _clean() -> list[Row]:
 
 def _small(id: str, quantity: str, value: float, unit: str, why: str, bound: float = 1e-12) -> Row:
     """Row for an error beside a closed form."""
-    return at_most(f"inertial_unit.{id}", SYSTEM, quantity, value, unit, bound, why, "closed form")
+    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, value, unit).at_most(bound, why, "closed form")
 
 
 def _one_axis(paths: int) -> list[Row]:
@@ -88,13 +88,15 @@ def _one_axis(paths: int) -> list[Row]:
         spill = float(np.abs(np.delete(turns, axis, axis=1)).max())
         rows += [
             mean_square(
-                f"inertial_unit.one_axis.{axis + 1}",
-                SYSTEM,
-                f"mean square angle, axis {axis + 1} noisy",
-                float(np.mean(turns[:, axis] ** 2)),
+                Observed(
+                    f"inertial_unit.one_axis.{axis + 1}",
+                    SYSTEM,
+                    f"mean square angle, axis {axis + 1} noisy",
+                    float(np.mean(turns[:, axis] ** 2)),
+                    "rad^2",
+                ),
                 EQUAL**2 * 200 * PERIOD,
                 paths,
-                "rad^2",
                 f"s^2 t; {paths:,} paths, seed {SEED}",
             ),
             _small(
@@ -111,12 +113,7 @@ def _one_axis(paths: int) -> list[Row]:
 def _mean(id: str, quantity: str, samples: np.ndarray, law: float, why: str) -> Row:
     """Row for a mean that must lie within LEVEL standard errors of its law."""
     error = float(samples.std(ddof=1) / math.sqrt(len(samples)))
-    return within(
-        f"inertial_unit.{id}",
-        SYSTEM,
-        quantity,
-        float(samples.mean()),
-        "",
+    return Observed(f"inertial_unit.{id}", SYSTEM, quantity, float(samples.mean()), "").within(
         law,
         LEVEL * error,
         f"{why}; {len(samples):,} paths, seed {SEED}, within {LEVEL} standard errors of {error:.2g}",
@@ -166,16 +163,13 @@ def _three_axes(paths: int) -> list[Row]:
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
             LEVEL,
         ),
-        finding(
+        Observed(
             "inertial_unit.matrix.resting",
             SYSTEM,
             "the same against the law of a body at rest",
             standard_errors(found, resting),
             "",
-            f"far beyond {LEVEL}",
-            "the rows above can tell the laws apart",
-            "closed form",
-        ),
+        ).beside(f"far beyond {LEVEL}", "the rows above can tell the laws apart", "closed form"),
     ]
 
 
@@ -200,17 +194,13 @@ def _norms(paths: int) -> list[Row]:
         )
         rows += [
             *(_mean(f"{id}.{axes}", *figures) for id, *figures in means),
-            within(
+            Observed(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
                 f"root of the Euler law at 4e6 steps, {axes} noisy axes",
                 euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
-                ito_norm(np.full(axes, EQUAL), span),
-                1e-6,
-                "exp(k s^2 t / 8), eq. (28)",
-                "closed form",
-            ),
+            ).within(ito_norm(np.full(axes, EQUAL), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
         ]
     return rows
 
@@ -221,19 +211,13 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     axis = math.degrees(walk * TEN_MINUTES**0.5)
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [
-        within(
-            "inertial_unit.walk",
-            SYSTEM,
-            "random walk of the ten-minute example",
-            math.degrees(walk),
-            "deg per sqrt(s)",
-            0.1812,
-            5e-5,
-            why,
-            "published",
-        ),
+        Observed(
+            "inertial_unit.walk", SYSTEM, "random walk of the ten-minute example", math.degrees(walk), "deg per sqrt(s)"
+        ).within(0.1812, 5e-5, why, "published"),
         *(
-            within(f"inertial_unit.ten_minutes.{id}", SYSTEM, what, angle, "deg", law, 5e-3, why, "closed form")
+            Observed(f"inertial_unit.ten_minutes.{id}", SYSTEM, what, angle, "deg").within(
+                law, 5e-3, why, "closed form"
+            )
             for id, what, angle, law, why in (
                 ("axis", "its rms angle per axis at 600 s", axis, 4.44, "s sqrt(t)"),
                 ("total", "its rms angle in all at 600 s", axis * 3**0.5, 7.69, "s sqrt(3 t)"),
@@ -249,13 +233,15 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     found = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(
         mean_square(
-            "inertial_unit.ten_minutes",
-            SYSTEM,
-            "its mean square angle per axis by Monte Carlo",
-            float(np.mean(found[:, -1] ** 2)),
+            Observed(
+                "inertial_unit.ten_minutes",
+                SYSTEM,
+                "its mean square angle per axis by Monte Carlo",
+                float(np.mean(found[:, -1] ** 2)),
+                "deg^2",
+            ),
             axis**2,
             3 * paths,
-            "deg^2",
             f"{paths} paths of 600,000 steps, seed {SEED}",
         )
     )
@@ -280,13 +266,15 @@ def _bias(paths: int) -> list[Row]:
         law = float(angle_variance(np.array(float(span)), 0.0, turn_on, instability, tau))
         rows.append(
             mean_square(
-                f"inertial_unit.bias.{name}",
-                SYSTEM,
-                f"mean square angle of a bias of 10 deg/h, {name}, {span} s",
-                float(np.mean(angles**2)),
+                Observed(
+                    f"inertial_unit.bias.{name}",
+                    SYSTEM,
+                    f"mean square angle of a bias of 10 deg/h, {name}, {span} s",
+                    float(np.mean(angles**2)),
+                    "rad^2",
+                ),
                 law,
                 paths,
-                "rad^2",
                 f"b^2 t^2 or 2 b^2 tau^2 (t/tau - 1 + exp(-t/tau)), tau = 100 s; {paths:,} paths, seed {SEED}",
             )
         )
@@ -337,17 +325,14 @@ def _recording(paths: int) -> CaseAnswer:
     found = errors(rates, period, deviation, paths)
     law = mean_error(deviation * period**0.5, rates, period, START)
     return [
-        finding(
+        Observed(
             "inertial_unit.recording",
             SYSTEM,
             f"a minute in a real car: attitude of the gyro alone against the "
             f"camera's after {recording.PERIOD * (len(off) - 1):.0f} s, own bias taken off",
             float(off[-1]),
             "deg",
-            "nothing published",
-            f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade",
-            "none",
-        ),
+        ).beside("nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
         _small(
             "recording.law",
             "mean rotation matrix of noise on its motion: worst entry by its standard error",

@@ -19,7 +19,7 @@ import numpy as np
 from models.drawing.figures import LABELS
 from models.engines.stability import linearised
 from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import CaseAnswer, Saved, System, Table, at_most, not_run
+from validation.common.rows import CaseAnswer, Observed, Saved, System, Table, not_run
 from validation.common.scenes import road_scene
 from validation.price import instructions_run
 from validation.price.tables import named
@@ -61,12 +61,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         return [not_run(ID, SYSTEM, WHAT, reason)], {"instructions": {}}
     off = np.abs(again / first - 1.0).max(axis=1)
     rows = [
-        at_most(
+        Observed(
             f"{ID}.{engine}",
             SYSTEM,
             f"{WHAT}: largest difference of a run in {LABELS[engine]}",
             float(largest.max()),
             "relative",
+        ).at_most(
             BOUND,
             "the same instructions in the same order: seed of hashes and "
             "number of threads are set, and no clock's reading is printed while they are counted",

@@ -12,7 +12,7 @@ from models.drift.innovations import consistency
 from models.drift.score import CHANNELS
 from models.systems.pitch_plane.pitch_filter import PITCH, RATE
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, Saved, System, Table, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import on_paper_road
 from validation.drift import kalman_runs as runs
 from validation.drift.kalman_runs import (
@@ -101,11 +101,15 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
         f"correlated by {SLUGGISH:g}": lambda w: np.vstack([w[:1], w[1:] + SLUGGISH * w[:-1]]),
     }
     stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
-    rows = [at_most("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "", 1, stated, "closed form")]
+    rows = [
+        Observed("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "").at_most(
+            1, stated, "closed form"
+        )
+    ]
     for words, plant in planted.items():
         silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
         id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words}, not named"
-        rows.append(at_most(id, SYSTEM, what, silent, "", 0, f"of {count} runs", "closed form"))
+        rows.append(Observed(id, SYSTEM, what, silent, "").at_most(0, f"of {count} runs", "closed form"))
     return rows
 
 
@@ -137,16 +141,8 @@ def _band_row(name: str, words: str, values: np.ndarray, freedom: int, sample: s
         f"{100 * LEVEL:g} % band {low:.3f} to {high:.3f} of chi-square with {freedom * len(values)} degrees of "
         f"freedom: {sample}"
     )
-    return within(
-        f"kalman.{name}",
-        SYSTEM,
-        f"{words}, mean per degree of freedom, no model error",
-        mean,
-        "",
-        (low + high) / 2,
-        (high - low) / 2,
-        why,
-        "closed form",
+    return Observed(f"kalman.{name}", SYSTEM, f"{words}, mean per degree of freedom, no model error", mean, "").within(
+        (low + high) / 2, (high - low) / 2, why, "closed form"
     )
 
 
@@ -159,19 +155,14 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest pitch error by its stated deviation"
         why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {found['deviation']:.2g} rad"
         rows.append(
-            at_most(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "", 5.0, why, "closed form")
+            Observed(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "").at_most(
+                5.0, why, "closed form"
+            )
         )
         rows.append(
-            at_most(
-                f"{id}.count",
-                SYSTEM,
-                f"cells without a number that were not counted, {name}",
-                found["miscounted"],
-                "",
-                0.0,
-                f"{found['missed']:.0f} were written",
-                "closed form",
-            )
+            Observed(
+                f"{id}.count", SYSTEM, f"cells without a number that were not counted, {name}", found["miscounted"], ""
+            ).at_most(0.0, f"{found['missed']:.0f} were written", "closed form")
         )
     return rows
 
@@ -180,7 +171,7 @@ def _short_rows(folder: Path) -> list[Row]:
     error = stabilised(folder, 3.0, SEED, ENGINES[:1])["reference"]["pitch"]
     what = "largest pitch error of a stabilised run of 3 s, wrong model and noise"
     why = "until the inertia is learnt, 5 % of the fast pitch are missing"
-    return [at_most("kalman.short", SYSTEM, what, error, "rad", 5e-3, why, "none")]
+    return [Observed("kalman.short", SYSTEM, what, error, "rad").at_most(5e-3, why, "none")]
 
 
 def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
@@ -196,17 +187,13 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
         who, what = ("estimate", "run")[i // 6], names[i % 6]
         why = f"{LOOP_RUNS} runs of {LOOP:g} s; spread {spread[i]:.1%} from the loop's own autocorrelation, times 3.29"
         rows.append(
-            within(
+            Observed(
                 f"kalman.covariance.{who}.{i % 6}",
                 SYSTEM,
                 f"variance of the {who}'s error in {what}: filter and run by discrete Lyapunov equation",
                 squares[i] / covariance[i, i],
                 "",
-                1.0,
-                3.29 * spread[i],
-                why,
-                "closed form",
-            )
+            ).within(1.0, 3.29 * spread[i], why, "closed form")
         )
         table.append([float(np.sqrt(covariance[i, i])), float(np.sqrt(squares[i]))])
     return rows, table
@@ -216,39 +203,25 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
     words = "pitch deviation that a gyro of 0.1 rad/s at 1 kHz alone leaves after 600 s"
     why = "the instability makes the pitch visible in its rate; lambda from the true run is good to 5 %"
     return [
-        within(
-            "kalman.gyro",
-            SYSTEM,
-            f"{words}, by the averaged Riccati equation",
-            found["stated"] / found["law"],
-            "",
-            1.0,
-            0.1,
-            why,
-            "closed form",
-        ),
-        within(
+        Observed(
+            "kalman.gyro", SYSTEM, f"{words}, by the averaged Riccati equation", found["stated"] / found["law"], ""
+        ).within(1.0, 0.1, why, "closed form"),
+        Observed(
             "kalman.gyro.error",
             SYSTEM,
             "its actual error, rms from 100 s on, by the stated deviation",
             found["error"] / found["stated"],
             "",
+        ).within(
             1.0,
             0.2,
             "the error's slow pole is lambda, so 500 s hold some "
             "T lambda = 195 independent squares: 3.29 / sqrt(2 195) = 17 %",
             "closed form",
         ),
-        finding(
-            "kalman.gyro.level",
-            SYSTEM,
-            "the same about a level vehicle, A(0): a random walk",
-            found["walk"],
-            "rad",
-            found["stated"],
-            "nothing in A(0) shows the pitch",
-            "closed form",
-        ),
+        Observed(
+            "kalman.gyro.level", SYSTEM, "the same about a level vehicle, A(0): a random walk", found["walk"], "rad"
+        ).beside(found["stated"], "nothing in A(0) shows the pitch", "closed form"),
     ]
 
 
@@ -263,8 +236,8 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
             )
             words = f"mean pseudo-damage of {name} by the true one, {engine}"
             rows.append(
-                within(
-                    f"kalman.damage.{name}.{engine}", SYSTEM, words, float(ratios.mean()), "", 1.0, 0.02, why, "native"
+                Observed(f"kalman.damage.{name}.{engine}", SYSTEM, words, float(ratios.mean()), "").within(
+                    1.0, 0.02, why, "native"
                 )
             )
     return rows
@@ -284,16 +257,13 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
     ):
         for band, range_ in (("", "all frequencies"), (", band", "up to 15 Hz")):
             rows.append(
-                at_most(
+                Observed(
                     f"kalman.moment.{name}{band.replace(', ', '.')}",
                     SYSTEM,
                     f"{words}, rms by that of I beta'', {range_}",
                     max(one[key + band] for one in some),
                     "",
-                    0.02,
-                    "largest of all samples; 0.4 % were seen when the settings were chosen",
-                    "none",
-                )
+                ).at_most(0.02, "largest of all samples; 0.4 % were seen when the settings were chosen", "none")
             )
     total, inertia = (np.array([one[key] for one in own]) for key in ("all, band", "inertia"))
     shown = (
@@ -301,7 +271,7 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
         ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
     )
     return rows + [
-        within(f"kalman.{id}", SYSTEM, what, float(np.mean(values)), "", wanted, band, why, "closed form")
+        Observed(f"kalman.{id}", SYSTEM, what, float(np.mean(values)), "").within(wanted, band, why, "closed form")
         for id, what, values, wanted, band, why in shown
     ]
 

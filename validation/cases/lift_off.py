@@ -27,7 +27,7 @@ from validation.common import checks
 from validation.common.bounces import Bounces, energy
 from validation.common.checks import acceleration_gap
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, System, at_most, finding, within
+from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.common.scenes import STUDY_ROAD, VEHICLES, gap
 
 TITLE = "Tyres that only push"
@@ -82,16 +82,13 @@ def _accelerations(parameters: str) -> list[Row]:
             error = acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
-                at_most(
+                Observed(
                     f"lift_off.audit.{engine}.{parameters}.{geometry}",
                     SYSTEM,
                     f"{what}, {engine} against the written equations, {parameters}, {geometry} geometry",
                     error,
                     "of the largest",
-                    1e-12,
-                    "a dozen products of doubles; the law stands in each by itself",
-                    "native",
-                )
+                ).at_most(1e-12, "a dozen products of doubles; the law stands in each by itself", "native")
             )
     return rows
 
@@ -101,32 +98,21 @@ def _paths(parameters: str, duration: float) -> list[Row]:
     own = scene(parameters, duration=duration, step=5e-4, road=True)
     runs = {engine: simulate(own, engine) for engine in ALL}
     rows = [
-        at_most(
+        Observed(
             f"lift_off.path.{engine}.{parameters}",
             SYSTEM,
             f"states over {duration:g} s of the study road, {engine} against reference, {parameters}",
             gap(runs[engine], runs["reference"]),
             STATES,
-            1e-11,
-            f"{ROUNDING}; each landing makes the difference some times as large",
-            "native",
-        )
+        ).at_most(1e-11, f"{ROUNDING}; each landing makes the difference some times as large", "native")
         for engine in ENGINES
     ]
     least = min(_loads(run).min() for run in runs.values())
     return [
         *rows,
-        within(
-            f"lift_off.least.{parameters}",
-            SYSTEM,
-            f"least wheel load of these runs, {parameters}",
-            float(least),
-            "N",
-            0.0,
-            0.0,
-            "wheels leave the road, and no tyre pulls",
-            "none",
-        ),
+        Observed(
+            f"lift_off.least.{parameters}", SYSTEM, f"least wheel load of these runs, {parameters}", float(least), "N"
+        ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
     ]
 
 
@@ -151,17 +137,14 @@ def _exact(duration: float) -> list[Row]:
             error = float(np.abs(simulate(own, engine).states - exact).max())
             name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
             rows.append(
-                at_most(
+                Observed(
                     name,
                     SYSTEM,
                     f"vehicle dropped from 0.3 m, tyre dampers {what}: states beside matrix "
                     f"exponentials between the switches, {engine} at 0.1 ms",
                     error,
                     STATES,
-                    2e-4,
-                    "a corner within a step costs its square, at every landing",
-                    "closed form",
-                )
+                ).at_most(2e-4, "a corner within a step costs its square, at every landing", "closed form")
             )
     return rows
 
@@ -183,7 +166,7 @@ def _order(halvings: int) -> Row:
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
     why = "the force has corners: 2 on the average, 4 between them"
-    return finding("lift_off.order", SYSTEM, what, slope, "", 2.0, why, "closed form")
+    return Observed("lift_off.order", SYSTEM, what, slope, "").beside(2.0, why, "closed form")
 
 
 @allowing(
@@ -200,31 +183,25 @@ def _energy(duration: float) -> list[Row]:
         found = energy(assemble(own), states)
         size = found[0] - energy(assemble(own), np.zeros((1, 8)))[0]  # by its fall to the road
         rows.append(
-            at_most(
+            Observed(
                 f"lift_off.energy.{engine}",
                 SYSTEM,
                 f"change of energy of a bouncing vehicle without dampers, {duration:g} s, {engine}",
                 float(np.abs(found - found[0]).max() / size),
                 "of the fall's",
-                1e-4,
-                "the error of the step",
-                "closed form",
-            )
+            ).at_most(1e-4, "the error of the step", "closed form")
         )
         damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
         found = energy(assemble(damped), simulate(damped, engine).states)
         gain = float((found - np.minimum.accumulate(found)).max() / size)
         rows.append(
-            at_most(
+            Observed(
                 f"lift_off.gain.{engine}",
                 SYSTEM,
                 f"the same with dampers in the tyres alone: gain of energy, {engine}",
                 gain,
                 "of the fall's",
-                1e-4,
-                "the damper takes energy and never gives any",
-                "closed form",
-            )
+            ).at_most(1e-4, "the damper takes energy and never gives any", "closed form")
         )
     return rows
 
@@ -253,7 +230,7 @@ def _pulls(quick: bool) -> list[Row]:
         ("rms", words, deviations[1] / deviations[0], "", 1.0, "what the linear tyre costs"),
     )
     return [
-        finding(f"lift_off.{id}", SYSTEM, words, value, unit, expected, why, "none")
+        Observed(f"lift_off.{id}", SYSTEM, words, value, unit).beside(expected, why, "none")
         for id, words, value, unit, expected, why in shown
     ]
 
@@ -286,28 +263,22 @@ def _in_space(quick: bool) -> list[Row]:
     apart = max(np.abs(one.positions - two.positions).max(), np.abs(one.rates - two.rates).max())
     return [
         *(
-            at_most(
+            Observed(
                 f"lift_off.space.{engine}",
                 "ride",
                 f"R19-ride, tyres in the air, pressed and hit: accelerations, {engine} against the written ones",
                 worst[engine],
                 "of the largest",
-                1e-12,
-                "each has the law in its code",
-                "native",
-            )
+            ).at_most(1e-12, "each has the law in its code", "native")
             for engine in ENGINES
         ),
-        at_most(
+        Observed(
             "lift_off.ride",
             "ride",
             "R19-ride on 20 times the paper's road: states, exudyn against mujoco",
             float(apart),
             STATES,
-            1e-10,
-            ROUNDING,
-            "native",
-        ),
+        ).at_most(1e-10, ROUNDING, "native"),
     ]
 
 
@@ -320,25 +291,14 @@ def _above_a_cut() -> list[Row]:
     apart = max(float(np.abs(runs[engine].states - runs["reference"].states).max()) for engine in ENGINES)
     loads = runs["reference"].wrenches[:, :, 2]
     return [
-        at_most(
+        Observed(
             "lift_off.hubs",
             "drift",
             f"R19-free on a class E road, {duration:g} s: states of exudyn and mujoco against the reference",
             apart,
             STATES,
-            1e-10,
-            "one law, three mass matrices",
-            "shared kernel",
-        ),
-        within(
-            "lift_off.hubs.least",
-            "drift",
-            "the same: least force of the road on a hub",
-            float(loads.min()),
-            "N",
-            0.0,
-            0.0,
-            "wheels leave the road, and no tyre pulls",
-            "none",
-        ),
+        ).at_most(1e-10, "one law, three mass matrices", "shared kernel"),
+        Observed(
+            "lift_off.hubs.least", "drift", "the same: least force of the road on a hub", float(loads.min()), "N"
+        ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
     ]

@@ -13,7 +13,7 @@ from models.systems.wheel_rail.run import run
 from models.systems.wheel_rail.scene import Positions
 from validation.cases.contact_profiles import RAIL_FILE, WHEEL_FILE
 from validation.common.grounds import allowing
-from validation.common.rows import Row, System, Table, at_most, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import data_folder
 from validation.contact.manchester_references import (
     CONTACT,
@@ -46,17 +46,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     placed, each = _placed("A-2", published[:, 0])
     rows = [row for wheel in WHEELS for row in _published_rows(wheel, placed, published)]
     rows.append(
-        within(
+        Observed(
             "manchester.two_patches",
             SYSTEM,
             "patches on the right wheel at 5 mm, case A-1",
             float(len(placed_at("A-1", 5e-3).right)),
             "",
-            2.0,
-            0.0,
-            "the gauge corner takes over from the head",
-            "published",
-        )
+        ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
     data: dict[str, Any] = {"A-2": [_told(one) for one in placed], "published": published.tolist()}
     if not quick:
@@ -86,40 +82,26 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
     place, _, _ = off.max(axis=0).tolist()
     _, force, peak = (100.0 * off / published_sums).max(axis=0).tolist()
     rows = [
-        at_most(
+        Observed(
             f"manchester.places.{wheel}",
             SYSTEM,
             f"mean place of contact of the {wheel} wheel, largest difference",
             place,
             "mm",
-            PLACE,
-            PUBLISHED,
-            "published",
-        ),
-        at_most(
-            f"manchester.forces.{wheel}",
-            SYSTEM,
-            f"normal force of the {wheel} wheel, largest difference",
-            force,
-            "%",
-            FORCE,
-            PUBLISHED,
-            "published",
-        ),
-        finding(
-            f"manchester.peaks.{wheel}",
-            SYSTEM,
-            f"largest pressure of the {wheel} wheel, largest difference",
-            peak,
-            "%",
-            0.0,
-            "CONTACT's cells of 0.2 mm; a flange's patch has four of them",
-        ),
+        ).at_most(PLACE, PUBLISHED, "published"),
+        Observed(
+            f"manchester.forces.{wheel}", SYSTEM, f"normal force of the {wheel} wheel, largest difference", force, "%"
+        ).at_most(FORCE, PUBLISHED, "published"),
+        Observed(
+            f"manchester.peaks.{wheel}", SYSTEM, f"largest pressure of the {wheel} wheel, largest difference", peak, "%"
+        ).beside(0.0, "CONTACT's cells of 0.2 mm; a flange's patch has four of them"),
     ]
     if wheel == "right":
         why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
         roll = np.abs(np.array([1e3 * position.roll for position in placed]) - published[:, 1])
-        rows.append(finding("manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad", 0.0, why))
+        rows.append(
+            Observed("manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad").beside(0.0, why)
+        )
     return rows
 
 
@@ -147,27 +129,13 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
     )
     return [
         *(
-            at_most(
-                f"manchester.search.{name}",
-                SYSTEM,
-                f"{what}, largest difference",
-                float(gap),
-                unit,
-                bound,
-                why,
-                "closed form",
+            Observed(f"manchester.search.{name}", SYSTEM, f"{what}, largest difference", float(gap), unit).at_most(
+                bound, why, "closed form"
             )
             for (name, what, unit, bound, why), gap in zip(told, np.max(gaps, axis=0), strict=True)
         ),
-        at_most(
-            "manchester.mirror",
-            SYSTEM,
-            "shifted and turned the other way, wheels exchanged",
-            mirror,
-            "",
-            1e-9,
-            "the track is symmetric",
-            "none",
+        Observed("manchester.mirror", SYSTEM, "shifted and turned the other way, wheels exchanged", mirror, "").at_most(
+            1e-9, "the track is symmetric", "none"
         ),
     ]
 
@@ -178,12 +146,13 @@ def _axle_row(placed: Placed) -> Row:
         sum(p.fx * p.rolling_radius - p.mz * np.sin(p.angle) for p in wheel) for wheel in (placed.right, placed.left)
     ]
     most = SCENE.cases["A-2"].friction * SCENE.wheelset.load * placed.right[0].rolling_radius
-    return at_most(
+    return Observed(
         "manchester.axle",
         SYSTEM,
         "moment of a wheel's creep forces about the axle, no shift, case A-2",
         float(np.abs(moments).max() / most),
         "mu N R",
+    ).at_most(
         1e-3,
         "patches that have grown together lean by some mrad, which leaves a part of their levers out",
         "closed form",
@@ -201,34 +170,14 @@ def _split_rows(placed: Placed) -> list[Row]:
         for name, other in (("apart", alone), ("one plane", plane))
     }
     return [
-        at_most(
-            "manchester.split.apart",
-            SYSTEM,
-            "shares of two patches at 5 mm, by the wheel's force",
-            far["apart"],
-            "%",
-            FORCE,
-            "each on a half-space of its own that the other's resultant sinks",
-            "closed form",
-        ),
-        at_most(
-            "manchester.split.plane",
-            SYSTEM,
-            "shares of two patches at 5 mm on one plane",
-            far["one plane"],
-            "%",
-            FORCE,
-            "exact theory on CONTACT's plane, lowered as the wheel is",
-            "native",
-        ),
-        finding(
-            "manchester.split.mean",
-            SYSTEM,
-            "mean place at 5 mm on CONTACT's own plane",
-            mean,
-            "mm",
-            float(CONTACT[10, 2]),
-            "CONTACT lays more on the smaller patch; 4 um of shift do the same",
+        Observed(
+            "manchester.split.apart", SYSTEM, "shares of two patches at 5 mm, by the wheel's force", far["apart"], "%"
+        ).at_most(FORCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
+        Observed(
+            "manchester.split.plane", SYSTEM, "shares of two patches at 5 mm on one plane", far["one plane"], "%"
+        ).at_most(FORCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
+        Observed("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm").beside(
+            float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
         ),
     ]
 
@@ -239,16 +188,9 @@ def _load_row(static: list[Placed]) -> Row:
         for one in static
         for wheel in (one.right, one.left)
     )
-    return at_most(
-        "manchester.load",
-        SYSTEM,
-        "vertical sum of a wheel's normal forces less its load, case A-1",
-        off,
-        "",
-        1e-5,
-        "patches share the load to the precision of the shares",
-        "none",
-    )
+    return Observed(
+        "manchester.load", SYSTEM, "vertical sum of a wheel's normal forces less its load, case A-1", off, ""
+    ).at_most(1e-5, "patches share the load to the precision of the shares", "none")
 
 
 def _file_rows(placed: list[Placed]) -> list[Row]:
@@ -266,16 +208,9 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
     pairs = [(sums(one, wheel), sums(theirs, wheel)) for one, theirs in chosen for wheel in WHEELS]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
-        at_most(
-            f"manchester.files.{name}",
-            SYSTEM,
-            f"{name}: {words}, largest difference",
-            max(one[k] for one in off),
-            unit,
-            bound,
-            "the bound asked for",
-            "published",
-        )
+        Observed(
+            f"manchester.files.{name}", SYSTEM, f"{name}: {words}, largest difference", max(one[k] for one in off), unit
+        ).at_most(bound, "the bound asked for", "published")
         for name, (unit, bound, k) in names.items()
     ]
 
@@ -283,15 +218,13 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
 def _price_rows(each: dict[str, float]) -> list[Row]:
     why = "geometry, roll, exact normal contact; rolling also the speed of spin"
     return [
-        finding(
+        Observed(
             f"manchester.price.{name}",
             SYSTEM,
             f"processor time of one position, both wheels, case {name}, all of them once",
             seconds,
             "s",
-            "-",
-            why,
-        )
+        ).beside("-", why)
         for name, seconds in each.items()
     ]
 

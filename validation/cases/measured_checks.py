@@ -12,7 +12,7 @@ from models.measured.checks import check
 from models.measured.faults_of_measurement import Faults
 from models.systems.measured.virtual import VirtualMeasurement
 from models.vehicles.cut_vehicle import GRAVITY
-from validation.common.rows import Row, System, Table, behaves, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 from validation.measured import measured_car
 from validation.measured import recording as car
 from validation.measured.planted import (
@@ -139,13 +139,13 @@ def _size(found: Sequence[Finding], check: str, place: str = "") -> float:
 def _sized(key: str, quantity: str, size: float, unit: str, wanted: float) -> Row:
     """Row of the size of what was planted."""
     id, why = f"measured_checks.{key}", "what was planted, 20 %"
-    return within(id, SYSTEM, quantity, size, unit, wanted, SHARE * abs(wanted), why, "closed form")
+    return Observed(id, SYSTEM, quantity, size, unit).within(wanted, SHARE * abs(wanted), why, "closed form")
 
 
 def _none(key: str, quantity: str, texts: list[str], why: str) -> Row:
     """Row of findings of which there must be none."""
     id, said = f"measured_checks.{key}", "; ".join(texts) or why
-    return within(id, SYSTEM, quantity, len(texts), "", 0, 0, said, "closed form")
+    return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
 
 
 def _rows(fault: Planted, found: tuple[Finding, ...]) -> list[Row]:
@@ -188,7 +188,7 @@ def _strangers(folder: Path) -> list[Row]:
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
     other = "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     return [
-        within(id, SYSTEM, what, excess, "%", wanted, SHARE * 6.6, why, "closed form"),
+        Observed(id, SYSTEM, what, excess, "%").within(wanted, SHARE * 6.6, why, "closed form"),
         _none("strangers", other, errors, "doubts are allowed, errors would stop a good recording"),
     ]
 
@@ -215,7 +215,7 @@ def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
     late = 1e3 * float(np.mean([_size(own[:1], own[0].check) if own else np.nan for own in found]))
     what = f"3 ms late, one force: mean over {SAMPLES} samples of noise"
     why = "5 %: the response is linear, the vehicle is not"
-    return within("measured_checks.spread", SYSTEM, what, late, "ms", 3.0, 0.15, why, "closed form")
+    return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
 
 
 def _moving_car(folder: Path) -> list[Row]:
@@ -253,15 +253,13 @@ def _moving_car(folder: Path) -> list[Row]:
             "gravity and the turning of the pose tell",
         ),
         _sized("car.degrees", "the same with degrees for radians in pitch: size", size, "1", DEGREES),
-        finding(
+        Observed(
             "measured_checks.car.ratio",
             SYSTEM,
             "the same: pitch rate of the gyro by that of the camera's pose",
             _size(found["clean"], "turning", "pitch"),
             "1",
-            1.0,
-            "a telephone beside a camera at 20 Hz",
-        ),
+        ).beside(1.0, "a telephone beside a camera at 20 Hz"),
     ]
 
 

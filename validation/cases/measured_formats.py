@@ -17,7 +17,7 @@ from models.fatigue.damage import pseudo_damage
 from models.measured.channel import Source
 from models.measured.formats import open_source, write
 from models.measured.formats.writing import Group
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 from validation.measured.measured_files import csv_forms, kinds
 from validation.measured.measured_files.odd import Odd, read
 from validation.measured.measured_files.own_libraries import LIBRARIES
@@ -107,25 +107,11 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     lost = ", ".join(what for what, good in kept(source).items() if not good)
     key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
-        at_most(
-            f"{key}.values",
-            SYSTEM,
-            f"{form}: values there and back, by block",
-            error,
-            "of the value",
-            RESOLUTION[extension],
-            why,
-            "closed form",
+        Observed(f"{key}.values", SYSTEM, f"{form}: values there and back, by block", error, "of the value").at_most(
+            RESOLUTION[extension], why, "closed form"
         ),
-        at_most(
-            f"{key}.times",
-            SYSTEM,
-            f"{form}: times there and back",
-            off,
-            "s",
-            1e-12,
-            "a thousand millionth of a period; CSV writes times with 15 digits",
-            "closed form",
+        Observed(f"{key}.times", SYSTEM, f"{form}: times there and back", off, "s").at_most(
+            1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"
         ),
         behaves(
             f"{key}.texts",
@@ -135,15 +121,8 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             "kept",
             "a file without them cannot be mapped by anybody else",
         ),
-        at_most(
-            f"{key}.library",
-            SYSTEM,
-            f"{form}: values as {library} reads the file",
-            own,
-            "of the value",
-            RESOLUTION[extension],
-            f"{why}; names and units are compared, too",
-            "native",
+        Observed(f"{key}.library", SYSTEM, f"{form}: values as {library} reads the file", own, "of the value").at_most(
+            RESOLUTION[extension], f"{why}; names and units are compared, too", "native"
         ),
     ], {
         "format": form,
@@ -168,16 +147,13 @@ def two_rates(path: Path, extension: str) -> Row:
         for (name,), (period, own) in values.items()
         for k, truth in ((0, period * np.arange(len(own))), (1, own))
     ]
-    return at_most(
+    return Observed(
         f"measured_formats.{extension[1:]}.rates",
         SYSTEM,
         f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, times and values there and back",
         max(errors),
         "s or N",
-        1e-12,
-        "each group has a clock of its own",
-        "closed form",
-    )
+    ).at_most(1e-12, "each group has a clock of its own", "closed form")
 
 
 def forms(folder: Path) -> list[Row]:
@@ -191,26 +167,20 @@ def forms(folder: Path) -> list[Row]:
     why = "all of them are hard cases of their own"
     bits = f"{why}; half a bit of a time of 0.4 s, and less than the last bit of any force"
     return [
-        at_most(
+        Observed(
             "measured_formats.forms.values",
             SYSTEM,
             f"{len(read)} forms of CSV and of names of files: times and values beside those of the plain file",
             max(errors),
             "s or N",
-            1e-16,
-            bits,
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-16, bits, "closed form"),
+        Observed(
             "measured_formats.forms.silent",
             SYSTEM,
             f"{len(files) - len(read)} forms with two meanings and files of other kinds: read without a word",
             silent,
             "files",
-            0.0,
-            f"{why}; each refusal says what to do",
-            "none",
-        ),
+        ).at_most(0.0, f"{why}; each refusal says what to do", "none"),
         behaves(
             "measured_formats.forms.crashes",
             SYSTEM,
@@ -249,26 +219,20 @@ def resolution(folder: Path) -> list[Row]:
     errors = [abs(pseudo_damage(own[:4500]) / pseudo_damage(load[:4500]) - 1.0) for own in (floating, whole)]
     why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
     return [
-        at_most(
+        Observed(
             "measured_formats.rsp.damage",
             SYSTEM,
             "RPC III as it is written, 32-bit floating point: damage",
             errors[0],
             "relative",
-            1e-5,
-            why,
-            "closed form",
-        ),
-        finding(
+        ).at_most(1e-5, why, "closed form"),
+        Observed(
             "measured_formats.rsp.whole",
             SYSTEM,
             "RPC III with 16-bit whole numbers instead: damage",
             errors[1],
             "relative",
-            "not written; read where others have",
-            why,
-            "closed form",
-        ),
+        ).beside("not written; read where others have", why, "closed form"),
     ]
 
 
@@ -295,26 +259,16 @@ def memory(path: Path, extension: str) -> list[Row]:
     size = path.stat().st_size / 1e6
     path.unlink()
     return [
-        within(
-            f"{key}.samples",
-            SYSTEM,
-            f"{form}: samples of five minutes read by block",
-            found,
-            "",
-            count,
-            0,
-            "a count: none is lost between blocks",
-            "none",
+        Observed(f"{key}.samples", SYSTEM, f"{form}: samples of five minutes read by block", found, "").within(
+            count, 0, "a count: none is lost between blocks", "none"
         ),
-        aim(
+        Observed(
             key,
             SYSTEM,
             f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block, once",
             peak / 1e3,
             "MB",
-            350.0,
-            "libraries included; blocks of 29 MB, the same for a file of an hour",
-        ),
+        ).aim(350.0, "libraries included; blocks of 29 MB, the same for a file of an hour"),
     ]
 
 

@@ -17,7 +17,7 @@ from models.systems.measured.section_run import Hold, run
 from models.systems.measured.sections import Sections, guided
 from models.systems.measured.verdict import checks, compare
 from models.vehicles.cut_vehicle import cut
-from validation.common.rows import Row, System, Table, aim, at_most, behaves, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.measured.long_recording import SEED, answers_of, killed, run_of
 from validation.spatial.cars import anywhere, shaken, twin
 from validation.spatial.joint_forces import exudyn_guides, mujoco_guides
@@ -58,17 +58,14 @@ def _guides(quick: bool) -> list[Row]:
         found, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
         worst = max(worst, float(np.abs(found - other).max() / np.abs(other).max()))
     rows = [
-        at_most(
+        Observed(
             "measured_long.guides_mujoco",
             SYSTEM,
             "forces and moments that guides transmit, of a car without "
             "symmetry that turns, beside MuJoCo's force and torque sensors, relative",
             worst,
             "1",
-            1e-11,
-            "Newton and Euler along the run; the sensors know nothing of the kernel",
-            "native",
-        )
+        ).at_most(1e-11, "Newton and Euler along the run; the sensors know nothing of the kernel", "native")
     ]
     if quick:
         return rows
@@ -79,16 +76,13 @@ def _guides(quick: bool) -> list[Row]:
     off = float(np.abs(found - other).max() / np.abs(other).max())
     return [
         *rows,
-        at_most(
+        Observed(
             "measured_long.guides_exudyn",
             SYSTEM,
             "the same at rest beside the constraints of free bodies in Exudyn, relative",
             off,
             "1",
-            1e-5,
-            "positions rounded to 1e-16 m over the square of a step of 3e-5 s",
-            "native",
-        ),
+        ).at_most(1e-5, "positions rounded to 1e-16 m over the square of a step of 3e-5 s", "native"),
     ]
 
 
@@ -120,17 +114,13 @@ def _counting() -> list[Row]:
             "the standard's own table",
             "published",
         ),
-        within(
+        Observed(
             "measured_long.sine_damage",
             SYSTEM,
             "pseudo-damage, slope 5, of 100 periods of a sine of amplitude 1",
             counted.damage[5.0],
             "1",
-            99.5 * 2**5 + 2 * 0.5,
-            1e-9,
-            "199 half cycles of 2 and two of 1 at the ends",
-            "closed form",
-        ),
+        ).within(99.5 * 2**5 + 2 * 0.5, 1e-9, "199 half cycles of 2 and two of 1 at the ends", "closed form"),
         behaves(
             "measured_long.levels",
             SYSTEM,
@@ -154,17 +144,14 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
         run(own, place / name, block=block)
         bits.append(np.frombuffer(answers_of(place, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
-    return at_most(
+    return Observed(
         f"measured_long.blocks_{engine}_{method}",
         SYSTEM,
         f"answers in {engine}, stabiliser {method}, of "
         f"which bits change when {seconds:g} s are run in blocks of 0.073 s",
         changed,
         "1",
-        0.0,
-        "state, filter and inputs go from block to block as they are",
-        "closed form",
-    )
+    ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
 
 
 def _killed(folder: Path) -> Row:
@@ -180,17 +167,14 @@ def _killed(folder: Path) -> Row:
             run(own, place / "run")
         bits.append(np.frombuffer(answers_of(place), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
-    return at_most(
+    return Observed(
         "measured_long.killed",
         SYSTEM,
         f"answers of which bits change when a run of {seconds:g} s in "
         f"blocks of 0.25 s is killed twice at moments drawn from seed {SEED}, and goes on",
         changed,
         "1",
-        0.0,
-        "a checkpoint is written whole or not at all",
-        "closed form",
-    )
+    ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
 
 
 def _memory(folder: Path) -> list[Row]:
@@ -203,26 +187,21 @@ def _memory(folder: Path) -> list[Row]:
     half, last = lines[len(lines) // 2], lines[-1]
     growth = (last[1] - half[1]) / (last[0] - half[0])
     return [
-        aim(
+        Observed(
             "measured_long.memory",
             SYSTEM,
             f"memory for 60 channels at 1 kHz, once: the largest over {LONG:g} s in "
             "ten blocks, and an hour of its growth over the second half",
             float(last[1] + growth * 3600.0),
             "B",
-            2e9,
-            "only a block is in memory",
-        ),
-        aim(
+        ).aim(2e9, "only a block is in memory"),
+        Observed(
             "measured_long.speed",
             SYSTEM,
             "seconds of recording per second of processor, once, MuJoCo, step 2 ms, all sections",
             float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])),
             "1",
-            1.0,
-            "how long an hour takes",
-            "at least",
-        ),
+        ).aim(1.0, "how long an hour takes", "at least"),
     ]
 
 
@@ -245,16 +224,13 @@ def _handed_on(folder: Path) -> list[Row]:
     compared = [compare(own.recording, found, *pair) for pair in checks(own)]
     force = next(each for each in compared if each.signal.name == "front left_force")
     return [
-        at_most(
+        Observed(
             "measured_long.handed_on",
             SYSTEM,
             "section forces written as CSV, MDF, RPC III and TDMS and read back, relative",
             worst,
             "1",
-            2.0**-24,
-            "RPC III keeps singles, the others every bit",
-            "native",
-        ),
+        ).at_most(2.0**-24, "RPC III keeps singles, the others every bit", "native"),
         behaves(
             "measured_long.handed_on_names",
             SYSTEM,
@@ -263,16 +239,13 @@ def _handed_on(folder: Path) -> list[Row]:
             "True",
             "they say axes and signs",
         ),
-        at_most(
+        Observed(
             "measured_long.check_channel",
             SYSTEM,
             "part of the variance of a measured spring force that the stabilised run does not give",
             1.0 - force.explained,
             "1",
-            0.01,
-            "noise of 8 N on 100 N, and what the filter adds",
-            "native",
-        ),
+        ).at_most(0.01, "noise of 8 N on 100 N, and what the filter adds", "native"),
     ]
 
 

@@ -26,7 +26,7 @@ from models.systems.measured.verdict import errors, judge, judge_beside_truth
 from models.systems.measured.virtual import VirtualMeasurement, VirtualTable, group, map_lines, virtual_measurement
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, cut, rigid
 from models.vehicles.vehicle_file import SHIPPED, load_vehicle
-from validation.common.rows import Row, System, Table, at_most, behaves, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, behaves, not_run
 from validation.measured import measured_car
 from validation.measured import recording as moving_car
 
@@ -176,28 +176,25 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
     worst = max(means, key=lambda name: abs(means[name] - 1))
     what = f"{proof.name}, frame {proof.frame!r}, {proof.bits} bit, through {form}"
     return [
-        at_most(
+        Observed(
             f"measured_virtual.values_{proof.name}_{form}",
             SYSTEM,
             f"change of hub channels by file, map and clock, by their largest value; {what}",
             off,
             "1",
+        ).at_most(
             2**-23 if form == "rsp" else 1e-12,
             "RPC III holds single precision, the others every bit; units cost a rounding",
             "native",
         ),
-        within(
+        Observed(
             f"measured_virtual.damage_{proof.name}_{form}",
             SYSTEM,
             f"damage (slope 5) of {worst}, the farthest "
             f"from the truth of {len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
             means[worst],
             "1",
-            1.0,
-            DAMAGE,
-            "demanded; body-frame section forces of the run held by the filter",
-            "none",
-        ),
+        ).within(1.0, DAMAGE, "demanded; body-frame section forces of the run held by the filter", "none"),
     ]
 
 
@@ -210,16 +207,13 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
     held_run = runs[ENGINES[-1]]
     blind = judge(held_run, true.vehicle, proof.hold, first.period)
     rows = [
-        at_most(
+        Observed(
             f"measured_virtual.engines_{proof.name}",
             SYSTEM,
             f"answers of Exudyn and MuJoCo apart, by the largest of each; {proof.name}, held, {first.duration:g} s",
             apart,
             "1",
-            1e-6,
-            "same tableau, same step",
-            "shared kernel",
-        ),
+        ).at_most(1e-6, "same tableau, same step", "shared kernel"),
         behaves(
             f"measured_virtual.verdict_{proof.name}",
             SYSTEM,
@@ -239,16 +233,14 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
         run = error.partial
     said = judge(run, true.vehicle, free, first.period, trusted=until)
     rows.append(
-        finding(
+        Observed(
             f"measured_virtual.free_{proof.name}",
             SYSTEM,
             f"the same forces on the free vehicle, frame "
             f"{proof.frame!r}: its run ends after (s); verdict: {said.word}, {said.reason}",
             (run.done - 1) * run.period,
             "s",
-            first.duration,
-            "stated",
-        )
+        ).beside(first.duration, "stated")
     )
     return rows
 
@@ -270,18 +262,14 @@ def _trusted() -> list[Row]:
         assert predicted is not None
         found = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(
-            within(
+            Observed(
                 f"measured_virtual.trust_{name}",
                 SYSTEM,
                 f"median time at which roll or pitch is off by "
                 f"0.05 rad, {COPIES} free runs on a rough road, by the predicted one ({name}, {frame!r})",
                 found / predicted,
                 "1",
-                1.0,
-                0.2,
-                "demanded; the median of 16 has a deviation of 3 to 10 %",
-                "closed form",
-            )
+            ).within(1.0, 0.2, "demanded; the median of 16 has a deviation of 3 to 10 %", "closed form")
         )
     return rows
 
@@ -321,9 +309,9 @@ def _moving(folder: Path) -> list[Row]:
     mounted, size = "two devices, each as it was mounted", float(np.linalg.norm(up))
     gyro = f"{gyro}, as the check finds it"
     return [
-        within(f"{id}_gyro", SYSTEM, gyro, ratio or 0.0, "1", 1.0, 0.1, mounted, "none"),
-        finding(f"{id}_shift", SYSTEM, late, shift or 0.0, "s", "", "two clocks"),
-        within(f"{id}_gravity", SYSTEM, means, size, "m/s^2", 9.81, 0.2, why, "none"),
+        Observed(f"{id}_gyro", SYSTEM, gyro, ratio or 0.0, "1").within(1.0, 0.1, mounted, "none"),
+        Observed(f"{id}_shift", SYSTEM, late, shift or 0.0, "s").beside("", "two clocks"),
+        Observed(f"{id}_gravity", SYSTEM, means, size, "m/s^2").within(9.81, 0.2, why, "none"),
     ]
 
 
@@ -339,37 +327,27 @@ def _quick(folder: Path) -> list[Row]:
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
     deviations = drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
     return [
-        at_most(
+        Observed(
             "measured_virtual.values",
             SYSTEM,
             "change of hub channels by a CSV file, map and clock, by their largest value",
             _changed(recording, true, samples),
             "1",
-            1e-12,
-            "units cost a rounding",
-            "native",
-        ),
-        within(
+        ).at_most(1e-12, "units cost a rounding", "native"),
+        Observed(
             "measured_virtual.damage",
             SYSTEM,
             "damage (slope 5) of the front left spring, 0.6 s of a rough road, by the true one",
             found.damage["front left"],
             "1",
-            1.0,
-            0.1,
-            "one sample of noise",
-            "none",
-        ),
-        at_most(
+        ).within(1.0, 0.1, "one sample of noise", "none"),
+        Observed(
             "measured_virtual.law",
             SYSTEM,
             "deviation of roll, pitch and heading after 10 s of noise beside q t^3/3",
             float(np.abs(deviations / np.sqrt(law[0]) - 1).max()),
             "1",
-            1e-4,
-            "no growth in the frame of the hubs",
-            "closed form",
-        ),
+        ).at_most(1e-4, "no growth in the frame of the hubs", "closed form"),
     ]
 
 

@@ -25,7 +25,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import assemble, settings_of
 from models.systems.pitch_plane.scene import build as build_scene
 from validation.common.bands import mean_square
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import on_paper_road
 from validation.hard_cases.case import IMPLEMENTATIONS
 from validation.spatial.spatial_motion import ARRAYS, PATH, tilted
@@ -78,7 +78,7 @@ def _exact(name: str) -> list[Row]:
         ("consistency", "share of the readings that no rigid body explains", quality(array, clean).share, ""),
     )
     return [
-        at_most(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit, BOUND, why, "closed form")
+        Observed(f"{key}.{id}", SYSTEM, f"{words}, {what}", value, unit).at_most(BOUND, why, "closed form")
         for id, words, value, unit in shown
     ]
 
@@ -90,15 +90,14 @@ def _plain() -> Row:
     m = np.swapaxes(relative, 1, 2) @ np.linalg.pinv((floor - floor.mean(axis=0)).T)
     plain = 0.5 * (m[:, 2, 1] - m[:, 1, 2])
     half = 0.5 * (PATH.alpha[:, 0] + PATH.rates[:, 1] * PATH.rates[:, 2])
-    return at_most(
+    return Observed(
         "motion.plain",
         SYSTEM,
         "eq. (18) as printed, sensors in a plane: roll acceleration against (alpha1 + w2 w3) / 2",
         float(np.abs(plain - half).max()),
         "rad/s^2",
-        BOUND,
-        "half of the true value plus a bias, without a word: this is why planes are detected",
-        "closed form",
+    ).at_most(
+        BOUND, "half of the true value plus a bias, without a word: this is why planes are detected", "closed form"
     )
 
 
@@ -110,17 +109,13 @@ def _order() -> Row:
         float(np.abs(motion(array, clean[::n], n * PATH.period, PATH.start).position - PATH.position[::n]).max())
         for n in (40, 20)
     ]
-    return within(
+    return Observed(
         "motion.order",
         SYSTEM,
         "order of the recovered position in the sampling period, 40 and 20 ms",
         float(np.log2(errors[0] / errors[1])),
         "",
-        4.0,
-        0.4,
-        "cubics through four neighbours and a fourth-order step of the quaternion",
-        "closed form",
-    )
+    ).within(4.0, 0.4, "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
 
 
 def _tilt() -> Row:
@@ -130,7 +125,9 @@ def _tilt() -> Row:
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
     what = f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2"
     worst = float(np.abs(found - law).max() / law[-1])
-    return at_most("motion.tilt", SYSTEM, what, worst, "", 1e-10, "a constant is integrated exactly", "closed form")
+    return Observed("motion.tilt", SYSTEM, what, worst, "").at_most(
+        1e-10, "a constant is integrated exactly", "closed form"
+    )
 
 
 def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
@@ -147,26 +144,29 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
             key = f"motion.gain.{formula}.{height:g}"
             rows.append(
                 mean_square(
-                    key,
-                    SYSTEM,
-                    f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
-                    f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula",
-                    found,
+                    Observed(
+                        key,
+                        SYSTEM,
+                        f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
+                        f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula",
+                        found,
+                        "1/m^2",
+                    ),
                     law,
                     count,
-                    "1/m^2",
                     f"{count:,} samples; gain {law**0.5:.3g} 1/m",
                 )
             )
             line += [law**0.5, found**0.5]
         if height in HEIGHTS:
             rows.append(
-                within(
+                Observed(
                     f"motion.known_gain.{height:g}",
                     SYSTEM,
                     f"largest noise gain, fifth sensor {height:g} m up, plain formula",
                     line[1],
                     "1/m",
+                ).within(
                     HEIGHTS[height],
                     0.04 * HEIGHTS[height],
                     "figures relative to the last sensor; relative to the mean up to 3 % less",
@@ -202,13 +202,14 @@ def _engine(engine: str, duration: float) -> list[Row]:
     return [
         *_follows("accelerometers", engine, array, felt, run.states, None),
         *_follows("gyro", engine, array, felt, run.states, turning),
-        at_most(
+        Observed(
             f"motion.pitch_acceleration.{engine}",
             SYSTEM,
             "pitch acceleration from the readings of "
             f"{engine}'s run against the paper's equations at its states, by the largest",
             float(np.abs(found - true).max() / np.abs(true).max()),
             "",
+        ).at_most(
             BOUND,
             "the engine's acceleration beside eq. (38), as in the build audit",
             "shared kernel" if engine == "reference" else "native",
@@ -222,16 +223,13 @@ def _engine(engine: str, duration: float) -> list[Row]:
             "more than 5 % is a loose mount; the one without which it passes is named",
             "closed form",
         ),
-        at_most(
+        Observed(
             f"motion.rigid.{engine}",
             SYSTEM,
             f"share that no rigid body explains, the five rigid mounts, {engine}",
             quality(array, felt).share,
             "",
-            BOUND,
-            "rounding: far below the 5 % at which a mount is called loose",
-            "closed form",
-        ),
+        ).at_most(BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
     ]
 
 
@@ -246,16 +244,13 @@ def _follows(
     )
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
-        at_most(
+        Observed(
             f"motion.recovered.{way}.{what}.{engine}",
             SYSTEM,
             f"{what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
             unit,
-            bound,
-            "cubics through samples of 1 ms, across wheel modes of 700 1/s",
-            "closed form",
-        )
+        ).at_most(bound, "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")
         for what, error, unit, bound in errors
     ]
 
@@ -278,13 +273,15 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
     count, array = 6001, sensor_array(ARRAYS["5, one 1 m up"])
     errors = np.array([integrate_rates(spin(array, _noise(path, count)), PERIOD, np.zeros(3)) for path in range(paths)])
     row = mean_square(
-        "motion.walk",
-        SYSTEM,
-        "rate error of integration alone after 60 s, mean square by its gain",
-        float(np.mean((errors[:, -1] / array.gains()) ** 2)),
+        Observed(
+            "motion.walk",
+            SYSTEM,
+            "rate error of integration alone after 60 s, mean square by its gain",
+            float(np.mean((errors[:, -1] / array.gains()) ** 2)),
+            "m^2/s^2",
+        ),
         NOISE**2 * PERIOD * (count - 1) * PERIOD,
         3 * paths,
-        "m^2/s^2",
         f"{paths} paths of {NOISE:g} m/s^2 at 100 Hz, three axes: a random walk, noise^2 period time",
     )
     curves = {
@@ -307,33 +304,26 @@ def _held(curves: Saved, quick: bool) -> list[Row]:
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))
     why = f"{paths} paths of {PERIOD * (count - 1):g} s, {NOISE:g} m/s^2 at 100 Hz; filterpy's extended Kalman filter"
     rows = [
-        at_most(
+        Observed(
             "motion.held",
             SYSTEM,
             "rate error with the symmetric part as a measurement, rms of the last third, by "
             "that of integration alone at the end",
             late / walked,
             "",
-            0.8 if quick else 0.2,
-            why,
-            "closed form",
-        ),
-        within(
+        ).at_most(0.8 if quick else 0.2, why, "closed form"),
+        Observed(
             "motion.held.stated",
             SYSTEM,
             "the same by the standard deviation that the filter states",
             late / rms(stated[-count // 3 :]),
             "",
-            1.0,
-            0.5 if quick else 0.2,
-            f"{why}; it neglects that the readings are used twice",
-            "closed form",
-        ),
+        ).within(1.0, 0.5 if quick else 0.2, f"{why}; it neglects that the readings are used twice", "closed form"),
     ]
     if quick:  # too short to tell growth from settling
         return rows
     what, why = "rms of the last third by that of the second sixth", f"{why}; integration alone would grow by 1.8"
-    return [*rows, within("motion.held.growth", SYSTEM, what, late / early, "", 1.0, 0.2, why, "closed form")]
+    return [*rows, Observed("motion.held.growth", SYSTEM, what, late / early, "").within(1.0, 0.2, why, "closed form")]
 
 
 def tables(data: Saved) -> list[Table]:

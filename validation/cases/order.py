@@ -6,7 +6,7 @@ import numpy as np
 
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import CaseAnswer, Saved, System, Table, within
+from validation.common.rows import CaseAnswer, Observed, Saved, System, Table
 from validation.common.scenes import on_paper_road, road_scene
 
 TITLE = "Observed order of the largest state error on the study road"
@@ -72,16 +72,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         found = errors(engine, integrator, options, truth, duration, steps)
         name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
         rows.append(
-            within(
-                f"order.{engine}.{name}",
-                SYSTEM,
-                f"order of {name} in {engine}",
-                fitted(steps, found),
-                "",
-                order,
-                band,
-                WHY,
-                "closed form",
+            Observed(f"order.{engine}.{name}", SYSTEM, f"order of {name} in {engine}", fitted(steps, found), "").within(
+                order, band, WHY, "closed form"
             )
         )
         table.append([engine, name, *found])

@@ -6,7 +6,7 @@ other systems, beside all runs without a fault that these need.
 
 from pathlib import Path
 
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, Table, at_most
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, Table
 from validation.faults import advice, braking, choosing, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
@@ -38,16 +38,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _enough(data: Saved) -> Row:
     caught = sum(line[3] != "none" for line in _lines(data))
-    return at_most(
+    return Observed(
         "planted.count",
         SYSTEM,
         f"by how many fewer than {LEAST} faults of all systems are caught",
         max(0, LEAST - caught),
         "faults",
-        0,
-        f"{caught} of {len(_lines(data))} are",
-        "native",
-    )
+    ).at_most(0, f"{caught} of {len(_lines(data))} are", "native")
 
 
 def _lines(data: Saved) -> list[tuple[str, ...]]:

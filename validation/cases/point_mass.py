@@ -8,7 +8,7 @@ import numpy as np
 
 from models.drift.point_mass import continuous, discrete, paths
 from validation.common.bands import mean_square
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 
 TITLE = "A point mass driven by a noisy force"
 SYSTEM: System = "drift"
@@ -36,32 +36,25 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         **{f"{n} steps": [_discrete_error(x, n) for x in DAMPED] for n in LENGTHS},
     }
     rows = [
-        at_most(
+        Observed(
             f"point_mass.{name.replace(' ', '_')}.{x:g}",
             SYSTEM,
             f"covariance, {name}, damping times time {x:g}: worst relative error",
             error,
             "",
-            BOUND,
-            WHY,
-            "closed form",
-        )
+        ).at_most(BOUND, WHY, "closed form")
         for name, errors in exact.items()
         for x, error in zip(DAMPED, errors, strict=True)
     ]
     differences = [[n, *(_difference(x, n) for x in (0.0, 1.0, 10.0))] for n in (10, 100, 1000, 10_000, 100_000)]
     rows.append(
-        within(
+        Observed(
             "point_mass.order",
             SYSTEM,
             "discrete by continuous variance of position, no damping, n = 1000",
             1 - differences[2][1],
             "",
-            7.4888 / 7.5,
-            1e-5,
-            "1 - 3/(2n): 7.4888 against 7.5",
-            "closed form",
-        )
+        ).within(7.4888 / 7.5, 1e-5, "1 - 3/(2n): 7.4888 against 7.5", "closed form")
     )
     for x in (0.0, 3.0):
         rows += _monte_carlo(x, 2000 if quick else 10_000)
@@ -152,23 +145,27 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
     why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
-            f"point_mass.position.{damped:g}",
-            SYSTEM,
-            f"variance of position, damping times time {damped:g}, by Monte Carlo",
-            float(np.mean(found[:, 0] ** 2)),
+            Observed(
+                f"point_mass.position.{damped:g}",
+                SYSTEM,
+                f"variance of position, damping times time {damped:g}, by Monte Carlo",
+                float(np.mean(found[:, 0] ** 2)),
+                "m^2",
+            ),
             float(law[0, 0]),
             count,
-            "m^2",
             why,
         ),
         mean_square(
-            f"point_mass.joint.{damped:g}",
-            SYSTEM,
-            f"whole covariance, damping times time {damped:g}, by Monte Carlo: half the mean squared distance",
-            distance,
+            Observed(
+                f"point_mass.joint.{damped:g}",
+                SYSTEM,
+                f"whole covariance, damping times time {damped:g}, by Monte Carlo: half the mean squared distance",
+                distance,
+                "",
+            ),
             1.0,
             2 * count,
-            "",
             why,
         ),
     ]

@@ -15,7 +15,7 @@ from models.advice.price.problem import Problem, Setting
 from models.engines.assembly import Assembly
 from models.ensemble.workers import processes
 from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, behaves, not_run, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves, not_run
 from validation.common.scenes import on_paper_road
 from validation.price import ride, speed, split
 from validation.price.figure import draw as draw_figure
@@ -159,12 +159,13 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
         ]
         what = f"force calls counted from outside ({how}) against those reported, {len(pairs)} runs, largest difference"
         rows.append(
-            within(
+            Observed(
                 f"price.road.counts.{engine}",
                 SYSTEM,
                 what,
                 max(abs(outside - said) for outside, said in pairs),
                 "calls",
+            ).within(
                 0,
                 0,
                 "exact; the one evaluation before the first step of methods that start from accelerations is left out",
@@ -177,23 +178,20 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
 def _speed_rows(data: Saved) -> list[Row]:
     """Targets about seconds: reported with their intervals, never judged."""
     rows = [
-        at_most(
+        Observed(
             "price.callback.gap",
             SYSTEM,
             "MuJoCo RK4: every force in one compiled callback against native springs",
             data["callback"]["RK4"]["gap"],
             "m, rad, m/s, rad/s",
-            1e-12,
-            "the same forces at the same stages, written twice",
-            "native",
-        )
+        ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
     ]
     for integrator, found in data["callback"].items():
         for key, words in CALLBACKS.items():
             ratio, low, high = found[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
             what = f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}"
-            rows.append(aim(name, SYSTEM, what, ratio, "times", 1.2, ON_SECONDS))
+            rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
     return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
 
 
@@ -204,7 +202,7 @@ def _real_time(key: str, found: tuple[float, float, float] | None) -> Row:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
     factor, low, high = found
     told = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
-    return aim(name, SYSTEM, told, factor, "times real time", 1000.0, ON_SECONDS, "at least")
+    return Observed(name, SYSTEM, told, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
 
 
 def tables(data: Saved) -> list[Table]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, aim, at_most, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.price import unseen_systems
 from validation.price.unseen import ENGINES, Verdict, drawn, judge
 
@@ -76,64 +76,45 @@ def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
     factors = [one.factor for one in every]
     scenes, why = f"{len(found)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
-        within(
+        Observed(
             "recommendation.met",
             SYSTEM,
             f"share of {scenes} in which every recommended setting holds its tolerance ({len(every)} settings)",
             held / len(found),
             "",
-            1.0,
-            1.0 - MET,
-            why,
-            "closed form",
-        ),
-        at_most(
+        ).within(1.0, 1.0 - MET, why, "closed form"),
+        Observed(
             "recommendation.predicted",
             SYSTEM,
             "predicted by true error, or its inverse: largest of all",
             max(factors, default=float("inf")),
             "times",
-            FACTOR,
-            f"{why}; errors below what is known of the truth count as that",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
+        Observed(
             "recommendation.refused",
             SYSTEM,
             f"scenes that were refused with a reason, and drawn anew, beside {scenes}",
             len(refused),
             "scenes",
-            (1.0 - MET) * len(found),
-            "; ".join(refused) or "none was: every one got a recommendation",
-            "none",
-        ),
-        finding(
-            "recommendation.factor",
-            SYSTEM,
-            "the same, 95 of 100",
-            float(np.quantile(factors, 0.95)),
-            "times",
-            "1",
-            why,
-            "closed form",
-        ),
-        at_most(
+        ).at_most((1.0 - MET) * len(found), "; ".join(refused) or "none was: every one got a recommendation", "none"),
+        Observed(
+            "recommendation.factor", SYSTEM, "the same, 95 of 100", float(np.quantile(factors, 0.95)), "times"
+        ).beside("1", why, "closed form"),
+        Observed(
             "recommendation.slower",
             SYSTEM,
             "settings recommended by force calls that take more of them than the "
             "engine's default that meets the tolerance",
             _slower(every, "calls"),
             "settings",
-            0.0,
-            "exact",
-            "none",
-        ),
-        aim(
+        ).at_most(0.0, "exact", "none"),
+        Observed(
             "recommendation.slower.seconds",
             SYSTEM,
             "settings recommended by seconds that take more of them than the engine's default that meets the tolerance",
             _slower(every, "seconds"),
             "settings",
+        ).aim(
             0.0,
             "seconds of the "
             "processor, where the 95 % interval of the ratio lies above 1.05 in two contests more, of 9 and 25 rounds",

@@ -24,7 +24,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, aim, at_most, behaves
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.no_variance import CORNER, weighting_rows, without_variance
 from validation.ride.rides import INTENSITY, corners, five_cases, off, one_track, paper_road, twin
 
@@ -114,16 +114,13 @@ def _closed_rows() -> list[Row]:
         for key, value, expected in zip(worst, variance[:3], exact if corner == 0.0 else exact[:2], strict=False):
             worst[key] = max(worst[key], off(value, expected))
     rows = [
-        at_most(
+        Observed(
             f"ride_covariance.quarter.{key}",
             SYSTEM,
             f"quarter car, variance of the {key}, corners of the road from 0 to 3 rad/m",
             value,
             "",
-            1e-10,
-            "asked; the sums have no cancellation",
-            "closed form",
-        )
+        ).at_most(1e-10, "asked; the sums have no cancellation", "closed form")
         for key, value in worst.items()
     ]
     a, b, speeds = 1.2, 1.5, (3.0, 17.0, 50.0)
@@ -133,23 +130,23 @@ def _closed_rows() -> list[Row]:
     formula = [half_car_acceleration(CORNER, v * INTENSITY, a, b, v) for v in speeds]
     what = "half car that splits into quarter cars, variance at its centre of gravity, delay exact, 3 to 50 m/s"
     worst_half = off(np.array(half), np.array(formula))
-    return [*rows, at_most("ride_covariance.half", SYSTEM, what, worst_half, "", 1e-10, "asked", "closed form")]
+    return [
+        *rows,
+        Observed("ride_covariance.half", SYSTEM, what, worst_half, "").at_most(1e-10, "asked", "closed form"),
+    ]
 
 
 def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
     by_vehicle = {name: [*group] for name, group in groupby(routes, key=itemgetter("vehicle"))}
     return [
-        at_most(
+        Observed(
             f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
             SYSTEM,
             f"standard deviations of {name}, {sum(route['values'] for route in group)} values, five cases: "
             "against quadrature of spectra by dynamic stiffness",
             max(route["worst"] for route in group),
             "",
-            1e-6,
-            "asked; both routes claim better than 1e-9",
-            "native",
-        )
+        ).at_most(1e-6, "asked; both routes claim better than 1e-9", "native")
         for name, group in by_vehicle.items()
     ]
 
@@ -164,26 +161,20 @@ def _limit_rows() -> list[Row]:
     late = stationary(replace(one, delays=(0.0, 1e6, 2e6))).deviation
     apart = stationary(replace(one, independent=True)).deviation
     return [
-        at_most(
+        Observed(
             "ride_covariance.delay.zero",
             SYSTEM,
             "three axles at delay 0 against one input, worst output",
             off(at_once, joined),
             "",
-            0.0,
-            "exact: they are the same equation",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(0.0, "exact: they are the same equation", "closed form"),
+        Observed(
             "ride_covariance.delay.long",
             SYSTEM,
             "delays of 1e6 s against independent axles, worst output",
             off(late, apart),
             "",
-            1e-14,
-            "exact but for rounding: the response has died out",
-            "closed form",
-        ),
+        ).at_most(1e-14, "exact but for rounding: the response has died out", "closed form"),
         _inputs_row(),
     ]
 
@@ -197,16 +188,9 @@ def _inputs_row() -> Row:
         heights = H @ stationary(excited(vehicle, met, 13.0)).P @ H.T
         expected = input_covariance(road, vehicle.wheels, *case)
         worst = max(worst, float(np.abs(heights - expected).max() / np.abs(expected).max()))
-    return at_most(
-        "ride_covariance.inputs",
-        SYSTEM,
-        "covariances of the heights under six wheels in five cases",
-        worst,
-        "",
-        1e-12,
-        "exact but for rounding",
-        "closed form",
-    )
+    return Observed(
+        "ride_covariance.inputs", SYSTEM, "covariances of the heights under six wheels in five cases", worst, ""
+    ).at_most(1e-12, "exact but for rounding", "closed form")
 
 
 def _engine_row(engine: str) -> Row:
@@ -219,17 +203,14 @@ def _engine_row(engine: str) -> Row:
         linear, analytic = build(engine, vehicle, speed=speed).linearise(), linearise(vehicle, speed)
         roads = five_cases(analytic.wheels).values()
         worst = max(worst, *(_compared(linear, analytic, road, speed)[0] for road in roads))
-    return at_most(
+    return Observed(
         f"ride_covariance.engine.{engine}",
         SYSTEM,
         "standard deviations from the linearisation of "
         f"{engine}, three asymmetric twins, five cases, against quadrature of the analytic vehicles",
         worst,
         "",
-        1e-6,
-        "asked",
-        "native",
-    )
+    ).at_most(1e-6, "asked", "native")
 
 
 def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
@@ -245,16 +226,13 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
     slow = sweep(linear, roads, speeds[some], FILTERS, fast=False)
     told = slow.variance > LEAST * slow.variance.max()
     rows = [
-        at_most(
+        Observed(
             "ride_covariance.fast.equal",
             SYSTEM,
             "fast route against the direct one, with three weighted seats, variance, worst of all outputs",
             off(quick.variance[:, some][told], slow.variance[told]),
             "",
-            1e-10,
-            "asked",
-            "none",
-        ),
+        ).at_most(1e-10, "asked", "none"),
         behaves(
             "ride_covariance.fast.taken",
             SYSTEM,
@@ -263,16 +241,14 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
             "0",
             "its eigenvectors are well apart",
         ),
-        aim(
+        Observed(
             "ride_covariance.fast.time",
             SYSTEM,
             f"five cases times {len(speeds)} speeds with ISO weighting, from "
             f"the linear vehicle of {source}, one core, once",
             seconds,
             "s",
-            2.0,
-            "asked for 60 speeds; it counts this process's seconds and not other load",
-        ),
+        ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),
     ]
     return rows, {
         "speeds": speeds.tolist(),

@@ -15,7 +15,7 @@ from models.vehicles.linear_vehicle import LinearVehicle, Rows, poles, shift
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.rides import R19_FREQUENCIES, off
 from validation.spatial import spatial_twin
 
@@ -92,32 +92,26 @@ def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.nda
 def _linearised(vehicle: SpatialVehicle, name: str, loaded: str, bounds: dict[str, float]) -> list[Row]:
     expected = linearise(vehicle, SPEED)
     return [
-        at_most(
+        Observed(
             f"ride_engines.matrices.{name}.{loaded}.{engine}",
             SYSTEM,
             f"M, D, K, road columns and outputs of {name}, {loaded}, {engine} against analytic",
             difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
             "relative",
-            bounds[engine],
-            BY_DIFFERENCES,
-            "native",
-        )
+        ).at_most(bounds[engine], BY_DIFFERENCES, "native")
         for engine in ENGINES
     ]
 
 
 def _frequencies() -> list[Row]:
     return [
-        at_most(
+        Observed(
             f"ride_engines.frequencies.{engine}",
             SYSTEM,
             f"19 eigenfrequencies of R19-ride, {engine}",
             off(np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES),
             "relative",
-            1e-5,
-            "six decimals of the expected ones are known",
-            "published",
-        )
+        ).at_most(1e-5, "six decimals of the expected ones are known", "published")
         for engine in ENGINES
     ]
 
@@ -134,16 +128,13 @@ def _states(name: str) -> list[Row]:
         worst = np.maximum(worst, [relative(*pair) for pair in pairs])
     names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
     return [
-        at_most(
+        Observed(
             f"ride_engines.states.{name}.{what}",
             SYSTEM,
             f"accelerations of {name} at {STATES} random states, {what}",
             float(value),
             "relative",
-            1e-12,
-            SAME,
-            "native",
-        )
+        ).at_most(1e-12, SAME, "native")
         for what, value in zip(names, worst, strict=True)
     ]
 
@@ -170,16 +161,13 @@ def _path() -> tuple[list[Row], list[list[str]]]:
             for part in ("positions", "rates")
         )
         rows.append(
-            at_most(
+            Observed(
                 f"ride_engines.path.{what}",
                 SYSTEM,
                 f"states of R19-ride over 1 s, {what} springs, RK4 at 1 ms, exudyn against mujoco",
                 float(gap),
                 "m, rad, m/s, rad/s",
-                1e-12,
-                SAME,
-                "native",
-            )
+            ).at_most(1e-12, SAME, "native")
         )
     return rows, price
 
@@ -192,29 +180,23 @@ def _at_rest() -> list[Row]:
     for engine in ENGINES:
         model = build(engine, vehicle, _settings(engine))
         rows.append(
-            at_most(
+            Observed(
                 f"ride_engines.rest.{engine}",
                 SYSTEM,
                 f"acceleration in the design position, {engine}",
                 float(np.abs(model.acceleration(zero, zero)).max()),
                 "m/s^2, rad/s^2",
-                1e-10,
-                "preloads hold the weights to rounding",
-                "none",
-            )
+            ).at_most(1e-10, "preloads hold the weights to rounding", "none")
         )
         mean = np.abs(model.run(zero, zero).positions.mean(axis=0)).max()
         rows.append(
-            at_most(
+            Observed(
                 f"ride_engines.mean.{engine}",
                 SYSTEM,
                 f"mean position over 1 s from there, {engine}",
                 float(mean),
                 "m, rad",
-                1e-10,
-                "nothing moves it",
-                "none",
-            )
+            ).at_most(1e-10, "nothing moves it", "none")
         )
     return rows
 
@@ -229,16 +211,13 @@ def _shift() -> list[Row]:
                 *(build(engine, of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
             )
             rows.append(
-                finding(
+                Observed(
                     f"ride_engines.shift.{name}.{engine}",
                     SYSTEM,
                     f"largest shift of an eigenvalue of {name} from unloaded to loaded, {engine}",
                     float(np.abs(found).max()),
                     "1/s",
-                    float(np.abs(analytic).max()),
-                    "expected: the same from the analytic matrices",
-                    "native",
-                )
+                ).beside(float(np.abs(analytic).max()), "expected: the same from the analytic matrices", "native")
             )
     return rows
 

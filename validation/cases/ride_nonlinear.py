@@ -14,7 +14,7 @@ from models.ride.gaussian_laws import of_curve, of_friction
 from models.ride.nonlinear_copies import copies_in_time
 from models.ride.statistical_linearisation import promised, statistically_linear
 from models.vehicles.spatial_linear import linearise
-from validation.common.rows import Row, System, Table, at_most
+from validation.common.rows import Observed, Row, System, Table
 from validation.ride.in_engines import NONLINEAR, SEED, SPEED, bent_in_engines, draw, linear_in_engines, ride
 from validation.ride.rides import off
 
@@ -63,37 +63,28 @@ def _gains() -> list[Row]:
         dry = max(dry, abs(of_friction(1.0, 1.0, ratio) / gain - 1.0))
     coulomb = of_friction(1.0, 1e-6, 1.0) / np.sqrt(2.0 / np.pi) - 1.0
     return [
-        at_most(
+        Observed(
             "ride_nonlinear.gains.curves",
             SYSTEM,
             "mean force and gain of damper and stops, closed form against "
             "the defining integrals, at 6 motions, relative",
             worst,
             "",
-            1e-9,
-            "error functions",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-9, "error functions", "closed form"),
+        Observed(
             "ride_nonlinear.gains.friction",
             SYSTEM,
             "gain of dry friction, likewise, rates 0.1 to 100 times that of friction, relative",
             dry,
             "",
-            1e-9,
-            "the trapezoidal rule converges geometrically",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-9, "the trapezoidal rule converges geometrically", "closed form"),
+        Observed(
             "ride_nonlinear.gains.coulomb",
             SYSTEM,
             "the same against friction (2 / pi)^(1/2) / deviation, which Coulomb's law has",
             abs(float(coulomb)),
             "",
-            1e-9,
-            "rates 1e6 times that of friction",
-            "closed form",
-        ),
+        ).at_most(1e-9, "rates 1e6 times that of friction", "closed form"),
     ]
 
 
@@ -114,37 +105,24 @@ def _fixed_point() -> list[Row]:
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
     apart = [off(each.covariance.deviation, one.covariance.deviation) for each in (other, unloaded)]
     return [
-        at_most(
+        Observed(
             "ride_nonlinear.fixed_point",
             SYSTEM,
             f"{len(one.changes)} iterations, each change at most "
             f"{one.contraction:.2g} of the last: distance of the gains to the fixed point, relative",
             one.distance,
             "",
-            1e-11,
-            "last change * c / (1 - c), Banach's bound",
-            "none",
-        ),
-        at_most(
+        ).at_most(1e-11, "last change * c / (1 - c), Banach's bound", "none"),
+        Observed(
             "ride_nonlinear.start",
             SYSTEM,
             "standard deviations from first gains of a tenfold motion, relative",
             apart[0],
             "",
-            1e-10,
-            "one fixed point, whatever the start",
-            "none",
-        ),
-        at_most(
-            "ride_nonlinear.gravity",
-            SYSTEM,
-            "standard deviations without gravity, relative",
-            apart[1],
-            "",
-            1e-10,
-            "preloads hold the weights, and nothing turns",
-            "none",
-        ),
+        ).at_most(1e-10, "one fixed point, whatever the start", "none"),
+        Observed(
+            "ride_nonlinear.gravity", SYSTEM, "standard deviations without gravity, relative", apart[1], ""
+        ).at_most(1e-10, "preloads hold the weights, and nothing turns", "none"),
     ]
 
 
@@ -161,13 +139,14 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
             f"{100 * error:+.1f} ± {100 * spread:.1f} % ({100 * found.left_out[i]:.1f} %, {copies.kurtosis[i]:.1f})"
         )
         rows.append(
-            at_most(
+            Observed(
                 f"ride_nonlinear.level.{level:g}.{name}",
                 SYSTEM,
                 f"{level:g} times the paper's road: "
                 f"deviation of {name} beside {len(copies.moments[0])} copies, {copies.duration:.0f} s",
                 abs(error),
                 "",
+            ).at_most(
                 promised(found.left_out[i]) + 4.0 * spread,
                 f"left out {100 * found.left_out[i]:.2g} % of the variance: what its sentence promises, "
                 "and 4 standard errors",
@@ -178,12 +157,13 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     size = float(copies.deviation[travel])
     shift = float(found.mean[travel] - copies.mean[travel]) / size
     rows.append(
-        at_most(
+        Observed(
             f"ride_nonlinear.mean.{level:g}",
             SYSTEM,
             f"the same: mean travel, {1e3 * found.mean[travel]:.2f} mm, beside the copies', by its deviation",
             abs(shift),
             "",
+        ).at_most(
             promised(found.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
             "as above: the damper pulls the body down",
             "none",
@@ -197,16 +177,13 @@ def _linear_copies() -> Row:
     vehicle, road = ride("quarter_car")
     exact = stationary(excited(linearise(vehicle), road, SPEED))
     copies = copies_in_time(vehicle, road, SPEED, LASTING[1], copies=COPIES[1], seed=SEED)
-    return at_most(
+    return Observed(
         "ride_nonlinear.linear",
         SYSTEM,
         f"quarter_car, {COPIES[1]} copies in time: variances against the covariance, largest |z| of 3",
         float(np.abs(copies.z(exact.deviation)).max()),
         "",
-        4.0,
-        "of 3 normal values one beyond 4 in 5000 times",
-        "none",
-    )
+    ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none")
 
 
 def _alone() -> list[Row]:
@@ -228,13 +205,14 @@ def _alone() -> list[Row]:
         kept = [promised(share) for share in found.left_out] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / kept).argmax())
         rows.append(
-            at_most(
+            Observed(
                 f"ride_nonlinear.alone.{name.split()[0]}",
                 SYSTEM,
                 f"{name} alone on {level:g} times the "
                 f"paper's road: deviation of {copies.names[worst]}, which keeps its promise worst",
                 float(error[worst]),
                 "",
+            ).at_most(
                 float(kept[worst]),
                 f"left out {100 * found.left_out[worst]:.2g} %: the promise, and 4 standard errors",
                 "none",

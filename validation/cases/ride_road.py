@@ -17,7 +17,7 @@ from models.road.two_track import CASES, LEVEL, TwoTrackRoad, excitation, input_
 from models.vehicles.linear_vehicle import LinearVehicle, Wheel
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, at_most, finding
+from validation.common.rows import Observed, Row, System, Table
 from validation.ride.fitted_roads import HALF_TRACK, coherency_figure, fits_table, made, measured
 from validation.ride.rides import STANDARD, off
 
@@ -57,36 +57,27 @@ def _paper_rows() -> list[Row]:
     formula = (1.5**2 - 0.3**2) / (0.3**2 + 1.5**2 + 2.0 * k**2)
     found = road.coherency(k, HALF_TRACK, -HALF_TRACK)
     return [
-        at_most(
+        Observed(
             "ride_road.level",
             SYSTEM,
             "track spectrum at 10,000 rad/m, times Omega^2, against S0",
             spectrum / LEVEL - 1.0,
             "",
-            1e-7,
-            "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-7, "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8", "closed form"),
+        Observed(
             "ride_road.variance",
             SYSTEM,
             "variance of a track against the integral of its spectrum",
             closed / variance - 1.0,
             "",
-            1e-9,
-            "the closed form (S0 pi / 2)(1/O1 + 1/O2) by quadrature",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-9, "the closed form (S0 pi / 2)(1/O1 + 1/O2) by quadrature", "closed form"),
+        Observed(
             "ride_road.coherency",
             SYSTEM,
             "coherency at 0, 1 and 16 rad/m against (O2^2 - O1^2)/(O1^2 + O2^2 + 2 Omega^2)",
             float(np.abs(found - formula).max()),
             "",
-            1e-15,
-            "equal shares at short waves",
-            "closed form",
-        ),
+        ).at_most(1e-15, "equal shares at short waves", "closed form"),
     ]
 
 
@@ -101,17 +92,14 @@ def _input_rows() -> list[Row]:
             worst[order] = max(worst[order], float(np.abs(by_noise - by_output).max() / np.abs(by_output).max()))
     why = "the Lyapunov equation of six wheels with delays, against the autocovariance of the filter at the distance"
     return [
-        at_most(
+        Observed(
             f"ride_road.inputs.{order}",
             SYSTEM,
             f"five input covariances, three axles, filters of {order} order: "
             "filter of delayed noise against delayed output",
             error,
             "",
-            1e-13,
-            why,
-            "closed form",
-        )
+        ).at_most(1e-13, why, "closed form")
         for order, error in worst.items()
     ] + [_limit_row()]
 
@@ -138,16 +126,13 @@ def _limit_row() -> Row:
         )
         pairs.append(float(np.abs(delayed - limit).max() / np.abs(limit).max()))
     why = "no distance: one input; 200 m: independent but for exp(-0.3 times 200) = 9e-27"
-    return at_most(
+    return Observed(
         "ride_road.limits",
         SYSTEM,
         "input covariance of axles in one place and 200 m apart, against equal and uncorrelated axles",
         max(pairs),
         "",
-        1e-14,
-        why,
-        "closed form",
-    )
+    ).at_most(1e-14, why, "closed form")
 
 
 def _isotropic_rows() -> list[Row]:
@@ -159,27 +144,21 @@ def _isotropic_rows() -> list[Row]:
     across = np.array([_by_surface_density(part, float(each), apart) for each in k])
     hankel = part.density(k, apart)
     return [
-        at_most(
+        Observed(
             "ride_road.isotropic.fourier",
             SYSTEM,
             "cross density of an isotropic road: Bessel function against the Fourier integral of R(sqrt(x^2 + d^2))",
             off(along, closed),
             "",
-            1e-11,
-            "quadrature to 1e-12 of the variance, over a density that falls",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-11, "quadrature to 1e-12 of the variance, over a density that falls", "closed form"),
+        Observed(
             "ride_road.isotropic.hankel",
             SYSTEM,
             "the same for waviness 2.6: Bessel function of order 1.3 against "
             "the integral over the two-dimensional density",
             off(across, hankel),
             "",
-            1e-9,
-            "quadrature to 1e-12 of the density on the track",
-            "closed form",
-        ),
+        ).at_most(1e-9, "quadrature to 1e-12 of the density on the track", "closed form"),
         *_route_rows(road),
     ]
 
@@ -210,28 +189,25 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
     exact = _accelerations(stationary(excited(vehicle, excitation(road, vehicle.wheels), SPEED)).deviation, vehicle)
     by_frequency, isotropic = (_by_frequency(vehicle, one) for one in (road, isotropic_like(road, HALF_TRACK)))
     rows = [
-        at_most(
+        Observed(
             "ride_road.route",
             SYSTEM,
             f"{len(exact)} accelerations of R19-ride from the densities of the heights, against the covariance",
             off(by_frequency, exact),
             "",
-            1e-6,
-            "0.0001 to 500 rad/m; no filter and no state on one side; what lies beyond is 1e-7",
-            "closed form",
+        ).at_most(
+            1e-6, "0.0001 to 500 rad/m; no filter and no state on one side; what lies beyond is 1e-7", "closed form"
         )
     ]
     why = "isotropic tracks part sooner than mean and roll process as waves get shorter: less heave, more roll"
     return rows + [
-        finding(
+        Observed(
             f"ride_road.isotropic.{name.split()[0]}",
             SYSTEM,
             f"{name} of R19-ride at {SPEED:g} m/s: isotropic road over two-track road of the same track spectrum",
             float(isotropic[i] / exact[i]),
             "",
-            "",
-            why,
-        )
+        ).beside("", why)
         for i, name in enumerate(_names(vehicle))
         if name in ("body centre", "roll acceleration")
     ]
@@ -262,37 +238,29 @@ def _weighting_rows() -> list[Row]:
         A, B, C = W.matrices()
         by_states = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
         rows += [
-            at_most(
+            Observed(
                 f"ride_road.weighting.{name}.table",
                 SYSTEM,
                 f"{name} from the parameters against the table of ISO 2631-1, {sound.sum()} frequencies",
                 float(np.abs(digits[sound]).max()),
                 "units of the table's last digit",
-                1.0,
-                "half a unit of rounding; two entries were cut off, not rounded",
-                "published",
-            ),
-            at_most(
+            ).at_most(1.0, "half a unit of rounding; two entries were cut off, not rounded", "published"),
+            Observed(
                 f"ride_road.weighting.{name}.states",
                 SYSTEM,
                 f"{name}: cascade of scaled sections against the formula of its sections",
                 off(by_states, W.response(frequency)),
                 "",
-                1e-13,
-                "rounding",
-                "closed form",
-            ),
+            ).at_most(1e-13, "rounding", "closed form"),
         ]
     rows.append(
-        finding(
+        Observed(
             "ride_road.weighting.misprint",
             SYSTEM,
             "Wd at 10 Hz from the parameters, times 1000",
             1e3 * float(np.abs(WEIGHTINGS["Wd"].response(np.array(10.0)))),
             "",
-            212.0,
-            "the table's 212 is not that of its own parameters: 22 other entries are",
-        )
+        ).beside(212.0, "the table's 212 is not that of its own parameters: 22 other entries are")
     )
     return rows + _weighted_rows()
 
@@ -311,16 +279,13 @@ def _weighted_rows() -> list[Row]:
         gain = np.abs(WEIGHTINGS[name].response(SPEED * k / (2.0 * np.pi))) ** 2
         expected = math.sqrt(weight @ (gain * density[:, vehicle.names.index(output)]))
         rows.append(
-            at_most(
+            Observed(
                 f"ride_road.weighted.{name}",
                 SYSTEM,
                 f"{output} of R19-ride weighted by {name}, {SPEED:g} m/s: Lyapunov against quadrature",
                 float(value / expected - 1.0),
                 "",
-                1e-8,
-                "0.0001 to 500 rad/m: a weighting leaves nothing beyond",
-                "closed form",
-            )
+            ).at_most(1e-8, "0.0001 to 500 rad/m: a weighting leaves nothing beyond", "closed form")
         )
     return rows
 

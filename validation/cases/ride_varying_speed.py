@@ -20,7 +20,7 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, at_most, behaves, finding
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.ride.rides import off, paper_road
 
 TITLE = "Ride at varying speed, through standstill, and by Monte Carlo"
@@ -83,46 +83,34 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
     stopped, fine = (varying_speed(vehicle, road, stops, instants=often, reach=reach) for reach in (REACH, REACH / 2))
     step = np.abs(stopped.at(often) ** 2 - fine.at(often) ** 2) / stopped.deviation.max(axis=0) ** 2
     return [
-        at_most(
+        Observed(
             f"ride_varying_speed.settled.{name}",
             SYSTEM,
             f"{name}, long after a change from 10 to 20 m/s: all outputs against the Lyapunov equation",
             off(settled[-1], exact),
             "",
-            1e-10,
-            "the stationary limit, relative",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-10, "the stationary limit, relative", "closed form"),
+        Observed(
             f"ride_varying_speed.even.{name}",
             SYSTEM,
             f"{name}, at 20 m/s all the time: likewise, worst instant",
             off(even, exact),
             "",
-            1e-10,
-            "nothing may drift",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-10, "nothing may drift", "closed form"),
+        Observed(
             f"ride_varying_speed.road.{name}",
             SYSTEM,
             f"{name}, through 0, 30 and 0 m/s, standing included: variance of the road under each wheel, worst instant",
             off((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
-            1e-10,
-            "the road does not know how fast it is driven over; relative",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-10, "the road does not know how fast it is driven over; relative", "closed form"),
+        Observed(
             f"ride_varying_speed.step.{name}",
             SYSTEM,
             f"{name}, the same drive at half the step: change of all variances, by their largest value",
             float(step.max()),
             "",
-            1e-9,
-            "ten times what was seen",
-            "none",
-        ),
+        ).at_most(1e-9, "ten times what was seen", "none"),
     ]
 
 
@@ -131,16 +119,13 @@ def _adjoint() -> Row:
     vehicle, road = ride("half_car")
     found = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
-    return at_most(
+    return Observed(
         "ride_varying_speed.adjoint",
         SYSTEM,
         "half_car, a stop within its wheelbase and off again: body rear against the adjoint, relative",
         off(found.of("body rear")[-1], exact),
         "",
-        1e-8,
-        "the adjoint's solver is good to 1e-10",
-        "closed form",
-    )
+    ).at_most(1e-8, "the adjoint's solver is good to 1e-10", "closed form")
 
 
 def _damped() -> Row:
@@ -186,32 +171,27 @@ def _copies(name: str, found: dict[str, Any]) -> list[Row]:
     """Copies at three instants in three points, all outputs beside, and the error of the quasi-stationary answer."""
     error = off(np.array(found["quasi"]), np.array(found["deviation"]))
     return [
-        at_most(
+        Observed(
             f"ride_varying_speed.copies.{name}",
             SYSTEM,
             f"r19_ride {name}: Monte Carlo of {COPIES} copies at 3 instants in 3 points of the body, largest |z|",
             float(np.abs(found["z"]).max()),
             "",
-            4.0,
-            "of 9 normal values one beyond 4 in 1800 times",
-            "none",
-        ),
-        finding(
+        ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
+        Observed(
             f"ride_varying_speed.outputs.{name}",
             SYSTEM,
             f"r19_ride {name}: the same for all 16 outputs, largest |z| of 48",
             found["all"],
             "",
-            "below 4",
-            "wheel loads and travels follow the same law",
-            "none",
-        ),
-        finding(
+        ).beside("below 4", "wheel loads and travels follow the same law", "none"),
+        Observed(
             f"ride_varying_speed.quasi.{name}",
             SYSTEM,
             f"r19_ride {name}: largest error of the quasi-stationary standard deviation in 3 points",
             error,
             "",
+        ).beside(
             {"accelerating": 0.017, "braking": 0.15}[name],
             "beside what a prototype sampled; the largest over all instants",
             "none",
@@ -229,47 +209,31 @@ def _constant() -> list[Row]:
     z = copies.z(exact.deviation[None])[0]
     error = float((copies.error[0] / 2.0 / copies.variance[0])[columns].max())
     return [
-        at_most(
+        Observed(
             "ride_varying_speed.constant",
             SYSTEM,
             f"r19_ride at 20 m/s, {STEADY_COPIES} copies of {LASTING:g} s: largest |z| in 3 points of the body",
             float(np.abs(z[columns]).max()),
             "",
-            4.0,
-            "of 3 normal values one beyond 4 in 5000 times",
-            "none",
-        ),
-        finding(
-            "ride_varying_speed.constant.outputs",
-            SYSTEM,
-            "the same for all 16 outputs",
-            float(np.abs(z).max()),
-            "",
-            "below 4",
-            "as above",
-            "none",
-        ),
-        finding(
+        ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none"),
+        Observed(
+            "ride_varying_speed.constant.outputs", SYSTEM, "the same for all 16 outputs", float(np.abs(z).max()), ""
+        ).beside("below 4", "as above", "none"),
+        Observed(
             "ride_varying_speed.constant.error",
             SYSTEM,
             "the same: standard error of these standard deviations, relative",
             error,
             "",
-            "falls as 1 / sqrt(copies x length)",
-            "what its time buys",
-            "none",
-        ),
-        finding(
+        ).beside("falls as 1 / sqrt(copies x length)", "what its time buys", "none"),
+        Observed(
             "ride_varying_speed.cost",
             SYSTEM,
             "the same: processor seconds of Monte Carlo for a standard error of "
             "1e-3, by those of the covariance, which is exact, each once",
             slow * (error / 1e-3) ** 2 / fast,
             "",
-            "hundreds",
-            "every further digit costs Monte Carlo a hundredfold, the covariance nothing",
-            "none",
-        ),
+        ).beside("hundreds", "every further digit costs Monte Carlo a hundredfold, the covariance nothing", "none"),
     ]
 
 

@@ -12,7 +12,7 @@ from models.road.opencrg import read_opencrg, write_opencrg
 from models.road.profile import Profile
 from models.road.study import study_road
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import Row, System, at_most, not_run, within
+from validation.common.rows import Observed, Row, System, not_run
 from validation.common.scenes import COURSE, data_folder, gap, on_paper_road, road_scene
 
 TITLE = "Roads: formula, class, OpenCRG and CSV"
@@ -38,16 +38,13 @@ def _round_trips(folder: Path) -> list[Row]:
     station = INCREMENT * np.arange(round(LENGTH / INCREMENT) + 1)
     true = road.height_and_slope(station)[0]
     rows = [
-        at_most(
+        Observed(
             f"roads.{kind}.round-trip",
             SYSTEM,
             f"heights of the study road written to {kind} and read back",
             float(np.abs(profile.height_and_slope(station)[0] - true).max()),
             "m",
-            1e-14,
-            "both formats keep doubles; only the unit conversion rounds",
-            "closed form",
-        )
+        ).at_most(1e-14, "both formats keep doubles; only the unit conversion rounds", "closed form")
         for kind, profile in back.items()
     ]
     paths = [
@@ -62,16 +59,13 @@ def _round_trips(folder: Path) -> list[Row]:
         for source, suffix in (("opencrg", "crg"), ("csv", "csv"))
     ]
     rows.append(
-        at_most(
+        Observed(
             "roads.same-run",
             SYSTEM,
             "the vehicle's states over the OpenCRG road against the CSV road",
             gap(*paths),
             "m, rad, m/s, rad/s",
-            1e-11,
-            "the same heights to 1e-14 through the same springs",
-            "shared kernel",
-        )
+        ).at_most(1e-11, "the same heights to 1e-14 through the same springs", "shared kernel")
     )
     return rows
 
@@ -94,16 +88,9 @@ def _recurrence() -> Row:
     road = study_road()
     station = 300.0 + 0.01 * np.arange(4000)
     error = np.abs(road.sample_uniform(300.0, 0.01, 4000)[0] - road.height_and_slope(station)[0]).max()
-    return at_most(
-        "roads.recurrence",
-        SYSTEM,
-        "study road sampled by rotation against the formula",
-        float(error),
-        "m",
-        1e-13,
-        "64 rotations of a unit vector lose 64 roundings before they start anew",
-        "closed form",
-    )
+    return Observed(
+        "roads.recurrence", SYSTEM, "study road sampled by rotation against the formula", float(error), "m"
+    ).at_most(1e-13, "64 rotations of a unit vector lose 64 roundings before they start anew", "closed form")
 
 
 def _class_variance() -> Row:
@@ -112,16 +99,14 @@ def _class_variance() -> Row:
     road = iso8608_road("C", seed=SEED, n_min=low, n_max=high, waves=80, window_length=0.0)
     height = road.sample_uniform(0.0, 0.05, 400_000)[0]
     expected = CLASSES["C"] * 0.1**2 * (1 / low - 1 / high)
-    return within(
+    return Observed(
         "roads.iso8608",
         SYSTEM,
         "variance of a class C road over 20 km, one-sided density 0.05 to 2 1/m",
         float(np.var(height) / expected),
         "of the integral",
-        1.0,
-        0.01,
-        "sines of unequal wavelength are uncorrelated to 1 over the number of waves in 20 km",
-        "closed form",
+    ).within(
+        1.0, 0.01, "sines of unequal wavelength are uncorrelated to 1 over the number of waves in 20 km", "closed form"
     )
 
 
@@ -134,22 +119,20 @@ def _measured() -> list[Row]:
     heights = [profile.height_and_slope(station)[0] for profile in (left, right)]
     undulated = heights[0][(station >= 100) & (station <= 404.8)]
     return [
-        at_most(
+        Observed(
             "roads.course.tracks",
             SYSTEM,
             "measured course: left track against right track",
             float(np.abs(heights[0] - heights[1]).max()),
             "m",
-            0.0,
-            "its owners say that they are identical",
-            "published",
-        ),
-        within(
+        ).at_most(0.0, "its owners say that they are identical", "published"),
+        Observed(
             "roads.course.rms",
             SYSTEM,
             "measured course: rms of the undulated part, detrended",
             float(_detrended(undulated).std()),
             "m",
+        ).within(
             1.7441 * 0.0254,
             0.002,
             "the file's header says 1.7441 in; how it was detrended is not said, which moves it by some percent",

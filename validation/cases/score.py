@@ -13,7 +13,7 @@ from models.fatigue.damage import SLOPE, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.stabilised import Bench, Options, compare, roads
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, behaves, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table, behaves
 from validation.common.scenes import drive, force_scene, on_paper_road
 from validation.hard_cases.case import IMPLEMENTATIONS
 
@@ -73,26 +73,17 @@ def _conventions() -> list[Row]:
     repeated = {name: _closed(load) / pseudo_damage(load) - 1 for name, load in (("walk", walk), ("white", white))}
     why = "the residue closed by repeating the load, instead of counted as half cycles: the convention must be stated"
     return [
-        at_most(
+        Observed(
             "score.damage.turning-points",
             SYSTEM,
             f"damage of a random walk of {SAMPLES:,} samples from its "
             "turning points alone against all samples, relative",
             abs(pseudo_damage(walk) / whole - 1),
             "",
-            1e-12,
-            "rainflow reads turning points only; the sum is in another order",
-            "native",
-        ),
+        ).at_most(1e-12, "rainflow reads turning points only; the sum is in another order", "native"),
         *(
-            finding(
-                f"score.damage.convention.{name}",
-                SYSTEM,
-                what,
-                repeated[name],
-                "",
-                f"{told} between two libraries",
-                why,
+            Observed(f"score.damage.convention.{name}", SYSTEM, what, repeated[name], "").beside(
+                f"{told} between two libraries", why
             )
             for name, what, told in (
                 ("walk", "damage of a random walk with its residue closed, difference", 0.34),
@@ -116,23 +107,16 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     rows = []
     for engine, (drift, worst) in found.items():
         rows += [
-            within(
+            Observed(
                 f"score.heave.drift.{engine}",
                 SYSTEM,
                 f"{engine}: heave error of a run that sinks at {SINKING} m/s",
                 drift,
                 "m",
-                SINKING * duration,
-                1e-6,
-                "a large drift, on purpose",
-                "closed form",
-            ),
-            at_most(
-                f"score.heave.damage.{engine}",
-                SYSTEM,
-                f"{engine}: its damage ratios, worst |ratio - 1|",
-                worst,
-                "",
+            ).within(SINKING * duration, 1e-6, "a large drift, on purpose", "closed form"),
+            Observed(
+                f"score.heave.damage.{engine}", SYSTEM, f"{engine}: its damage ratios, worst |ratio - 1|", worst, ""
+            ).at_most(
                 1e-9,
                 "the equations feel neither place nor common speed: a heave drift leaves all four "
                 "section forces alone, up to rounding of heights of 10 m that the pitch's growth carries on",
@@ -205,7 +189,7 @@ def _verdicts(found: list[Saved]) -> list[Row]:
         elif word != "accepted" and alone == "accepted":
             id, what = f"score.unseen.{_id(row)}", f"{place}, damage ratio of f3x where the run itself shows nothing"
             why = "what an engineer without the truth cannot know"
-            rows.append(finding(id, SYSTEM, what, row["damage f3x"], "", word, why, "none"))
+            rows.append(Observed(id, SYSTEM, what, row["damage f3x"], "").beside(word, why, "none"))
     return rows
 
 
@@ -220,13 +204,14 @@ def _id(row: Saved) -> str:
 def _blind(found: list[Saved]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
     return [
-        within(
+        Observed(
             f"score.vertical.{row['road']}.{row['engine']}",
             SYSTEM,
             f"{row['engine']}, {row['road']}: damage "
             f"ratio of the vertical f3 of a free run, pitch {row['pitch error max [rad]']:.1f} rad wrong",
             row["vertical damage f3"],
             "",
+        ).within(
             1.0,
             0.1,
             "f3 = f1 - m1 g + m1 z1'' at every pitch: whoever scores "
@@ -264,16 +249,9 @@ def _beside(long: list[Saved]) -> list[Row]:
             ("f3x", "damage f3x", "damage ratio of f3x", "", along),
         )
         rows += [
-            finding(
-                f"score.prototype.{name}.{short}",
-                SYSTEM,
-                f"{row['method']}, 60 s: {words}",
-                row[key],
-                unit,
-                f"{wanted:g} (prototype)",
-                why,
-                "none",
-            )
+            Observed(
+                f"score.prototype.{name}.{short}", SYSTEM, f"{row['method']}, 60 s: {words}", row[key], unit
+            ).beside(f"{wanted:g} (prototype)", why, "none")
             for short, key, words, unit, wanted in shown
             if row[key] is not None
         ]

@@ -19,7 +19,7 @@ from models.vehicles.pitch_plane import Parameters
 from validation.common import checks
 from validation.common.checks import trajectory_gap
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, System, at_most, finding, within
+from validation.common.rows import CaseAnswer, Observed, Row, System
 from validation.common.scenes import VEHICLES, on_paper_road, road_scene
 
 TITLE = "Stabilisers"
@@ -80,17 +80,15 @@ def _missing_mass(parameters: str, p: Parameters, measured: Result, follow: Foll
     mean = (rate[-1] - rate[0]) / scene.run.duration
     wanted = MISSING * p.m3 * (p.g - mean)
     return [
-        within(
+        Observed(
             f"stabilisers.mass.{engine}.{parameters}",
             SYSTEM,
             f"{engine}, {parameters}: mean force of a prescribed heave, {MISSING:.0%} of the chassis missing "
             f"(0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)",
             float(guided(scene, engine)["enforced_force"].mean()),
             "N",
-            wanted,
-            BOUND * wanted,
-            f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here",
-            "closed form",
+        ).within(
+            wanted, BOUND * wanted, f"0.05 m3 (g - z3''), down; z3'' is {mean:.3f} m/s^2 on average here", "closed form"
         )
         for engine in CONSTRAINED
     ]
@@ -102,18 +100,14 @@ def _shifted_centre(parameters: str, p: Parameters, measured: Result, follow: Fo
     scene = follow({"a": p.a + SHIFT, "b": p.b - SHIFT}, RAILS)
     wanted = SHIFT * float(np.mean((measured["f3"] + measured["f4"]) * np.cos(measured["pitch"])))
     return [
-        within(
+        Observed(
             f"stabilisers.centre.{engine}.{parameters}",
             SYSTEM,
             f"{engine}, {parameters}: mean moment of a prescribed pitch, centre of mass {SHIFT:g} m too far ahead "
             f"(m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)",
             float(guided(scene, engine)["enforced_moment"].mean()),
             "N m",
-            wanted,
-            BOUND * wanted,
-            "x (f3 + f4) cos(pitch) of the true drive, nose up",
-            "closed form",
-        )
+        ).within(wanted, BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
         for engine in CONSTRAINED
     ]
 
@@ -129,16 +123,13 @@ def _exact(follow: Follow, duration: float) -> list[Row]:
         "moment": (free.with_moment(moment), "an added moment of 500 N m at 30 rad/s"),
     }
     return [
-        at_most(
+        Observed(
             f"stabilisers.{name}.{engine}",
             SYSTEM,
             f"{engine}, {words}: largest difference of any state to the reference",
             trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
             "SI",
-            1e-12,
-            "the same stages see the same side of the band and the same moment",
-            "native",
-        )
+        ).at_most(1e-12, "the same stages see the same side of the band and the same moment", "native")
         for name, (own, words) in laws.items()
         for engine, integrator in EXPLICIT.items()
     ]
@@ -151,13 +142,14 @@ def _high_pass(follow: Follow) -> Row:
     poles = np.linalg.eigvals(first_order(linearised(vehicle)))
     wanted = corner * complex(-ratio, np.sqrt(1 - ratio**2))
     off = float(np.abs(poles - wanted).min()) / corner
-    return at_most(
+    return Observed(
         "stabilisers.high_pass",
         SYSTEM,
         f"high-pass at {CUT_OFF:g} Hz: distance of the vehicle's slow pole "
         "from that of s^2 + 2 zeta wc s + wc^2, by wc",
         off,
         "",
+    ).at_most(
         0.01,
         "k = (I + J) wc^2, d = 2 zeta (I + J) wc; the wheels follow the chassis but for (wc / 20)^2, and "
         "unequal ends couple heave by (b m1 - a m2)^2 / (M (I + J))",
@@ -178,29 +170,25 @@ def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
     }
     rms = {bandwidth: float(np.sqrt(np.mean(run["enforced_moment"] ** 2))) for bandwidth, run in runs.items()}
     rows = [
-        finding(
+        Observed(
             "stabilisers.bandwidth.raw",
             SYSTEM,
             "rms moment of a pitch with noise of 0.1 degrees per sample at 1 kHz, used as it is",
             rms[None],
             "N m",
-            1e6,
-            "I s sqrt(6) / T^2 and more: differentiated twice",
-            "published",
-        )
+        ).beside(1e6, "I s sqrt(6) / T^2 and more: differentiated twice", "published")
     ]
     for bandwidth, published in BANDWIDTHS.items():
         off = float(np.abs(runs[bandwidth]["pitch"] - measured["pitch"]).max())
         rows.append(
-            finding(
+            Observed(
                 f"stabilisers.bandwidth.{bandwidth:g}",
                 SYSTEM,
                 f"the same smoothed to {bandwidth:g} Hz; the pitch is then off by at most {off:.4f} rad",
                 rms[bandwidth],
                 "N m",
-                published,
-                "with another filter: a low one takes motion away, a high one leaves noise",
-                "published",
+            ).beside(
+                published, "with another filter: a low one takes motion away, a high one leaves noise", "published"
             )
         )
     return rows

@@ -15,7 +15,7 @@ from models.core.discretisation import WARNED
 from models.core.systems import modules_of
 from models.ensemble.workers import processes
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Drawn, Row, Saved, System, Table, at_most, finding, within
+from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, System, Table
 from validation.stated_errors.sample import Sample
 
 TITLE = "Stated errors against truths a hundred times finer"
@@ -100,47 +100,38 @@ def _rows(found: list[Saved], quick: bool) -> list[Row]:
     asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
     shares = (
         [
-            finding("stated_errors.near", SYSTEM, near, right, "", 1.0, asked, "none"),
-            finding("stated_errors.useless", SYSTEM, below, useless, "", 0.0, tenth, "none"),
+            Observed("stated_errors.near", SYSTEM, near, right, "").beside(1.0, asked, "none"),
+            Observed("stated_errors.useless", SYSTEM, below, useless, "").beside(0.0, tenth, "none"),
         ]
         if quick
         else [
-            within("stated_errors.near", SYSTEM, near, right, "", 1.0, 1.0 - SHARE, asked, "none"),
-            at_most("stated_errors.useless", SYSTEM, below, useless, "", FEW, tenth, "none"),
+            Observed("stated_errors.near", SYSTEM, near, right, "").within(1.0, 1.0 - SHARE, asked, "none"),
+            Observed("stated_errors.useless", SYSTEM, below, useless, "").at_most(FEW, tenth, "none"),
         ]
     )
     return [
         *shares,
-        at_most(
+        Observed(
             "stated_errors.silent",
             SYSTEM,
             f"samples whose true error is above {FAR:g} times the stated one, without a warning",
             float(len(silent)),
             "",
-            0.0,
-            f"asked: none; a warning stands above {100 * WARNED:g} % of the channel's deviation",
-            "none",
-        ),
-        at_most(
+        ).at_most(0.0, f"asked: none; a warning stands above {100 * WARNED:g} % of the channel's deviation", "none"),
+        Observed(
             "stated_errors.cost",
             SYSTEM,
             "force evaluations of the estimate by those of the run, median of systems",
             float(np.median(costs)),
             "",
-            COST,
-            "asked: about half the run again",
-            "none",
-        ),
-        finding(
+        ).at_most(COST, "asked: about half the run again", "none"),
+        Observed(
             "stated_errors.without",
             SYSTEM,
             f"of {len(found)} samples: results that say why there is no number",
             float(len(found) - len(known)),
             "",
-            "few",
-            "what does not repeat has no error of steps",
-            "none",
-        ),
+        ).beside("few", "what does not repeat has no error of steps", "none"),
     ]
 
 
@@ -170,7 +161,7 @@ def _of_system(name: str, found: list[Saved]) -> list[Row]:
         ("cost", "cost of the estimate by that of the run, median", _cost(name, found), COST),
     )
     return [
-        finding(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "", expected, why, "none")
+        Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "").beside(expected, why, "none")
         for id, what, value, expected in shown
     ]
 

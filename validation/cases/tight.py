@@ -4,7 +4,7 @@ from pathlib import Path
 
 from models.engines.assembly import Settings
 from models.systems.pitch_plane.run import run as simulate
-from validation.common.rows import CaseAnswer, Independence, System, at_most
+from validation.common.rows import CaseAnswer, Independence, Observed, System
 from validation.common.scenes import gap, on_paper_road, road_scene
 
 TITLE = "Road-excited run at the recommended setting against a tight-tolerance solution"
@@ -24,31 +24,25 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     tight = simulate(scene, "reference", Settings("DOP853", STEP, duration, TOLERANCE))
     other = simulate(scene, "reference", Settings("LSODA", STEP, duration, TOLERANCE))
     rows = [
-        at_most(
+        Observed(
             "tight.uncertainty",
             SYSTEM,
             "uncertainty of the tight solution: Dormand-Prince 8 against Adams/BDF",
             gap(tight, other),
             "m, rad, m/s, rad/s",
-            1e-7,
-            "a tenth of the bound that it has to judge",
-            "shared kernel",
-        )
+        ).at_most(1e-7, "a tenth of the bound that it has to judge", "shared kernel")
     ]
     for engine in ("reference", "exudyn", "mujoco"):
         independence: Independence = "shared kernel" if engine == "reference" else "native"
         run = simulate(scene, engine)
         name = run.data.attrs["integrator"]
         rows.append(
-            at_most(
+            Observed(
                 f"tight.{engine}",
                 SYSTEM,
                 f"states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
                 gap(run, tight),
                 "m, rad, m/s, rad/s",
-                1e-6,
-                "a thousandth of a millimetre: far below what a road survey resolves",
-                independence,
-            )
+            ).at_most(1e-6, "a thousandth of a millimetre: far below what a road survey resolves", independence)
         )
     return rows, {}

@@ -8,7 +8,7 @@ from models.systems.pitch_plane.run import run as simulate
 from models.systems.pitch_plane.scene import Scene
 from models.systems.pitch_plane.virtual_measurement import write_measurement
 from validation.common.grounds import allowing
-from validation.common.rows import CaseAnswer, Row, System, at_most, not_run
+from validation.common.rows import CaseAnswer, Observed, Row, System, not_run
 from validation.common.scenes import COURSE, VEHICLES, data_folder, force_scene, gap, on_paper_road, road_scene
 
 TITLE = "Same tableau and step: whole paths against the reference"
@@ -70,15 +70,12 @@ def _compare(what: str, scenes: list[Scene]) -> list[Row]:
     truths = [simulate(scene, "reference") for scene in scenes]
     steps = ", ".join(f"{1e3 * scene.run.step:g}" for scene in scenes)
     return [
-        at_most(
+        Observed(
             f"twin.{engine}.{what}",
             SYSTEM,
             f"states, {engine} against reference, RK4 at {steps} ms, {what}",
             max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
             "m, rad, m/s, rad/s",
-            BOUND,
-            WHY,
-            "native",
-        )
+        ).at_most(BOUND, WHY, "native")
         for engine in ("exudyn", "mujoco")
     ]

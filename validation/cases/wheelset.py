@@ -16,7 +16,7 @@ from models.rail.limit_cycle import Orbit, attained, beside, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
-from validation.common.rows import Row, System, Table, at_most, behaves, within
+from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.contact.drawn_wheelsets import HEAVY, SEED, STIFF, Speeds, criticals, drawn
 from validation.faults import wheelset as faults
 from validation.faults.campaign import off
@@ -71,35 +71,22 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         edges.append(abs(wavelength(Equations, edge) / plain - 1.0))
     count = f"of {len(wheelsets)} wheelsets without suspension at 0.2 m/s"
     return [
-        at_most(
+        Observed(
             "wheelset.wave.closed",
             SYSTEM,
             f"wavelength {count}: eigenvalues of all motions by the closed form",
             max(closed),
             "",
-            1e-3,
-            "cones on round heads without slip; inertia and spin creepage are what is left",
-            "closed form",
-        ),
-        at_most(
+        ).at_most(1e-3, "cones on round heads without slip; inertia and spin creepage are what is left", "closed form"),
+        Observed(
             "wheelset.wave.klingel",
             SYSTEM,
             f"wavelength {count} on rails that are edges: by Klingel's formula",
             max(edges),
             "",
-            1e-3,
-            "2 pi sqrt(r b / c), for which rails have no radius",
-            "closed form",
-        ),
-        at_most(
-            "wheelset.wave.engines",
-            SYSTEM,
-            f"wavelength {count}: three implementations",
-            max(among),
-            "",
-            1e-6,
-            "each linearises its own equations of motion around the same contact forces",
-            "shared kernel",
+        ).at_most(1e-3, "2 pi sqrt(r b / c), for which rails have no radius", "closed form"),
+        Observed("wheelset.wave.engines", SYSTEM, f"wavelength {count}: three implementations", max(among), "").at_most(
+            1e-6, "each linearises its own equations of motion around the same contact forces", "shared kernel"
         ),
     ]
 
@@ -114,16 +101,13 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
         "speeds for the chosen wheelset, for drawn ones near the first's and below"
     )
     return [
-        at_most(
+        Observed(
             "wheelset.critical.engines",
             SYSTEM,
             f"critical speed of {len(having)} wheelsets: three implementations",
             max(map(_spread, having)),
             "",
-            1e-6,
-            why,
-            "shared kernel",
-        ),
+        ).at_most(1e-6, why, "shared kernel"),
         behaves(
             "wheelset.critical.agreed",
             SYSTEM,
@@ -164,16 +148,13 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
             states = written.rest + LIVELY * draw.normal(size=(20, eq.STATES))
             worst = max(worst, *(off(built.rates(state), written.rates(state)) for state in states))
         rows.append(
-            at_most(
+            Observed(
                 f"wheelset.accelerations.{engine}",
                 SYSTEM,
                 f"rates of 20 random states of {len(wheelsets)} wheelsets with FASTSIM, by the largest",
                 worst,
                 "",
-                1e-10,
-                "the engine's own equations of motion around the same contact forces",
-                "shared kernel",
-            )
+            ).at_most(1e-10, "the engine's own equations of motion around the same contact forces", "shared kernel")
         )
     return rows
 
@@ -204,31 +185,25 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
     why = "the same method and contact forces; what differs is rounding"
     return [
         *(
-            at_most(
+            Observed(
                 f"wheelset.path.{engine}",
                 SYSTEM,
                 f"{of}: {engine} by the equations (m, rad, s)",
                 pairs["reference", engine],
                 "",
-                1e-10,
-                why,
-                "shared kernel",
-            )
+            ).at_most(1e-10, why, "shared kernel")
             for engine in ENGINES
         ),
-        at_most(
-            "wheelset.path.between", SYSTEM, f"{of}: both engines", pairs[ENGINES], "", 1e-10, why, "shared kernel"
+        Observed("wheelset.path.between", SYSTEM, f"{of}: both engines", pairs[ENGINES], "").at_most(
+            1e-10, why, "shared kernel"
         ),
-        at_most(
+        Observed(
             "wheelset.power",
             SYSTEM,
             f"times that a creep force has a power above zero, of {steps:,} at every step of these paths",
             positive,
             "",
-            0,
-            "friction takes energy and never gives any",
-            "none",
-        ),
+        ).at_most(0, "friction takes energy and never gives any", "none"),
     ]
 
 
@@ -267,26 +242,12 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
         apart = max(float(np.ptp([v for v, _ in own])) / max(e for _, e in own) for own in every)
         of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
         rows += [
-            at_most(
-                f"wheelset.cycle.{value}.error",
-                SYSTEM,
-                f"{of}: change by halving the step, relative",
-                errors,
-                "",
-                1e-2,
-                "Newton's method closes the orbit at either step",
-                "none",
-            ),
-            at_most(
-                f"wheelset.cycle.{value}",
-                SYSTEM,
-                f"{of}: {count} implementations, by the error of the step",
-                apart,
-                "",
-                1.0,
-                "each closes its own orbit, from a guess that is 1 % off",
-                "shared kernel",
-            ),
+            Observed(
+                f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: change by halving the step, relative", errors, ""
+            ).at_most(1e-2, "Newton's method closes the orbit at either step", "none"),
+            Observed(
+                f"wheelset.cycle.{value}", SYSTEM, f"{of}: {count} implementations, by the error of the step", apart, ""
+            ).at_most(1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
         ]
     return rows
 
@@ -297,17 +258,13 @@ def _order_row() -> Row:
     start = equations.displaced(5e-3)
     ends = [equations.run(start, 0.1, step).states[-1] for step in (1.25e-4, 6.25e-5, 3.125e-5)]
     first, second = np.abs(ends[0] - ends[1])[eq.YAW], np.abs(ends[1] - ends[2])[eq.YAW]
-    return within(
+    return Observed(
         "wheelset.order",
         SYSTEM,
         "observed order of RK4 in the yaw after 0.1 s, linear creep",
         float(np.log2(first / second)),
         "",
-        4.0,
-        0.2,
-        "the order of the method",
-        "closed form",
-    )
+    ).within(4.0, 0.2, "the order of the method", "closed form")
 
 
 def _energy_rows() -> list[Row]:
@@ -320,27 +277,20 @@ def _energy_rows() -> list[Row]:
             book = ledger(equations, equations.run(equations.displaced(5e-3), 0.1, step))
             left.append(float(np.abs(book.residual).max() / book.creep[-1]))
         rows += [
-            at_most(
+            Observed(
                 f"wheelset.energy.{law}",
                 SYSTEM,
                 f"energy that the ledger of a path of 0.1 s with {named} leaves open, by what creep takes",
                 left[-1],
                 "",
-                1e-8,
-                "steps of 0.125 ms; works by the stages of RK4",
-                "none",
-            ),
-            within(
+            ).at_most(1e-8, "steps of 0.125 ms; works by the stages of RK4", "none"),
+            Observed(
                 f"wheelset.energy.{law}.order",
                 SYSTEM,
                 f"order at which that falls with the step, {named}",
                 float(np.log2(left[0] / left[1])),
                 "",
-                4.0,
-                0.2,
-                "that of the integrator",
-                "none",
-            ),
+            ).within(4.0, 0.2, "that of the integrator", "none"),
         ]
     return rows
 

@@ -2,15 +2,13 @@
 
 from scipy.stats import chi2
 
-from validation.common.rows import Row, System, within
+from validation.common.rows import Observed, Row
 
 LEVEL = 0.999
 """Chance that a true law passes; the seeds are fixed, so a row either always passes or never does."""
 
 
-def mean_square(
-    id: str, system: System, quantity: str, value: float, expected: float, freedom: int, unit: str, why: str
-) -> Row:
+def mean_square(observed: Observed, expected: float, freedom: int, why: str) -> Row:
     """Row for a mean square of ``freedom`` independent normal numbers whose variance should be ``expected``.
 
     freedom times value by expected is chi-square with that many degrees of freedom; the row passes inside the
@@ -19,4 +17,4 @@ def mean_square(
     low, high = (float(chi2.ppf(part, freedom)) / freedom for part in ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
     note = f"{why}; {100 * LEVEL:g} % band of {freedom:,} degrees of freedom: {low:.4f} to {high:.4f} times the law"
     middle, half = expected * (low + high) / 2, expected * (high - low) / 2
-    return within(id, system, quantity, value, unit, middle, half, note, "closed form")
+    return observed.within(middle, half, note, "closed form")

@@ -79,29 +79,57 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def within(
-    id: str,
-    system: System,
-    quantity: str,
-    value: float,
-    unit: str,
-    expected: float,
-    tolerance: float,
-    why: str,
-    independence: Independence,
-) -> Row:
-    """Row that passes if |value - expected| <= tolerance; a value that is not a number fails."""
-    passed = abs(value - expected) <= tolerance
-    status: Status = "passed" if passed else "failed"
-    reason = "" if passed else f"off by {abs(value - expected):.3g}, allowed {tolerance:.3g}"
-    return Row(id, system, quantity, value, unit, expected, tolerance, why, independence, status, reason)
+@dataclass(frozen=True)
+class Observed:
+    """A figure before it is judged; each method gives the row of one way to judge it.
 
+    id : name of the row, which begins with the name of its case.
+    system, quantity : system that the figure belongs to, and in words what was measured.
+    value, unit : the figure, and its unit as text; "" for a pure number.
+    """
 
-def at_most(
-    id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str, independence: Independence
-) -> Row:
-    """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
-    return within(id, system, quantity, value, unit, 0.0, bound, why, independence)
+    id: str
+    system: System
+    quantity: str
+    value: float
+    unit: str
+
+    def within(self, expected: float, tolerance: float, why: str, independence: Independence) -> Row:
+        """Row that passes if |value - expected| <= tolerance; a value that is not a number fails."""
+        passed = abs(self.value - expected) <= tolerance
+        reason = "" if passed else f"off by {abs(self.value - expected):.3g}, allowed {tolerance:.3g}"
+        return self._row(expected, tolerance, why, independence, "passed" if passed else "failed", reason)
+
+    def at_most(self, bound: float, why: str, independence: Independence) -> Row:
+        """Row for an error or a ratio that must not exceed a bound: expected 0, tolerance the bound."""
+        return self.within(0.0, bound, why, independence)
+
+    def beside(self, expected: float | str, why: str, independence: Independence = "published") -> Row:
+        """Row that reports the figure beside a published one without judging it."""
+        return self._row(expected, None, why, independence, "reported")
+
+    def aim(self, bound: float, why: str, side: Side = "at most") -> Row:
+        """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
+
+        So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known
+        not to reach: ``why`` says for which of the two reasons.
+        """
+        reached = self.value <= bound if side == "at most" else self.value >= bound
+        wanted = f"{side} {bound:,.4g}"
+        missed = f"{self.value:,.4g}{f' {self.unit}' if self.unit else ''}; the aim is {wanted}"
+        return self._row(wanted, None, why, "none", *(("reported", "") if reached else ("missed", missed)))
+
+    def _row(
+        self,
+        expected: float | str,
+        tolerance: float | None,
+        why: str,
+        independence: Independence,
+        status: Status,
+        reason: str = "",
+    ) -> Row:
+        given = (self.id, self.system, self.quantity, self.value, self.unit)
+        return Row(*given, expected, tolerance, why, independence, status, reason)
 
 
 def behaves(
@@ -113,35 +141,6 @@ def behaves(
     return Row(
         id, system, quantity, found, "", expected, None, why, independence, "passed" if passed else "failed", reason
     )
-
-
-def finding(
-    id: str,
-    system: System,
-    quantity: str,
-    value: float,
-    unit: str,
-    expected: float | str,
-    why: str,
-    independence: Independence = "published",
-) -> Row:
-    """Row that reports a figure beside a published one without judging it."""
-    return Row(id, system, quantity, value, unit, expected, None, why, independence, "reported")
-
-
-def aim(
-    id: str, system: System, quantity: str, value: float, unit: str, bound: float, why: str, side: Side = "at most"
-) -> Row:
-    """Row of a stated aim that decides no verdict: reported where it is reached, missed otherwise or for no number.
-
-    So are figures that the machine decides, as seconds, their ratios and memory, and aims that the method is known not
-    to reach: ``why`` says for which of the two reasons.
-    """
-    reached = value <= bound if side == "at most" else value >= bound
-    status: Status = "reported" if reached else "missed"
-    wanted = f"{side} {bound:,.4g}"
-    reason = "" if reached else f"{value:,.4g}{f' {unit}' if unit else ''}; the aim is {wanted}"
-    return Row(id, system, quantity, value, unit, wanted, None, why, "none", status, reason)
 
 
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:

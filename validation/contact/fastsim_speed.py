@@ -13,7 +13,7 @@ from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_secon
 from models.contact.material import Pair
 from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
-from validation.common.rows import Row, System, aim
+from validation.common.rows import Observed, Row, System
 
 SYSTEM: System = "contact"
 CELLS = 21
@@ -55,7 +55,9 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     ratio = {name: paired_ratio(seconds, took["bound"]) for name, seconds in took.items()}
     calls_took = {n: median(1e6 * took[f"call {n}"]) for n in calls}
     rows = [
-        aim(f"fastsim.speed.{name}", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", value, unit, most, WHY)
+        Observed(f"fastsim.speed.{name}", SYSTEM, f"{what}, 95 % interval {low:.3g} to {high:.3g}", value, unit).aim(
+            most, WHY
+        )
         for name, what, (value, low, high), unit, most in (
             ("plain", "plain march per cell, by a root and a division", ratio["plain"], "", 1.8),
             ("second", "second-order march per cell, by a root and a division", ratio["second"], "", 4.0),

@@ -11,7 +11,7 @@ from models.core.errors import Refused, RunFailed
 from models.engines.contact_bridge import Wheels, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.stability import LONG_RUN, limit
-from validation.common.rows import Row, System, Table, at_most, behaves
+from validation.common.rows import Observed, Row, System, Table, behaves
 
 SYSTEM: System = "rolling-vehicle"
 DURATION = 0.2
@@ -84,7 +84,7 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
     explicit = done[0]
     implicit = [next(run for run in done if run.method == method) for method in METHODS]
     found = [
-        at_most(
+        Observed(
             f"contact_bridges.low-speed.{run.method}",
             SYSTEM,
             f"Exudyn at 1 m/s, {run.method} with slopes: "
@@ -92,6 +92,7 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
             f"needs {explicit.calls})",
             run.error,
             "of what is left",
+        ).at_most(
             1e-3,
             f"{MORE} times the explicit limit and of second order: a twentieth of the suspension's shortest period",
             "closed form",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from models.core.errors import RunFailed
-from validation.common.rows import Row, System, Table, finding, within
+from validation.common.rows import Observed, Row, System, Table
 from validation.faults.patches import Patch
 
 Record = dict[str, Any]
@@ -73,38 +73,32 @@ class Campaign:
         clean, *found = records
         single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
         return [
-            within(
+            Observed(
                 f"{self.id}.caught",
                 SYSTEM,
                 f"faults planted in {self.what} that a check catches",
                 sum(bool(seen(record)) for record in found),
                 "faults",
+            ).within(
                 len(found),
                 0,
                 f"every one of them makes it wrong; {len(found)} of {len(self.faults)} were planted",
                 "native",
             ),
-            within(
+            Observed(
                 f"{self.id}.false_alarms",
                 SYSTEM,
                 f"alarms of the checks of {self.what} without a fault",
                 len(seen(clean)),
                 "alarms",
-                0,
-                0,
-                "a check that cries without a fault is no check",
-                "native",
-            ),
-            finding(
+            ).within(0, 0, "a check that cries without a fault is no check", "native"),
+            Observed(
                 f"{self.id}.single",
                 SYSTEM,
                 f"faults planted in {self.what} that one check alone catches",
                 len(single),
                 "faults",
-                "few",
-                "what would pass if that check were dropped: " + (", ".join(single) or "none"),
-                "native",
-            ),
+            ).beside("few", "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),
         ]
 
     def table(self, records: list[Record]) -> Table:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from validation.common.rows import Drawn, Row, Saved, Table, finding, within
+from validation.common.rows import Drawn, Observed, Row, Saved, Table
 from validation.faults.bench import CHECKS, Bench, size
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import ADAPTER, CLEAN, DESCRIPTION, EQUATIONS, FAULTS, INPUT, Fault, planted
@@ -83,38 +83,25 @@ def rows(data: Saved) -> list[Row]:
     single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
     told = [f"{record['fault']} ({next(name for name in CHECKS if seen(record, name))})" for record in single]
     return [
-        within(
+        Observed(
             "planted.caught",
             SYSTEM,
             "planted faults that a check catches, asymmetric vehicle",
             sum(map(caught, found)),
             "faults",
-            len(found),
-            0,
-            f"every one of them is a wrong model; {len(found)} of {len(FAULTS)} were planted",
-            "native",
+        ).within(
+            len(found), 0, f"every one of them is a wrong model; {len(found)} of {len(FAULTS)} were planted", "native"
         ),
-        within(
+        Observed(
             "planted.false_alarms",
             SYSTEM,
             "alarms without a fault, all checks, vehicles and implementations",
             alarms,
             "alarms",
-            0,
-            0,
-            "a check that cries without a fault is no check",
-            "native",
-        ),
+        ).within(0, 0, "a check that cries without a fault is no check", "native"),
         *([_hidden(found)] if _both(data) else []),
-        finding(
-            "planted.single",
-            SYSTEM,
-            "planted faults that one check alone catches",
-            len(single),
-            "faults",
-            "few",
-            "what would pass if that check were dropped: " + (", ".join(told) or "none"),
-            "native",
+        Observed("planted.single", SYSTEM, "planted faults that one check alone catches", len(single), "faults").beside(
+            "few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"
         ),
     ]
 
@@ -127,17 +114,9 @@ def _both(data: Saved) -> bool:
 def _hidden(found: list[Saved]) -> Row:
     missed = [record for record in found if not caught(record, SYMMETRIC)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
-    return within(
-        "planted.hidden",
-        SYSTEM,
-        "planted faults that the symmetric vehicle of the paper hides",
-        len(missed),
-        "faults",
-        len(HIDDEN),
-        0,
-        why,
-        "native",
-    )
+    return Observed(
+        "planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed), "faults"
+    ).within(len(HIDDEN), 0, why, "native")
 
 
 def lines(data: Saved) -> list[tuple[str, ...]]:

@@ -25,7 +25,7 @@ from models.road.excitation import Excitation
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, Table, at_most, finding, within
+from validation.common.rows import Observed, Row, System, Table
 from validation.ride.rides import five_cases
 
 SYSTEM: System = "cost"
@@ -151,37 +151,31 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
     exact = points[:2]
     grids = [p for p in points if p.name.startswith("logarithmic")]
     rows = [
-        at_most(
+        Observed(
             f"price.ride.error.{p.name.split(',')[0]}",
             SYSTEM,
             f"R19-ride at {SPEED:g} m/s, {p.name}: largest "
             "error of a standard deviation of accelerations and tyre forces",
             max(p.errors.values()),
             "relative",
-            1e-9,
-            f"quadrature knows its variances to {ride.uncertainty:.0e}",
-            "closed form",
-        )
+        ).at_most(1e-9, f"quadrature knows its variances to {ride.uncertainty:.0e}", "closed form")
         for p in exact
     ]
     rows += [
-        within(
+        Observed(
             "price.ride.counts.solves",
             SYSTEM,
             "Lyapunov equations solved for one road at one speed",
             exact[0].count,
             "solves",
-            2,
-            0,
-            "the first solution and one correction",
-            "none",
-        ),
-        within(
+        ).within(2, 0, "the first solution and one correction", "none"),
+        Observed(
             "price.ride.counts.decompositions",
             SYSTEM,
             "eigenvectors made for all points of the sweep",
             exact[1].count,
             "decompositions",
+        ).within(
             4,
             0,
             "the vehicle; the filters of two tracks as modelled or alike, and of two apart; "
@@ -191,25 +185,22 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
     ]
     falls = [a.errors[kind] / b.errors[kind] for kind in KINDS for a, b in pairwise(grids)]
     rows.append(
-        within(
+        Observed(
             "price.ride.grids",
             SYSTEM,
             "grids of ten times the frequencies whose error is not smaller",
             sum(ratio <= 1.0 for ratio in falls),
             "",
-            0,
-            0,
-            "they converge",
-            "none",
-        )
+        ).within(0, 0, "they converge", "none")
     )
     rows += [
-        finding(
+        Observed(
             f"price.ride.copies.{p.count}",
             SYSTEM,
             f"{p.name}, {p.count} copies: largest error of a standard deviation, one draw, |z| up to {p.z:.1f}",
             max(p.errors.values()),
             "relative",
+        ).beside(
             "one over the root of copies times seconds",
             "statistics of few copies: the judged ones are in the case of varying speed",
             "none",

@@ -3,7 +3,7 @@
 from models.advice.price.curves import Reach
 from models.advice.price.problem import Problem, Setting
 from models.advice.price.runner import Measured, Point, attempt, cheapest
-from validation.common.rows import Row, System, at_most, finding, within
+from validation.common.rows import Observed, Row, System
 from validation.price.tables import named
 
 SYSTEM: System = "cost"
@@ -55,18 +55,19 @@ def _label(p: Point) -> str:
 def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
     """Row that passes if a list of offenders is empty, and names them if it is not."""
     offenders = f": {', '.join(found)}" if found else ""
-    return within(name, SYSTEM, what + offenders, len(found), "settings", 0, 0, why, "closed form")
+    return Observed(name, SYSTEM, what + offenders, len(found), "settings").within(0, 0, why, "closed form")
 
 
 def _reference(problem: Problem, measured: Measured) -> Row:
     """The reference must know more than the finest tolerance asks."""
     quantity, share = measured.quantity, getattr(problem, "sure", SURE)
-    return at_most(
+    return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,
         f"uncertainty of the reference ({problem.reference}), {quantity}",
         problem.uncertainty[quantity],
         measured.unit,
+    ).at_most(
         share * min(problem.tolerances),
         "what the reference states of itself or solvers of different "
         f"families differ by; {share:g} of the finest tolerance, so that curves stand clear",
@@ -78,12 +79,13 @@ def _orders(measured: Measured) -> list[Row]:
     """Observed order of every fixed-step method that declares one, for every quantity."""
     settings = {p.setting.curve: p.setting for p in measured.points}
     return [
-        within(
+        Observed(
             f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
             f"observed order of the largest {quantity} error, {named(curve)}",
             found,
             "",
+        ).within(
             setting.order,
             BANDS[setting.order],
             "slope on the three finest steps that stand clear of the reference; the next power of "
@@ -104,12 +106,13 @@ def _promises(problem: Problem, measured: Measured) -> Row:
         if best is not None:
             found = attempt(problem, _runnable(problem, measured, *best))
             worst = max(worst, found.errors.get(measured.quantity, float("inf")) / target)
-    return within(
+    return Observed(
         f"price.{problem.key}.cheapest",
         SYSTEM,
         "error of the table's cheapest settings by their tolerance, each of them run, largest",
         worst,
         "",
+    ).within(
         0.0,
         PROMISE,
         "interpolated between two settings tried: a quarter is how far a curve may bend between them",
@@ -168,4 +171,4 @@ def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> 
     bounds = told if kind == "seconds" else "exact"
     what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
     why = f"at its default {p.setting.label()} its error is {measured.error(p):.3g} {unit}"
-    return [finding(name, SYSTEM, what, lost.factor, "times", bounds, why, "none")]
+    return [Observed(name, SYSTEM, what, lost.factor, "times").beside(bounds, why, "none")]

@@ -23,7 +23,7 @@ from models.machine.compiled import njit
 from models.machine.stack import at, beyond
 from models.machine.timing import interleave, median
 from models.systems.pitch_plane.scene import assemble
-from validation.common.rows import Row, Saved, System, Table, finding
+from validation.common.rows import Observed, Row, Saved, System, Table
 from validation.price.compiled_forces import CompiledForces, law
 from validation.price.instructions_run import exudyn_marches
 from validation.price.problems import road_excited, wheelset
@@ -163,16 +163,13 @@ def share(saved: Saved) -> tuple[float, float, float]:
 def rows(data: list[Saved]) -> list[Row]:
     """The bridge's share, reported."""
     return [
-        finding(
+        Observed(
             f"price.{saved['problem']}.split.{saved['engine']}",
             SYSTEM,
             f"{_named(saved)}, {saved['problem']}: the bridge's share of a step",
             middle,
             "%",
-            f"95 % interval {low:.0f} to {high:.0f}",
-            "seconds are reported and never gated",
-            "none",
-        )
+        ).beside(f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated", "none")
         for saved in data
         for middle, low, high in [share(saved)]
     ]

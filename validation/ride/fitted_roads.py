@@ -16,7 +16,7 @@ from models.road.isotropic import isotropic_like
 from models.road.measured_tracks import MeasuredTracks, read_tracks
 from models.road.shape_filter import ShapeFilter
 from models.road.two_track import road_of_level
-from validation.common.rows import Row, System, Table, finding, not_run, within
+from validation.common.rows import Observed, Row, System, Table, not_run
 from validation.common.scenes import COURSE, data_folder
 
 SYSTEM: System = "ride"
@@ -37,12 +37,13 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
     if fitted.roll is None:
         raise RuntimeError("a roll process that was put in was not found")
     rows = [
-        within(
+        Observed(
             f"ride_road.fit.{name}.{what}",
             SYSTEM,
             f"{what} of the {name} process fitted to {length / 1e3:g} km of made road over the true one",
             getattr(process.filter, what) / getattr(true, what),
             "",
+        ).within(
             1.0,
             4.0 * getattr(process, f"{what}_error") + 0.02,
             "four of the fit's own standard errors, and 2 % for sampling at 5 cm and the window's width",
@@ -73,30 +74,24 @@ def measured() -> tuple[list[Row], list[dict[str, Any]]]:
         fitted = fit(tracks)
         if name == "belgian_block.crg":
             rows.append(
-                within(
+                Observed(
                     "ride_road.measured.correlation",
                     SYSTEM,
                     f"{tracks.name}: correlation of the two tracks",
                     float(np.corrcoef(tracks.left, tracks.right)[0, 1]),
                     "",
-                    -0.38,
-                    0.01,
-                    "as another reader of the file found",
-                    "published",
-                )
+                ).within(-0.38, 0.01, "as another reader of the file found", "published")
             )
         shown.append(_shown(tracks, fitted))
         why = f"{tracks.length:.4g} m; " + "; ".join(fitted.notes)
         rows.append(
-            finding(
+            Observed(
                 f"ride_road.measured.{name.split('.')[0]}",
                 SYSTEM,
                 f"{name}: rms of ln(measured / fitted) spectrum of the mean process",
                 fitted.mean.residual,
                 "",
-                "",
-                why,
-            )
+            ).beside("", why)
         )
     return rows, shown
 

@@ -18,7 +18,7 @@ from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import linearise, wheels
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, at_most
+from validation.common.rows import Observed, Row, System
 from validation.ride.rides import paper_road
 
 SYSTEM: System = "ride"
@@ -59,12 +59,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
     for engine, run in runs.items():
         shift = abs(run.outputs[:, travel].mean() - found.mean[travel]) / size[travel]
         rows.append(
-            at_most(
+            Observed(
                 f"ride_nonlinear.mean.{engine}",
                 SYSTEM,
                 f"the same in {engine}: mean travel, predicted {1e3 * found.mean[travel]:.2f} mm, by its deviation",
                 float(shift),
                 "",
+            ).at_most(
                 promised(left[travel]) + 4.0 * float(error[travel] / size[travel]),
                 "what its sentence promises, and 4 standard errors",
                 "none",
@@ -72,16 +73,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
         )
         mean = abs(run.outputs[:, force].mean()) / error[force]
         rows.append(
-            at_most(
+            Observed(
                 f"ride_nonlinear.load.{engine}",
                 SYSTEM,
                 "the same: mean of the dynamic tyre force, |z|",
                 float(mean),
                 "",
-                4.0,
-                "the tyre bears the weight, however the damper pulls",
-                "none",
-            )
+            ).at_most(4.0, "the tyre bears the weight, however the damper pulls", "none")
         )
     return rows
 
@@ -89,16 +87,13 @@ def bent_in_engines(quick: bool) -> list[Row]:
 def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
     one, other = (runs[engine].run for engine in ENGINES)
     gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
-    return at_most(
+    return Observed(
         f"ride_nonlinear.path.{id}",
         SYSTEM,
         f"{what} on one random road: exudyn against mujoco, all states",
         float(gap),
         "m, rad, m/s, rad/s",
-        1e-12,
-        SAME,
-        "native",
-    )
+    ).at_most(1e-12, SAME, "native")
 
 
 def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
@@ -115,27 +110,21 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
         square = ((run.outputs**2).mean(axis=0) - exact.variance) / errors[1]
         share = float(np.median(errors[1] / exact.variance / 2.0))
         rows += [
-            at_most(
+            Observed(
                 f"ride_nonlinear.variance.{engine}",
                 SYSTEM,
                 f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
                 f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
                 float(np.abs(square).max()),
                 "",
-                4.0,
-                "standard errors by the densities: samples of a path know of each other",
-                "none",
-            ),
-            at_most(
+            ).at_most(4.0, "standard errors by the densities: samples of a path know of each other", "none"),
+            Observed(
                 f"ride_nonlinear.zero.{engine}",
                 SYSTEM,
                 "the same: means about the equilibrium, largest |z| of 16",
                 float(np.abs(mean).max()),
                 "",
-                4.0,
-                "the road has no mean, and gravity is carried",
-                "none",
-            ),
+            ).at_most(4.0, "the road has no mean, and gravity is carried", "none"),
         ]
     return rows, _spectra(runs, linear, excitation_)
 

@@ -12,7 +12,7 @@ from models.ride.marginal import Unstable, parts
 from models.ride.weighting import WEIGHTINGS, weighted
 from models.vehicles.spatial_linear import linearise
 from models.vehicles.vehicle_file import load_vehicle
-from validation.common.rows import Row, System, at_most, behaves, within
+from validation.common.rows import Observed, Row, System, behaves
 from validation.ride.rides import corners, off, one_track, paper_road, twin
 
 SYSTEM: System = "ride"
@@ -28,16 +28,13 @@ def weighting_rows(seed: int) -> list[Row]:
         integrals = quadrature(vehicle, road, 20.0, {"left occupant": WEIGHTINGS[name].response})
         at = vehicle.names.index("left occupant")
         rows.append(
-            at_most(
+            Observed(
                 f"ride_covariance.weighting.{name}",
                 SYSTEM,
                 f"{name} of a seat as states behind the vehicle, against its frequency response in the quadrature",
                 deviation / integrals.variance[at] ** 0.5 - 1,
                 "",
-                1e-8,
-                "asked of the cascade; as one polynomial it is 2e-4 off",
-                "native",
-            )
+            ).at_most(1e-8, "asked of the cascade; as one polynomial it is 2e-4 off", "native")
         )
     return rows
 
@@ -69,16 +66,13 @@ def _white_rows() -> list[Row]:
     ]
     return [
         *rows,
-        at_most(
+        Observed(
             "ride_covariance.white.value",
             SYSTEM,
             "the outputs that stay finite, against quadrature",
             off(found.variance[:4], other.variance[:4]),
             "",
-            1e-10,
-            "both routes at their best",
-            "native",
-        ),
+        ).at_most(1e-10, "both routes at their best", "native"),
     ]
 
 
@@ -100,17 +94,9 @@ def _free_rows() -> list[Row]:
     omega = 1e-3  # a place that grows as c t per unit of noise has the density c^2 / (2 pi w^4) at low frequencies
     density = spectra(turning, road, 20.0, np.array([omega]))[0, side]
     return [
-        within(
-            "ride_covariance.free.zeros",
-            SYSTEM,
-            "zero eigenvalues that are found in R19-free",
-            split.zeros,
-            "",
-            3,
-            0,
-            "place along and across, heading",
-            "closed form",
-        ),
+        Observed(
+            "ride_covariance.free.zeros", SYSTEM, "zero eigenvalues that are found in R19-free", split.zeros, ""
+        ).within(3, 0, "place along and across, heading", "closed form"),
         behaves(
             "ride_covariance.free.status",
             SYSTEM,
@@ -135,27 +121,16 @@ def _free_rows() -> list[Row]:
             "diffusing",
             walking.reason[side],
         ),
-        within(
-            "ride_covariance.free.walk",
-            SYSTEM,
-            "its standard deviation after 100 s",
-            after,
-            "m",
-            7.0,
-            0.5,
-            "known to one digit, from the same law worked out beforehand",
-            "closed form",
+        Observed("ride_covariance.free.walk", SYSTEM, "its standard deviation after 100 s", after, "m").within(
+            7.0, 0.5, "known to one digit, from the same law worked out beforehand", "closed form"
         ),
-        at_most(
+        Observed(
             "ride_covariance.free.rate",
             SYSTEM,
             "growth of its variance, rate t^3, against 2 pi w^4 / 3 times its density at 0.001 rad/s",
             float(rate) / (2 * np.pi * omega**4 * density / 3) - 1,
             "",
-            1e-4,
-            "the next term is smaller by the square of frequency over the slowest pole",
-            "native",
-        ),
+        ).at_most(1e-4, "the next term is smaller by the square of frequency over the slowest pole", "native"),
     ]
 
 
