@@ -24,7 +24,8 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
-from models.contact.fastsim_many import SPIN, XI_X, forces
+from models.contact.fastsim_many import forces
+from models.contact.fastsim_records import CONTACT, FORCES, cells_in, strips_in
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.core.errors import InputError
@@ -88,7 +89,7 @@ class Room(NamedTuple):
     """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
 
     vectors (4, 3): of ``equations.set_rates``; of ``wheel_forces``: touches (patches, TOUCH), and of those in contact,
-    first to last, contacts (patches, 10), motion (patches, MOVED), creep forces found (patches, 4) and other ones.
+    first to last, contacts (CONTACT), motion (patches, MOVED), creep forces found (FORCES) and other ones.
     """
 
     vectors: Array
@@ -162,10 +163,10 @@ def room_for(p):
     return Room(
         np.empty((4, 3)),
         np.empty((n, TOUCH)),
-        np.empty((n, 10)),
+        np.empty(n, CONTACT),
         np.empty((n, MOVED)),
-        np.empty((n, 4)),
-        np.empty((n, 4)),
+        np.empty(n, FORCES),
+        np.empty(n, FORCES),
     )
 
 
@@ -211,50 +212,47 @@ def _linear(a, b, x, y, spin, shear, poisson):
 @inlined
 def _one_way(sign, contacts, slip, speed, rails, found):
     """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
+    by = max(abs(speed), REGULAR)
     for k in range(len(contacts)):
-        contacts[k, XI_X] = sign * slip[k, VX] / max(abs(speed), REGULAR)
-        contacts[k, XI_X + 1] = slip[k, ASIDE] / max(abs(speed), REGULAR)
-        contacts[k, SPIN] = sign * slip[k, TURN] / max(abs(speed), REGULAR)
+        contact = contacts[k]
+        contact.xi_x, contact.xi_y = sign * slip[k, VX] / by, slip[k, ASIDE] / by
+        contact.spin = sign * slip[k, TURN] / by
     if rails.law == FASTSIM:
-        forces(contacts, rails.strips, rails.cells, rails.middle, BLEND, ORDER, found)
+        forces(contacts, strips_in(rails.strips), cells_in(rails.cells, rails.middle), BLEND, ORDER, found)
     else:
         shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
         for k in range(len(contacts)):
-            a, b, x, y, spin = (
-                contacts[k, 0],
-                contacts[k, 1],
-                contacts[k, XI_X],
-                contacts[k, XI_X + 1],
-                contacts[k, SPIN],
-            )
-            found[k, 0], found[k, 1], found[k, 2] = _linear(a, b, x, y, spin, shear, poisson)
+            c, force = contacts[k], found[k]
+            force.fx, force.fy, force.mz = _linear(c.a, c.b, c.xi_x, c.xi_y, c.spin, shear, poisson)
 
 
 @lean
 def _both_ways(forwards, contacts, slip, speed, rails, some, found):
     """Fill fx, fy, mz of wheels that roll forwards by a share, with ``some`` as room."""
-    found[:] = 0.0
+    for k in range(len(contacts)):
+        found[k].fx = found[k].fy = found[k].mz = 0.0
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
             _one_way(sign, contacts, slip, speed, rails, some)
             for k in range(len(contacts)):
-                found[k, 0] += share * sign * some[k, 0]
-                found[k, 1] += share * some[k, 1]
-                found[k, 2] += share * sign * some[k, 2]
+                found[k].fx += share * sign * some[k].fx
+                found[k].fy += share * some[k].fy
+                found[k].mz += share * sign * some[k].mz
 
 
 @inlined
 def creep(contacts, slip, speed, rails, some, found):
-    """Fill fx, fy, mz of contacts (n, 10) from their slip, the first columns of their motion (n, MOVED).
+    """Fill fx, fy, mz of contacts (CONTACT) from their slip, the first columns of their motion (n, MOVED).
 
     The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image. ``some``,
-    of the shape of ``found`` (n, 4), is written over.
+    FORCES as ``found``, is written over.
     """
     if rails.law == FASTSIM:
         shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
-        for contact in contacts:
-            contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], shear, poisson)
+        for k in range(len(contacts)):
+            c = contacts[k]
+            c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
     if speed >= REGULAR:
         _one_way(1.0, contacts, slip, speed, rails, found)
     else:
@@ -309,8 +307,8 @@ def patch_by_patch(y, z, roll, yaw, velocity, turning, rails, force, moment, rep
     for i in range(some):
         k, contact, m = int(motions[i, PATCH]), contacts[i], motions[i]
         place, depth = _place(touches[k]), touches[k, DEEP]
-        press = Pressed(depth, contact[0], contact[1], m[ELASTIC], contact[2], m[PUSH])
-        creeping = room.found[i, 0], room.found[i, 1], room.found[i, 2]
+        press = Pressed(depth, contact.a, contact.b, m[ELASTIC], contact.load, m[PUSH])
+        creeping = room.found[i].fx, room.found[i].fy, room.found[i].mz
         _act(place, press, creeping, force, moment)
         if len(report) > 0:
             motion = Motion(m[VX], m[VY], m[ASIDE], m[TURN], m[RATE])
@@ -347,13 +345,13 @@ def _moving(place, velocity, turning):
 
 @inlined
 def _press(touch, velocity, turning, p, push, contact, motion):
-    """Kinematics and normal force of one patch: its contact (10,) for the creep law, its motion (MOVED,)."""
+    """Kinematics and normal force of one patch: its contact for the creep law, its motion (MOVED,)."""
     moving = _moving(_place(touch), velocity, turning)
     elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
     motion[VX], motion[VY], motion[ASIDE], motion[TURN], motion[RATE] = moving
     motion[ELASTIC], motion[PUSH] = elastic, push
-    contact[0], contact[1], contact[3] = a, b, p[FRICTION]
-    contact[2] = elastic * max(0.0, 1.0 + p[DAMPING] * moving.rate)
+    contact.a, contact.b, contact.mu = a, b, p[FRICTION]
+    contact.load = elastic * max(0.0, 1.0 + p[DAMPING] * moving.rate)
 
 
 @inlined
