@@ -9,7 +9,6 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.strict import Strict, quantity, read
-from models.rail import wheel_forces as wf
 from models.rail.equations import YAW
 from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.of_scene import wheelset_of
@@ -105,7 +104,7 @@ def _cycle_lines(cycles: dict[str, Orbit]) -> list[str]:
         return []
     first = next(iter(cycles.values()))
     path = first.path()
-    power, creep = path.contacts[:, :, wf.POWER], np.hypot(path.contacts[:, :, wf.FX], path.contacts[:, :, wf.FY])
+    power, creep = path.contacts["power"], np.hypot(path.contacts["fx"], path.contacts["fy"])
     yaw = 1e3 * path.states[:, YAW].max()
     lines = [
         f"  cycle at {first.speed:g} m/s: yaw up to {yaw:.4g} mrad, creep forces up to "

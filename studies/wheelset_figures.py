@@ -8,7 +8,6 @@ import numpy as np
 
 from models.core.result import Result
 from models.drawing.figures import COLOURS, LABELS, heading, plt, save
-from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import Orbit
@@ -27,11 +26,11 @@ def _note(axis: plt.Axes, text: str, place: tuple[float, float], shift: tuple[fl
     axis.annotate(text, place, shift, textcoords="offset points", ha="right", **style)
 
 
-def _wheels(contacts: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
-    """Name and colour of each wheel, and the sums (n, REPORTED) over its patches."""
+def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
+    """Name and colour of each wheel, and the sums (n,) over its patches of what they report under some names."""
     each = contacts.shape[1] // 2
-    yield "right wheel", "#0072b2", contacts[:, :each].sum(axis=1)
-    yield "left wheel", "#d55e00", contacts[:, each:].sum(axis=1)
+    yield "right wheel", "#0072b2", [contacts[name][:, :each].sum(axis=1) for name in names]
+    yield "left wheel", "#d55e00", [contacts[name][:, each:].sum(axis=1) for name in names]
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
@@ -101,15 +100,15 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     figure, axes = plt.subplots(3, len(paths), figsize=(6.2 * len(paths), 7.0), squeeze=False, sharex="col")
     for k, (speed, own) in enumerate(paths.items()):
         last = own.times >= own.times[-1] - SHOWN
-        for side, colour, sums in _wheels(own.contacts[last]):
-            for axis, column in zip(axes[:, k], (wf.FX, wf.FY, wf.POWER), strict=True):
-                axis.plot(own.times[last], sums[:, column], color=colour, label=side)
+        for side, colour, sums in _wheels(own.contacts[last], "fx", "fy", "power"):
+            for axis, values in zip(axes[:, k], sums, strict=True):
+                axis.plot(own.times[last], values, color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
         axes[1, k].set(ylabel="across [N]")
         axes[2, k].set(ylabel="power [W]", xlabel="time [s]")
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
     axes[0, 0].legend(loc="upper right", ncols=2)
-    largest = max(float(own.contacts[:, :, wf.POWER].max()) for own in paths.values())
+    largest = max(float(own.contacts["power"].max()) for own in paths.values())
     told = f"creep forces on the wheels and their power, at any time {largest:.3g} W or less"
     heading(figure, f"{title}\n{told}", at_speeds(results))
     save(figure, path)
@@ -156,9 +155,9 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
     first = next(iter(cycles.values()))
     own = first.path()
-    for side, colour, sums in _wheels(own.contacts):
-        for column, name, line in ((wf.FX, "along", "-"), (wf.FY, "across", "--")):
-            right.plot(own.times, 1e-3 * sums[:, column], line, color=colour, label=f"{side}, {name}")
+    for side, colour, (along, across) in _wheels(own.contacts, "fx", "fy"):
+        for force, name, line in ((along, "along", "-"), (across, "across", "--")):
+            right.plot(own.times, 1e-3 * force, line, color=colour, label=f"{side}, {name}")
     left.set(
         xlabel="lateral displacement [mm]",
         ylabel="yaw [mrad]",

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
 from models.contact.undeformed_distance import from_function
 from models.core.errors import InputError, Refused, RunFailed
-from models.engines.contact_bridge import SUNK, Wheels, add_forces, slopes
+from models.engines.contact_bridge import Wheels, add_forces, slopes
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
@@ -34,9 +34,9 @@ def test_forces_are_those_of_the_package():
     (q, v), f = wheels.state(), np.zeros(8)
     add_forces(wheels.numbers, q, v, f)
     for k in (0, 4):
-        hertz = by_approach(*wheels.curvatures, wheels.numbers[SUNK] + q[k + 2], wheels.pair)
+        hertz = by_approach(*wheels.curvatures, wheels.sunk + q[k + 2], wheels.pair)
         motion = v[k] / wheels.speed, v[k + 1] / wheels.speed - q[k + 3], v[k + 3] / wheels.speed
-        creep = fastsim(hertz.a, hertz.b, hertz.load, wheels.mu, *motion, wheels.pair, cells=11)
+        creep = fastsim(RollingEllipse(hertz.a, hertz.b, hertz.load, wheels.mu, *motion), wheels.pair, cells=11)
         expected = [creep.fx, creep.fy, wheels.load - hertz.load, creep.mz]
         np.testing.assert_allclose(f[k : k + 4], expected, rtol=1e-11, atol=1e-7)
 

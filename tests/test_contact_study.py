@@ -10,7 +10,7 @@ import pytest
 
 from models.advice.price import runner as cost
 from models.contact.accuracy import BANDS, KNOTS, MOMENT_BANDS, band, moment_band, rolled, spin_share
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import fastsim_fields
 from models.contact.material import Pair
 from models.core.errors import InputError
@@ -175,7 +175,7 @@ def test_the_linear_theory_states_how_far_it_is_beyond_friction():
 
 def test_fields_of_fastsim_are_those_of_its_forces():
     for choices in ({}, {"march": "plain", "flexibilities": "one"}, {"bound": "elliptic", "flexibilities": "three"}):
-        given = (6e-3, 3e-3, 8e4, 0.3, 1e-3, -7e-4, 0.4, Pair())
+        given = RollingEllipse(6e-3, 3e-3, 8e4, 0.3, 1e-3, -7e-4, 0.4), Pair()
         sums, f = fastsim(*given, **choices), fastsim_fields(*given, **choices)
         area = f.dx * f.dy
         assert (f.px * area).sum() == pytest.approx(float(sums.fx), rel=1e-12)
@@ -186,7 +186,7 @@ def test_fields_of_fastsim_are_those_of_its_forces():
 
 def test_a_row_of_a_table_is_the_contact_with_its_units():
     counts, rows = answered(CASES + ROW)
-    one = fastsim(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4, Pair())
+    one = fastsim(RollingEllipse(5e-3, 4e-3, 8e4, 0.3, 1e-3, -2e-4, 0.4), Pair())
     assert counts == {"rows": 1, "wrong": 0} and tuple(rows[0]) == HEADER and rows[0]["status"] == "ok"
     for heading, value in (("fx [N]", one.fx), ("fy [N]", one.fy), ("mz [N m]", one.mz), ("stick [-]", one.stick)):
         assert float(rows[0][heading]) == pytest.approx(float(value), rel=1e-5)

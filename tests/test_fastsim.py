@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.contact import hertz
-from models.contact.fastsim import Ellipse, fastsim
+from models.contact.fastsim import Ellipse, RollingEllipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS, grid, strips_of
 from models.contact.fields import fastsim_fields
@@ -69,7 +69,7 @@ def plain_python(a, b, load, mu, xi_x, xi_y, spin, cells, power, half):
 def test_the_kernels_do_what_a_plain_march_does(march, bound):
     for scale in (0.2, 1.0, 4.0):
         given = {**AT, **{name: scale * AT[name] for name in ("xi_x", "xi_y", "spin")}}
-        found = fastsim(**given, pair=PAIR, cells=13, bound=bound, march=march, flexibilities="three")
+        found = fastsim(RollingEllipse(**given), PAIR, cells=13, bound=bound, march=march, flexibilities="three")
         truth = plain_python(**given, cells=13, power=POWERS[bound], half=march == "second-order")
         # the kernels' exponential is right to 1e-5, a plain march to rounding
         allowed = 2e-5 if march == "second-order" else 1e-12
@@ -80,22 +80,24 @@ def test_the_kernels_do_what_a_plain_march_does(march, bound):
 def test_signs():
     """Forces oppose creepage; spin to the left pushes to the right as the linear theory has it: Fy = -C23 spin."""
     still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
-    assert fastsim(**{**still, "xi_x": 1e-4}, pair=PAIR).fx < 0
-    assert fastsim(**{**still, "xi_y": 1e-4}, pair=PAIR).fy < 0 < fastsim(**{**still, "xi_y": 1e-4}, pair=PAIR).mz
-    turned = fastsim(**{**still, "spin": 0.1}, pair=PAIR)
+    assert fastsim(RollingEllipse(**{**still, "xi_x": 1e-4}), PAIR).fx < 0
+    aside = fastsim(RollingEllipse(**{**still, "xi_y": 1e-4}), PAIR)
+    assert aside.fy < 0 < aside.mz
+    turned = fastsim(RollingEllipse(**{**still, "spin": 0.1}), PAIR)
     assert turned.fy < 0 and turned.mz < 0 and abs(turned.fx) < 1e-9
 
 
 def test_eight_times_the_load_doubles_the_radius():
     small, large = (hertz.by_load(1.1, 1.1, load, PAIR) for load in (1e4, 8e4))
     assert large.a == pytest.approx(2 * small.a, rel=1e-12)
-    forces = [fastsim(h.a, h.b, h.load, 0.3, s * 1e-3, 0.0, 0.2, PAIR) for h, s in ((small, 1), (large, 2))]
+    ellipses = [RollingEllipse(h.a, h.b, h.load, 0.3, s * 1e-3, 0.0, 0.2) for h, s in ((small, 1), (large, 2))]
+    forces = [fastsim(ellipse, PAIR) for ellipse in ellipses]
     assert forces[1].fx == pytest.approx(8 * forces[0].fx, rel=1e-12)
 
 
 def test_a_call_is_the_function():
     one = Ellipse(AT["a"] / AT["b"], PAIR)
-    found = fastsim(**AT, pair=PAIR)
+    found = fastsim(RollingEllipse(**AT), PAIR)
     values = [AT[name] for name in ("a", "load", "mu", "xi_x", "xi_y", "spin")]
     assert one(*values) == pytest.approx((found.fx, found.fy, found.mz), rel=1e-12)
     for place, bad in ((0, 0.0), (1, math.nan), (2, -0.1), (4, math.inf)):
@@ -106,24 +108,24 @@ def test_a_call_is_the_function():
 def test_many_are_as_they_are_alone():
     """Contacts of several shapes, whose strips share a block of lanes."""
     given = case.creepages(("x", "y-spin"), (0.3, 2.0))
-    together = fastsim(**given, pair=PAIR)
+    together = fastsim(RollingEllipse(**given), PAIR)
     for i in range(len(given["a"])):
-        alone = fastsim(**{name: values[i] for name, values in given.items()}, pair=PAIR)
+        alone = fastsim(RollingEllipse(**{name: values[i] for name, values in given.items()}), PAIR)
         assert together.fx[i] == pytest.approx(alone.fx, rel=1e-12, abs=1e-9)
         assert together.mz[i] == pytest.approx(alone.mz, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("load", [0.0, -5.0])
 def test_no_load_no_force(load):
-    found = fastsim(**{**AT, "load": load, "a": 0.0, "b": 0.0}, pair=PAIR)
+    found = fastsim(RollingEllipse(**{**AT, "load": load, "a": 0.0, "b": 0.0}), PAIR)
     assert (found.fx, found.fy, found.mz, found.dissipation, found.wear_number) == (0.0,) * 5
-    assert not derivatives(**{**AT, "load": load}, pair=PAIR).slopes.any()
+    assert not derivatives(RollingEllipse(**{**AT, "load": load}), PAIR).slopes.any()
 
 
 def test_without_creepage_the_slopes_are_those_of_the_linear_theory_and_of_the_bed():
     """Forces by C11, C22 and C23; the moment is that of the bed's tractions, linear along every strip."""
     still = {**AT, "xi_x": 0.0, "xi_y": 0.0, "spin": 0.0}
-    found = derivatives(**still, pair=PAIR)
+    found = derivatives(RollingEllipse(**still), PAIR)
     assert not found.forces.any() and np.isfinite(found.slopes).all()
     c, ab, (_, l2, l3) = coefficients(1.5, PAIR.nu), 24e-6, flexibilities(AT["a"], AT["b"], PAIR)
     # 21 cells: 0.4 %
@@ -138,8 +140,8 @@ def test_without_creepage_the_slopes_are_those_of_the_linear_theory_and_of_the_b
 def test_the_moment_is_that_of_the_tractions(options):
     """Of every bound, march and kind of flexibility, cell by cell."""
     for scale in (0.1, 1.0, 10.0):
-        given = {**AT, **{name: scale * AT[name] for name in ("xi_x", "xi_y", "spin")}}
-        found, cells = fastsim(**given, pair=PAIR, **options), fastsim_fields(**given, pair=PAIR, **options)
+        given = RollingEllipse(**{**AT, **{name: scale * AT[name] for name in ("xi_x", "xi_y", "spin")}})
+        found, cells = fastsim(given, PAIR, **options), fastsim_fields(given, PAIR, **options)
         area = cells.dx * cells.dy
         moment = np.sum((cells.x * cells.py - cells.y * cells.px) * area)
         assert found.fx == pytest.approx(np.sum(cells.px * area), rel=1e-11)
@@ -152,7 +154,8 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
     for bound, share in (("elliptic", 3 * math.pi / 16), ("parabolic", 8 / 15)):
         most = most_moment(round_patch, 81, bound)
         assert most == pytest.approx(share * 120, rel=5e-4)
-        spun = fastsim(5e-3, 5e-3, 8e4, 0.3, 0.0, 0.0, -1e3, PAIR, cells=81, bound=bound, flexibilities="one")
+        turning = RollingEllipse(5e-3, 5e-3, 8e4, 0.3, 0.0, 0.0, -1e3)
+        spun = fastsim(turning, PAIR, cells=81, bound=bound, flexibilities="one")
         assert (1 - 2e-3) * most <= spun.mz <= (1 + 1e-12) * most
 
 
@@ -160,12 +163,12 @@ def test_the_moment_reaches_the_limit_of_friction_and_no_more():
 @pytest.mark.parametrize("kind", ["blended", "one", "three"])
 def test_derivatives_are_those_of_the_march(kind, growing):
     given = case.creepages(tuple(case.KINDS), (0.2, 2.0))
-    own = derivatives(**given, pair=PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
+    own = derivatives(RollingEllipse(**given), PAIR, flexibilities=kind, growing=growing).slopes[..., 3] * case.LOAD
     ends = []
     for share in (1e-6, -1e-6):
         grown = (1 + share) ** (1 / 3) if growing else 1.0
         moved = {**given, "load": given["load"] * (1 + share), "a": given["a"] * grown, "b": given["b"] * grown}
-        found = fastsim(**moved, pair=PAIR, flexibilities=kind)
+        found = fastsim(RollingEllipse(**moved), PAIR, flexibilities=kind)
         ends.append(np.stack([found.fx, found.fy, found.mz], axis=1))
     off = np.abs((ends[0] - ends[1]) / 2e-6 - own) / case.UNITS
     assert np.quantile(off.max(axis=1), 0.95) < 1e-7
@@ -176,9 +179,9 @@ def test_falling_friction():
     law = Falling(floor=0.4, decay=0.6, speed=20.0)
     # all slides at 1 m/s: mu (0.4 + 0.6 exp(-0.6))
     expected = -0.3 * 80e3 * (0.4 + 0.6 * math.exp(-0.6))
-    assert fastsim(**given, pair=PAIR, falling=law).fx == pytest.approx(expected, rel=1e-9)
-    none = fastsim(**AT, pair=PAIR, falling=Falling(floor=1.0, decay=1.0, speed=20.0))
-    assert none.fx == pytest.approx(fastsim(**AT, pair=PAIR).fx, rel=1e-12)
+    assert fastsim(RollingEllipse(**given), PAIR, falling=law).fx == pytest.approx(expected, rel=1e-9)
+    none = fastsim(RollingEllipse(**AT), PAIR, falling=Falling(floor=1.0, decay=1.0, speed=20.0))
+    assert none.fx == pytest.approx(fastsim(RollingEllipse(**AT), PAIR).fx, rel=1e-12)
 
 
 @pytest.mark.parametrize("options", OPTIONS[:4])
@@ -199,11 +202,9 @@ def test_a_call_takes_whole_numbers_and_names_what_it_does_not_take():
 @pytest.mark.parametrize(("name", "value"), [("load", 1e-310), ("mu", 1e-300), ("mu", 1e-80)])
 def test_next_to_nothing_is_nothing(name, value):
     """A slip by so small a bound, squared, would be beyond all numbers."""
-    assert (fastsim(**{**AT, name: value}, pair=PAIR).fx, Ellipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0]) == (
-        0.0,
-        0.0,
-    )
-    assert fastsim(**{**AT, "xi_x": 1.0}, pair=PAIR).stick == 0.0
+    assert fastsim(RollingEllipse(**{**AT, name: value}), PAIR).fx == 0.0
+    assert Ellipse(1.5, PAIR)(6e-3, 1e-310, 0.3, 0.1, 0.1, 1.0)[0] == 0.0
+    assert fastsim(RollingEllipse(**{**AT, "xi_x": 1.0}), PAIR).stick == 0.0
 
 
 @pytest.mark.parametrize(
@@ -225,7 +226,7 @@ def test_next_to_nothing_is_nothing(name, value):
 )
 def test_bad_input_is_named(name, value):
     with pytest.raises(InputError, match=name):
-        fastsim(**{**AT, "xi_x": [0.0, 1e-3, 2e-3], name: value}, pair=PAIR)
+        fastsim(RollingEllipse(**{**AT, "xi_x": [0.0, 1e-3, 2e-3], name: value}), PAIR)
 
 
 @pytest.mark.parametrize(
@@ -233,13 +234,13 @@ def test_bad_input_is_named(name, value):
 )
 def test_an_unknown_option_is_named(options):
     with pytest.raises(InputError, match=next(iter(options))):
-        fastsim(**AT, pair=PAIR, **options)
+        fastsim(RollingEllipse(**AT), PAIR, **options)
 
 
 @pytest.mark.parametrize("bound", list(POWERS))
 def test_the_pressure_of_the_cells_is_the_load(bound):
-    net = grid(21, 36, bound)
-    assert net.strips[3].sum() * net.cells[1].sum() == pytest.approx(1.0, rel=1e-14)
+    strips, cells = grid(21, 36, bound).records
+    assert strips.part.sum() * cells.bound.sum() == pytest.approx(1.0, rel=1e-14)
 
 
 def test_every_row_of_the_case_passes(tmp_path):

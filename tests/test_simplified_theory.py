@@ -10,7 +10,7 @@ from models.contact.half_space import Z, influence
 from models.contact.hertz import by_load
 from models.contact.material import Pair
 from models.contact.patches import separate
-from models.contact.simplified_kernels import displacement, drag, march, step_on
+from models.contact.simplified_kernels import FineNet, displacement, drag, march, step_on
 from models.contact.simplified_theory import PAPER, Options, press, roll
 from models.contact.undeformed_distance import Distance, from_arrays, from_function, quadratic
 from models.core.errors import InputError
@@ -198,8 +198,8 @@ def test_the_march_is_of_second_order_where_tractions_turn():
         x = half[:, None] * (1.0 - (2.0 * np.arange(cells) + 1.0) / cells)
         pressure = 1.0 - (x / A0) ** 2 - (y[:, None] / B) ** 2
         traction = np.zeros((200, cells, 2))
-        found = march(y, -half, half, 2 * B / 200, pressure, 0.3, 1e-3, 0.0, 0.0, 40.0, traction)
-        return np.array(found[:2]) / (0.3 * np.pi * A0 * B / 2)
+        forces = march(FineNet(y, -half, half, 2 * B / 200, pressure), 0.3, 1e-3, (0.0, 0.0, 40.0), traction)
+        return np.array(forces[:2]) / (0.3 * np.pi * A0 * B / 2)
 
     true = force(704)
     coarse, fine = (np.linalg.norm(force(cells) - true) for cells in (11, 44))

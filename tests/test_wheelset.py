@@ -9,21 +9,21 @@ from scipy.optimize import minimize
 
 from models.core.errors import InputError, RunFailed
 from models.rail import equations as eq
-from models.rail import wheel_forces as wf
-from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
+from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.contact_table import rolling_radius_difference
 from models.rail.eigenvalues import growth as of_all
 from models.rail.equations import Equations
 from models.rail.limit_cycle import attained, refined
 from models.rail.linear import critical_speed, gravity, growth, kinematic_wavelength, klingel, matrices
+from models.rail.profile_contact import Pose
 from models.rail.profile_statics import equivalent_conicity
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import CONTACT, contact_of, placed_at, sums
 
 SPRINGS = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 FREE = CHOSEN.changed(**SPRINGS)
-CONE = (CHOSEN.radius, CHOSEN.half_gauge, CHOSEN.conicity, CHOSEN.head_radius)
-POSE = (0.006, 1e-4, -0.004, 0.03)
+CONE = Cone(CHOSEN.radius, CHOSEN.half_gauge, CHOSEN.conicity, CHOSEN.head_radius)
+POSE = Pose(0.006, 1e-4, -0.004, 0.03)
 
 
 def turn(roll, yaw):
@@ -51,7 +51,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
         method="Nelder-Mead",
         options={"xatol": 1e-12, "fatol": 1e-16, "maxiter": 2000},
     )
-    depth, rolling, n_y, n_z, *place = cone_on_rail(side, y, z, roll, yaw, *CONE)
+    depth, rolling, n_y, n_z, *place = cone_on_rail(side, POSE, CONE)
     assert depth == pytest.approx(head - found.fun, abs=1e-14)
     # The place is found to the root of the distance's rounding, 1e-8 and more along the axle.
     assert np.add(place, [0.0, y, z]) == pytest.approx(surface(found.x), abs=3e-7)
@@ -98,7 +98,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     def fall(y, yaw):
         z = roll = 0.0
         for _ in range(20):
-            right, left = (cone_on_rail(side, y, z, roll, yaw, *CONE)[0] for side in (RIGHT, LEFT))
+            right, left = (cone_on_rail(side, POSE, CONE)[0] for side in (RIGHT, LEFT))
             z, roll = z - (right + left) / 2, roll - (right - left) / (2 * CHOSEN.half_gauge)
         return z
 
@@ -114,9 +114,9 @@ def test_nothing_accelerates_at_rest_and_the_rails_carry_the_load():
     path = equations.run(equations.rest, 0.01, 5e-4)
     assert np.abs(equations.rates(equations.rest)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE]]).max() < 1e-9
     contact = path.contacts[0]
-    upward = contact[:, wf.LOAD] * np.cos(contact[:, wf.ANGLE]) - contact[:, wf.FY] * np.sin(contact[:, wf.ANGLE])
+    upward = contact["load"] * np.cos(contact["angle"]) - contact["fy"] * np.sin(contact["angle"])
     assert upward.sum() == pytest.approx(CHOSEN.load, rel=1e-5)  # the springs bear what the spin's forces lift
-    assert contact[0, wf.A] == pytest.approx(float(CHOSEN.ellipse.a), rel=1e-3)  # 0.2 % of the load is that of spin
+    assert contact["a"][0] == pytest.approx(float(CHOSEN.ellipse.a), rel=1e-3)  # 0.2 % of the load is that of spin
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])
@@ -134,20 +134,20 @@ def test_energy_is_what_the_forces_do(law):
         held = 0.0
         for side in (1, -1):
             out = turn(roll, yaw) @ [0.0, side * w.half_spacing, 0.0]
-            u = np.array([0.0, y, z]) + out - [0.0, side * w.half_spacing, body[eq.SUNK]]
+            u = np.array([0.0, y, z]) + out - [0.0, side * w.half_spacing, body.sunk]
             held += 0.5 * (w.stiffness_x * u[0] ** 2 + w.stiffness_y * u[1] ** 2 + w.stiffness_z * u[2] ** 2)
-        return kinetic + held - (w.mass * 9.81 + 2 * body[eq.CARRIED]) * z
+        return kinetic + held - (w.mass * 9.81 + 2 * body.carried) * z
 
     def depths(s):
-        return np.array([cone_on_rail(side, *s[:4], *CONE)[0] for side in (RIGHT, LEFT)])
+        return np.array([cone_on_rail(side, Pose(*s[:4].tolist()), CONE)[0] for side in (RIGHT, LEFT)])
 
     rates, h = equations.rates(state), 1e-8
     gained = (energy(state + h * rates) - energy(state - h * rates)) / (2 * h)
     deeper = (depths(state + h * rates) - depths(state - h * rates)) / (2 * h)
     contact = equations.run(state, 1e-6, 1e-6).contacts[0]
-    assert (contact[:, wf.LOAD] > 1e3).all()
-    assert (contact[:, wf.POWER] < 0.0).all()
-    done = (contact[:, wf.POWER] - contact[:, wf.LOAD] * deeper - contact[:, wf.FX] * 40.0).sum()
+    assert (contact["load"] > 1e3).all()
+    assert (contact["power"] < 0.0).all()
+    done = (contact["power"] - contact["load"] * deeper - contact["fx"] * 40.0).sum()
     assert gained == pytest.approx(done, abs=0.1)  # W; the energy of 4e5 J leaves 0.01 W, the least of faults 100 W
 
 
@@ -174,10 +174,10 @@ def test_wheel_that_lifts_off_has_no_forces_and_comes_back():
     start = equations.rest.copy()
     start[eq.Z] -= 2e-4
     path = equations.run(start, 0.3, 2e-4)
-    assert (path.contacts[0, :, wf.LOAD] == 0.0).all()
-    assert (path.contacts[0, :, [wf.FX, wf.FY, wf.MZ]] == 0.0).all()
+    assert (path.contacts["load"][0] == 0.0).all()
+    assert not any(path.contacts[name][0].any() for name in ("fx", "fy", "mz"))
     assert np.isfinite(path.states).all()
-    assert (path.contacts[:, :, wf.POWER] <= 0.0).all()
+    assert (path.contacts["power"] <= 0.0).all()
     assert path.states[-1, eq.Z] == pytest.approx(equations.rest[eq.Z], abs=2e-6)
 
 

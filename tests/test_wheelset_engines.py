@@ -12,7 +12,6 @@ from models.engines.mujoco_callback import installed
 from models.engines.wheelset_exudyn import ExudynWheelset
 from models.engines.wheelset_mujoco import MujocoWheelset, rail_law
 from models.rail import equations as eq
-from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.equations import Equations
 from models.rail.joint_forces import from_joints, to_joints
@@ -33,7 +32,7 @@ def test_accelerations_are_those_of_the_equations(engine, law):
     draw = np.random.default_rng(1)
     states = written.rest + LIVELY * draw.normal(size=(100, eq.STATES))
     expected = np.array([written.rates(state) for state in states])
-    loads = [written.run(state, 1e-9, 1e-9).contacts[0, :, wf.LOAD] for state in states]
+    loads = [written.run(state, 1e-9, 1e-9).contacts["load"][0] for state in states]
     assert 5 < np.sum(np.array(loads) == 0.0) < 195  # wheels in the air and on the rail are among them
     found = [built.rates(state) for state in states]
     # Both wheels in the air leave a spin without moment: rounding of 1e-14 rad/s^2 beside zero.
@@ -51,9 +50,10 @@ def test_paths_over_a_second():
     assert np.abs(exudyn - reference).max() < 1e-10
     assert np.abs(exudyn - mujoco).max() < 1e-10
     for path in paths[1:]:
-        np.testing.assert_allclose(path.contacts, paths[0].contacts, rtol=1e-6, atol=1e-6)
+        for name in path.contacts.dtype.names:
+            np.testing.assert_allclose(path.contacts[name], paths[0].contacts[name], rtol=1e-6, atol=1e-6)
         assert path.times == pytest.approx(paths[0].times)
-        assert (path.contacts[:, :, wf.POWER] <= 0.0).all()
+        assert (path.contacts["power"] <= 0.0).all()
 
 
 @both
@@ -69,8 +69,8 @@ def test_wheels_that_lift_off_come_back_as_in_the_equations(engine):
     written = Equations(CHOSEN, 40.0, cells=11)
     start = written.rest - 2e-4 * np.eye(eq.STATES)[eq.Z]
     path, expected = (one.run(start, 0.1, 2e-4, 5) for one in (engine(CHOSEN, 40.0, cells=11), written))
-    assert (path.contacts[0, :, wf.LOAD] == 0.0).all()
-    assert (path.contacts[-1, :, wf.LOAD] > 0.0).all()
+    assert (path.contacts["load"][0] == 0.0).all()
+    assert (path.contacts["load"][-1] > 0.0).all()
     np.testing.assert_allclose(path.states, expected.states, rtol=0.0, atol=1e-10)
     assert path.times == pytest.approx(expected.times)
 

@@ -14,7 +14,7 @@ from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
 from models.rail.linear import klingel
-from models.rail.profile_contact import N_Y, N_Z, TOUCH, Y_, Z_, pressed
+from models.rail.profile_contact import TOUCH, Pose, pressed
 from models.rail.profile_statics import held, steering_cones
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import SCENE, placed_at
@@ -30,7 +30,7 @@ def against_table(shifts):
     for shift in shifts:
         one = placed_at("A-1", shift)
         found = held(ON_PROFILES.changed(load=2e4), shift)
-        loads, places = found.loads.reshape(2, -1), found.touches[:, Y_].reshape(2, -1)
+        loads, places = found.loads.reshape(2, -1), found.touches["y"].reshape(2, -1)
         for k, wheel, side in ((0, one.right, 1), (1, one.left, -1)):
             whole = sum(place.normal for place in wheel)
             assert loads[k].sum() == pytest.approx(whole, rel=0.02)  # 1.5 % at the flange, else 0.2 %
@@ -55,15 +55,15 @@ def test_lateral_force_is_the_slope_of_the_energy():
 
     def energy(shift):
         one = held(ON_PROFILES, shift)
-        depth = np.maximum(one.touches[:, 0], 0.0)
+        depth = np.maximum(one.touches["depth"], 0.0)
         return 0.4 * one.loads @ depth - ON_PROFILES.load * one.z
 
     h = 5e-5
     for shift in (3e-3, 6e-3, 9e-3):
         one, before, after = (held(ON_PROFILES, shift + part * h) for part in (0.0, -1.0, 1.0))
-        assert one.loads @ one.touches[:, N_Z] == pytest.approx(ON_PROFILES.load, rel=1e-8)
-        across, down = -one.loads * one.touches[:, N_Y], -one.loads * one.touches[:, N_Z]
-        moment = (one.touches[:, Y_] * down - one.touches[:, Z_] * across).sum()
+        assert one.loads @ one.touches["n_z"] == pytest.approx(ON_PROFILES.load, rel=1e-8)
+        across, down = -one.loads * one.touches["n_y"], -one.loads * one.touches["n_z"]
+        moment = (one.touches["y"] * down - one.touches["z"] * across).sum()
         work = -across.sum() - moment * (after.roll - before.roll) / (2.0 * h)
         # The elastic energy of means is not quite one: 0.9 % seen at 3 mm, 2.0 % at 6 mm, of 4 and of 27 kN.
         assert work == pytest.approx((energy(shift + h) - energy(shift - h)) / (2.0 * h), rel=0.03)
@@ -90,8 +90,8 @@ def test_accelerations_are_those_of_the_equations(engine):
         found = built.rates(state)[[eq.Y_RATE, eq.Z_RATE, eq.ROLL_RATE, eq.YAW_RATE, eq.SPIN]]
         assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
     seen = np.array(seen)
-    assert (seen[:, :, wf.ANGLE] < FLANGE).any()
-    assert ((seen[:, :2, wf.LOAD] > 0.0).all(axis=1)).any()
+    assert (seen["angle"] < FLANGE).any()
+    assert ((seen["load"][:, :2] > 0.0).all(axis=1)).any()
 
 
 def test_paths_over_a_second_with_flange_contact():
@@ -101,14 +101,14 @@ def test_paths_over_a_second_with_flange_contact():
     start[eq.Y_RATE] = 0.1
     reference, mujoco, exudyn = (one.run(start, 1.0, 2.5e-4) for one in built)
     right = reference.contacts[:, :2]
-    assert right[..., wf.ANGLE].min() < math.radians(-38.0)  # in the flange's throat
-    assert (right[..., wf.LOAD] > 0.0).all(axis=1).any()
-    assert right[..., wf.LOAD].max() > 9e4
+    assert right["angle"].min() < math.radians(-38.0)  # in the flange's throat
+    assert (right["load"] > 0.0).all(axis=1).any()
+    assert right["load"].max() > 9e4
     for path in (mujoco, exudyn):
         # 4e-11 seen; with 230 kN on the flange's face of 70 degrees rounding grows to 1e-9 and more.
         assert np.abs(path.states - reference.states).max() < 1e-10
     for path in (reference, mujoco, exudyn):
-        assert (path.contacts[:, :, [wf.POWER, wf.DAMPING_POWER]] <= 0.0).all()
+        assert (path.contacts["power"] <= 0.0).all() and (path.contacts["damping_power"] <= 0.0).all()
 
 
 def worst(wheelset, speed, law, shift, step, duration):
@@ -149,17 +149,18 @@ def test_standstill_reversal_and_lift_off():
     assert np.isfinite(rates).all()
     assert rates[eq.SPIN] == 0.0  # nothing touches
     path = Equations(ON_PROFILES, 40.0, cells=7).run(equations.rest - 2e-4 * np.eye(eq.STATES)[eq.Z], 0.05, 2e-4)
-    assert (path.contacts[0, :, wf.LOAD] == 0.0).all()
-    assert (path.contacts[-1, [1, 3], wf.LOAD] > 0.0).all()
+    assert (path.contacts["load"][0] == 0.0).all()
+    assert (path.contacts["load"][-1, [1, 3]] > 0.0).all()
 
 
 def test_load_passes_between_patches_without_a_jump():
-    given = wf.numbers(ON_PROFILES)
+    rails = wf.rails_of(ON_PROFILES)
+    modulus = float(rails.wheels["modulus"][0])
     loads = []
     for shift in np.arange(4.6e-3, 5.2e-3, 1e-6):
-        touches = np.zeros((4, TOUCH))
-        wf.contact_points(shift, -1.1e-4, -3.6e-4, 0.0, given, touches)
-        loads.append([pressed(*touch[[0, 6, 7]], given[wf.MODULUS])[0] for touch in touches[:2]])
+        touches = np.zeros(4, TOUCH)
+        wf.contact_points(Pose(shift, -1.1e-4, -3.6e-4, 0.0), rails, touches)
+        loads.append([pressed(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches[:2]])
     loads = np.array(loads)
     assert (loads > 0.0).any(axis=0).all()
     assert loads[0, 0] == 0.0

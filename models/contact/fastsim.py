@@ -32,6 +32,7 @@ from models.contact.fastsim_grid import POWERS, Bound, Grid, grid, nets, strips_
 from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER
 from models.contact.fastsim_many import BLENDED, ONE, THREE, point
 from models.contact.fastsim_many import forces as march_all
+from models.contact.fastsim_records import CONTACT, FORCES
 from models.contact.hertz import LEAST_AXIS
 from models.contact.inputs import LARGEST_LOAD, NOTHING, Array, creepages, number, quantity, together, whole_number
 from models.contact.linear_theory import flexibilities as linear_flexibilities
@@ -42,7 +43,26 @@ Flexibilities = Literal["blended", "one", "three"]
 March = Literal["second-order", "plain"]
 KINDS = {"blended": BLENDED, "one": ONE, "three": THREE}
 MARCHES = {"second-order": SECOND_ORDER, "plain": PLAIN}
+FLEXIBILITIES = ("l1", "l2", "l3")
+"""Fields of CONTACT."""
 LEAST_CELLS, MOST_CELLS = 3, 2000
+
+
+@dataclass(frozen=True)
+class RollingEllipse:
+    """One elliptic contact that rolls, or many: every value a number, or arrays of any shapes that broadcast.
+
+    a, b : semi-axes along and across the direction of rolling (m); load : N, zero or less makes all forces zero; mu :
+    coefficient of friction, 0 to 10; xi_x, xi_y : creepages; spin : 1/m, signs as in ``models.contact``
+    """
+
+    a: Any
+    b: Any
+    load: Any
+    mu: Any
+    xi_x: Any
+    xi_y: Any
+    spin: Any
 
 
 @dataclass(frozen=True)
@@ -64,13 +84,7 @@ class Creep:
 
 
 def fastsim(
-    a: Any,
-    b: Any,
-    load: Any,
-    mu: Any,
-    xi_x: Any,
-    xi_y: Any,
-    spin: Any,
+    ellipse: RollingEllipse,
     pair: Pair,
     *,
     cells: int = 21,
@@ -83,11 +97,6 @@ def fastsim(
 
     Parameters
     ----------
-    a, b : semi-axes along and across the direction of rolling (m)
-    load : N; zero or less makes all forces zero
-    mu : coefficient of friction, 0 to 10
-    xi_x, xi_y : creepages; spin : 1/m, signs as in ``models.contact``
-        All of them arrays of any shapes that broadcast.
     pair : the two materials
     cells : in each strip; strips are as many, and more on an ellipse narrower than a/b = 1/2 (see ``fastsim_grid``)
     falling : friction that falls with the speed of slip; None for a constant one
@@ -97,20 +106,20 @@ def fastsim(
     InputError : names the value that is not finite, not plausible in SI, or of no common shape, or the word not known
     """
     check_choices(cells, bound, flexibilities, march, falling)
-    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
-    forces = np.zeros((len(contacts), 4))
-    for rows, net in nets(contacts, cells, bound):
-        some, marched = np.zeros((rows.size, 4)), (contacts[rows], net.strips, net.cells, net.middle)
+    contacts, shape = contacts_of(ellipse, pair)
+    forces = np.zeros(len(contacts), FORCES)
+    for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
+        marched, net_forces = (contacts[rows], *net.records, KINDS[flexibilities]), np.zeros(rows.size, FORCES)
         if falling is None:
-            march_all(*marched, KINDS[flexibilities], MARCHES[march], some)
+            march_all(*marched, MARCHES[march], net_forces)
         else:
             from models.contact.fastsim_falling import forces_falling
 
-            forces_falling(*marched, KINDS[flexibilities], *falling.law, some)
-        forces[rows] = some
-    fx, fy, mz, stick = forces.T
-    along, across = fx * contacts[:, 4], fy * contacts[:, 5]
-    lost = 0.0 - (along + across + mz * contacts[:, 6])
+            forces_falling(*marched, falling.law, net_forces)
+        forces[rows] = net_forces
+    fx, fy, mz, stick = (forces[name] for name in ("fx", "fy", "mz", "stick"))
+    along, across = fx * contacts["xi_x"], fy * contacts["xi_y"]
+    lost = 0.0 - (along + across + mz * contacts["spin"])
     values = fx, fy, mz, stick, lost, np.abs(along) + np.abs(across)
     return Creep(*(value.reshape(shape)[()] for value in values))
 
@@ -135,17 +144,12 @@ class Ellipse:
         check_choices(cells, bound, flexibilities, march)
         self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
-        unit = 1e-3
-        self._unit = tuple(float(value) / unit for value in linear_flexibilities(unit, unit / self.ratio, pair))
-        self._fixed = (
-            1.0 / self.ratio,
-            *self._unit,
-            self.net.strips,
-            self.net.cells,
-            self.net.middle,
-            KINDS[flexibilities],
-            MARCHES[march],
-        )
+        unit, size = np.zeros(1, CONTACT), 1e-3
+        unit["a"], unit["b"] = 1.0, 1.0 / self.ratio
+        for name, value in zip(FLEXIBILITIES, linear_flexibilities(size, size / self.ratio, pair), strict=True):
+            unit[name] = float(value) / size
+        net = self.net
+        self._fixed = unit, net.strips, net.cells, net.middle, KINDS[flexibilities], MARCHES[march]
 
     def __call__(
         self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float
@@ -153,15 +157,15 @@ class Ellipse:
         """Forces and moment; a : semi-axis along the direction of rolling (m)."""
         given = (a, load, mu, xi_x, xi_y, spin)
         try:
-            found = point(*map(float, given), *self._fixed)
+            forces = point(tuple(map(float, given)), *self._fixed)
         except (TypeError, ValueError):
-            found = (math.nan,) * 3
-        if not math.isfinite(found[0] + found[1] + found[2]):
+            forces = (math.nan,) * 3
+        if not math.isfinite(forces[0] + forces[1] + forces[2]):
             for name, value in zip(("a", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
                 number(name, value, "finite")
-            contacts_of(a, a / self.ratio, load, mu, xi_x, xi_y, spin, Pair())
+            contacts_of(RollingEllipse(a, a / self.ratio, load, mu, xi_x, xi_y, spin), Pair())
             raise InputError("", "a", a, "must be a semi-axis in m, above 0 where there is a load")
-        return found
+        return forces
 
 
 def check_choices(cells: int, bound: str, flexibilities: str, march: str, falling: Falling | None = None) -> None:
@@ -178,20 +182,23 @@ def check_choices(cells: int, bound: str, flexibilities: str, march: str, fallin
         raise InputError("", "march", march, "must be second-order where friction falls with the speed of slip")
 
 
-def contacts_of(
-    a: Any, b: Any, load: Any, mu: Any, xi_x: Any, xi_y: Any, spin: Any, pair: Pair
-) -> tuple[Array, tuple[int, ...]]:
-    """The contacts (n, 10) as the kernels read them, and the shape they had; those without load have axes of 0.1 m."""
+def contacts_of(ellipse: RollingEllipse, pair: Pair) -> tuple[Array, tuple[int, ...]]:
+    """CONTACT (n,) as the kernels read it, and the shape of what was given; those without load have axes of 0.1 m."""
+    axis = "a semi-axis in m, zero or more"
     given = together(
-        **{name: quantity(name, value, "a semi-axis in m, zero or more", 0.0) for name, value in (("a", a), ("b", b))},
-        load=quantity("load", load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
-        mu=quantity("mu", mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
-        **creepages(xi_x, xi_y, spin),
+        a=quantity("a", ellipse.a, axis, 0.0),
+        b=quantity("b", ellipse.b, axis, 0.0),
+        load=quantity("load", ellipse.load, f"a load in N, at most {LARGEST_LOAD:g}", most=LARGEST_LOAD),
+        mu=quantity("mu", ellipse.mu, "a coefficient of friction from 0 to 10", 0.0, 10.0),
+        **creepages(ellipse.xi_x, ellipse.xi_y, ellipse.spin),
     )
-    columns = np.array([values.ravel() for values in given]).T.reshape(-1, 7)
-    loaded = columns[:, 2] > NOTHING
-    for name, axis in zip("ab", columns[loaded, :2].T, strict=True):
-        quantity(name, axis, "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
-    columns[~loaded, :2] = 0.1
-    flexible = linear_flexibilities(columns[:, 0], columns[:, 1], pair)
-    return np.ascontiguousarray(np.column_stack([columns, *flexible])), given[0].shape
+    contacts = np.empty(given[0].size, CONTACT)
+    for name, values in zip(("a", "b", "load", "mu", "xi_x", "xi_y", "spin"), given, strict=True):
+        contacts[name] = values.ravel()
+    loaded = contacts["load"] > NOTHING
+    for name in ("a", "b"):
+        quantity(name, contacts[name][loaded], "a semi-axis in m, above 0 where there is a load", LEAST_AXIS)
+        contacts[name][~loaded] = 0.1
+    for name, value in zip(FLEXIBILITIES, linear_flexibilities(contacts["a"], contacts["b"], pair), strict=True):
+        contacts[name] = value
+    return contacts, given[0].shape

@@ -11,34 +11,14 @@ and nothing else, so its derivative follows from the others (Euler's theorem).
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, Flexibilities, check_choices, contacts_of
+from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import BEFORE, BOUND, CENTRE, LONGEST, MIDDLE, RATE, STILL, advance, cut, lateness
-from models.contact.fastsim_many import (
-    HALF,
-    L1,
-    LOAD,
-    MU,
-    ONE,
-    PART,
-    PER_SLIP,
-    SPIN,
-    SPREAD,
-    XI_X,
-    XI_Y,
-    A,
-    B,
-    Y,
-    blend,
-    mean_flexibility,
-    rigid_slip,
-    stiffness,
-    touches,
-)
+from models.contact.fastsim_kernels import LONGEST, STILL, advance, cut, lateness
+from models.contact.fastsim_many import ONE, add_strip, blend, mean_flexibility, rigid_slip, stiffness, touches
+from models.contact.fastsim_records import FORCES
 from models.contact.inputs import Array
 from models.contact.material import Pair
 from models.machine.compiled import compiled
@@ -56,13 +36,7 @@ class Derivatives:
 
 
 def derivatives(
-    a: Any,
-    b: Any,
-    load: Any,
-    mu: Any,
-    xi_x: Any,
-    xi_y: Any,
-    spin: Any,
+    ellipse: RollingEllipse,
     pair: Pair,
     *,
     cells: int = 21,
@@ -78,54 +52,55 @@ def derivatives(
     load or friction all are zero.
     """
     check_choices(cells, bound, flexibilities, "second-order")
-    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
-    found, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
-    for rows, net in nets(contacts, cells, bound):
-        _slopes(contacts, rows, net.strips, net.cells, net.middle, KINDS[flexibilities], found, slopes)
-    touching = (contacts[:, LOAD] > 0.0) & (contacts[:, MU] > 0.0)
-    moving = slopes[touching, :, :3] * contacts[touching][:, None, XI_X : SPIN + 1]
+    contacts, shape = contacts_of(ellipse, pair)
+    forces, slopes = np.zeros((len(contacts), 3)), np.zeros((len(contacts), 3, 4))
+    for rows, net in nets(contacts["a"] / contacts["b"], cells, bound):
+        net_forces, net_slopes = np.zeros(rows.size, FORCES), np.zeros((rows.size, 3, 3))
+        _slopes(contacts[rows], *net.records, KINDS[flexibilities], net_forces, net_slopes)
+        forces[rows] = np.column_stack([net_forces[name] for name in ("fx", "fy", "mz")])
+        slopes[rows, :, :3] = net_slopes
+    touching = (contacts["load"] > 0.0) & (contacts["mu"] > 0.0)
+    motion = np.column_stack([contacts[name][touching] for name in ("xi_x", "xi_y", "spin")])
+    moving = slopes[touching, :, :3] * motion[:, None]
     if growing:  # fx / N is a function of xi N^(-1/3) and spin, mz / N^(4/3) as well
-        change = found[touching] * np.array([1.0, 1.0, 4.0 / 3.0]) - moving[:, :, :2].sum(axis=2) / 3.0
+        change = forces[touching] * np.array([1.0, 1.0, 4.0 / 3.0]) - moving[:, :, :2].sum(axis=2) / 3.0
     else:
-        change = found[touching] - moving.sum(axis=2)
-    slopes[touching, :, 3] = change / contacts[touching, LOAD, None]
-    return Derivatives(found.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
+        change = forces[touching] - moving.sum(axis=2)
+    slopes[touching, :, 3] = change / contacts["load"][touching, None]
+    return Derivatives(forces.reshape(*shape, 3), slopes.reshape(*shape, 3, 4))
 
 
 @compiled
-def _slopes(contacts, rows, strips, cells, middle, kind, found, slopes):
-    """Fill forces (n, 3) and their derivatives (n, 3, 4) to the creepages in the given rows."""
-    slip, sums, moved, total = np.empty(PER_SLIP), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    scale = np.empty((3, 3))
-    for c in rows:
+def _slopes(contacts, strips, cells, kind, forces, slopes):
+    """Fill FORCES (n,), but for the sticking share, and their derivatives (n, 3, 3) to the creepages."""
+    sums, moved, total, scale = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for c in range(len(contacts)):
         contact = contacts[c]
         if not touches(contact):
             continue
-        rigid_slip(contact, cells.shape[1], middle, kind, slip)
-        _scale_slopes(contact, cells.shape[1], middle, kind, scale)
+        slip = rigid_slip(contact, cells, kind)
+        _scale_slopes(contact, cells, kind, scale)
         total[:] = 0.0
-        for s in range(strips.shape[1]):
-            _strip(contact, strips[:, s], cells, slip, sums, moved)
-            part = contact[MU] * contact[LOAD] * strips[PART, s]
-            arm, off = contact[A] * strips[HALF, s], contact[B] * strips[Y, s]
-            found[c, 0] += part * sums[0]
-            found[c, 1] += part * sums[1]
-            found[c, 2] += part * (arm * sums[2] - off * sums[0])
+        for s in range(strips.y.size):
+            _strip(contact, strips, s, cells, slip, sums, moved)
+            add_strip(contact, strips, s, (sums[0], sums[1], sums[2]), forces[c])
+            part = contact.mu * contact.load * strips.part[s]
+            arm, off = contact.a * strips.half[s], contact.b * strips.y[s]
             for k in range(3):  # loops, as array expressions take seconds to compile
                 total[0, k] += part * moved[0, k]
                 total[1, k] += part * moved[1, k]
                 total[2, k] += part * (arm * moved[2, k] - off * moved[0, k])
         for f in range(3):
             for k in range(3):
-                slopes[c, f, k] += total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
+                slopes[c, f, k] = total[f, 0] * scale[0, k] + total[f, 1] * scale[1, k] + total[f, 2] * scale[2, k]
 
 
 @compiled
-def _scale_slopes(contact, cells, middle, kind, scale):
+def _scale_slopes(contact, cells, kind, scale):
     """Derivatives (3, 3) of the numbers of ``rigid_slip`` to the creepages."""
-    a, c = contact[A], math.sqrt(contact[A] * contact[B])
-    bound = contact[MU] * middle * contact[LOAD] / (a * contact[B])
-    step, creep = 2.0 * a / (cells * bound), (contact[XI_X], contact[XI_Y], contact[SPIN] * c)
+    a, c, flexible = contact.a, math.sqrt(contact.a * contact.b), (contact.l1, contact.l2, contact.l3)
+    bound = contact.mu * cells.peak * contact.load / (a * contact.b)
+    step, creep = 2.0 * a / (cells.centre.size * bound), (contact.xi_x, contact.xi_y, contact.spin * c)
     k, change = stiffness(contact, bound, kind), np.zeros(3)
     blended = blend(contact, bound, kind)
     size = math.sqrt(creep[0] ** 2 + creep[1] ** 2 + creep[2] ** 2)
@@ -135,40 +110,41 @@ def _scale_slopes(contact, cells, middle, kind, scale):
         if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
             if kind == ONE:
-                d_mean = (sign * contact[L1 + j] - mean * creep[j] / size) / size
+                d_mean = (sign * flexible[j] - mean * creep[j] / size) / size
             else:
-                d_mean = 2.0 * creep[j] * (contact[L1 + j] - mean) / (size * size)
+                d_mean = 2.0 * creep[j] * (flexible[j] - mean) / (size * size)
             d_one = -d_mean / (mean * mean)
             for i in range(3):
-                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / contact[L1 + i]) + blended[0] * d_one)
+                change[i] = unit * (blended[1 + j] * (1.0 / mean - 1.0 / flexible[i]) + blended[0] * d_one)
         for i in range(3):
             scale[i, j] = step * (change[i] * creep[i] / (c if i == 2 else 1.0) + (k[i] if i == j else 0.0))
 
 
 @compiled
-def _strip(contact, strip, cells, slip, sums, moved):
-    """Sums of q_x, q_y, t q_y along one strip, and their derivatives (3, 3) to the three numbers of rigid slip."""
-    spread, off, arm = strip[SPREAD], contact[B] * strip[Y], contact[A] * strip[HALF]
+def _strip(contact, strips, s, cells, slip, sums, moved):
+    """Sums of q_x, q_y, t q_y along strip number s, and their derivatives (3, 3) to the three numbers of rigid slip."""
+    spread, off, arm = strips.spread[s], contact.b * strips.y[s], contact.a * strips.half[s]
     u, v0, v1 = spread * (slip[0] - slip[2] * off), spread * slip[1], spread * slip[2] * arm
     du, dv0, dv1 = (spread, 0.0, -spread * off), (0.0, spread, 0.0), (0.0, 0.0, spread * arm)
     dx, dy = np.zeros(3), np.zeros(3)
     px = py = slips = 0.0
-    change = -2.0 / cells.shape[1]
+    change = -2.0 / cells.centre.size
     sums[:] = 0.0
     moved[:] = 0.0
-    for i in range(cells.shape[1]):
-        t, mid, g, share = cells[CENTRE, i], cells[MIDDLE, i], cells[BOUND, i], 0.5 if i == 0 else 1.0
+    for i in range(cells.centre.size):
+        t, mid, g, share = cells.centre[i], cells.middle[i], cells.bound[i], 0.5 if i == 0 else 1.0
+        bound = g, cells.before[i], cells.rate[i]
         v = v0 + v1 * mid
         if i == 0:
             x, y, now = cut(-0.5 * u, -0.5 * v, g)
         else:
-            x, y, now = advance(px, py, slips, u, v, v1 * change, g, cells[BEFORE, i], cells[RATE, i])
+            x, y, now = advance((px, py, slips), (u, v, v1 * change), bound)
         turns = slips * (u * u + v * v) > STILL
-        reach = (abs(u) + abs(v)) * cells[RATE, i] if turns else 0.0
+        reach = (abs(u) + abs(v)) * cells.rate[i] if turns else 0.0
         late, steep = lateness(reach), 0.5 if reach < 0.4 else 0.2 if reach < 1.75 else 0.0
         w = v + v1 * change * late
         if turns and now > 0.0:
-            kept, pull, size = _turning(px, py, u, w, cells[BEFORE, i], cells[RATE, i])
+            kept, pull, size = _turning(px, py, u, w, cells.before[i], cells.rate[i])
         for k in range(3):
             dv = dv0[k] + dv1[k] * mid
             if now == 0.0:
@@ -176,7 +152,7 @@ def _strip(contact, strip, cells, slip, sums, moved):
                 dy[k] -= share * dv
                 continue
             if turns:
-                rise = (math.copysign(1.0, u) * du[k] + math.copysign(1.0, v) * dv) * cells[RATE, i] * steep
+                rise = (math.copysign(1.0, u) * du[k] + math.copysign(1.0, v) * dv) * cells.rate[i] * steep
                 dw = dv + change * (dv1[k] * late + v1 * rise)
                 heading = (u * dw - w * du[k]) / (size * size)
                 before = (px * dy[k] - py * dx[k]) / (px * px + py * py)

@@ -8,68 +8,50 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import CENTRE, MIDDLE, SECOND_ORDER
-from models.contact.fastsim_many import (
-    HALF,
-    LOAD,
-    MU,
-    PART,
-    PER_SLIP,
-    SPIN,
-    XI_X,
-    XI_Y,
-    A,
-    B,
-    Y,
-    rigid_slip,
-    strip_tractions,
-    touches,
-)
+from models.contact.fastsim_kernels import SECOND_ORDER
+from models.contact.fastsim_many import add_strip, rigid_slip, strip_slip, strip_tractions, touches
+from models.contact.fastsim_records import SLIP
 from models.machine.compiled import compiled
 
 
 @compiled
-def forces_falling(contacts, strips, cells, middle, kind, floor, decay, answers):
-    """As ``fastsim_many.forces`` with the second-order march, and friction that falls."""
-    n, m = cells.shape[1], strips.shape[1]
-    slip, left, tractions = np.empty(PER_SLIP), np.empty((2, n)), np.empty((3, n))
-    area = 0.0
-    for s in range(m):
-        area += strips[HALF, s]
+def forces_falling(contacts, strips, cells, kind, law, answers):
+    """As ``fastsim_many.forces`` with the second-order march, and friction that falls; law : of ``Falling``."""
+    n, area, slip = cells.centre.size, 0.0, np.empty(1, SLIP)[0]
+    left, tractions = np.empty((2, n)), np.empty((3, n))
+    for s in range(strips.y.size):
+        area += strips.half[s]
     for c in range(len(contacts)):
-        contact = contacts[c]
-        answers[c] = 0.0
+        contact, answer = contacts[c], answers[c]
+        answer.fx = answer.fy = answer.mz = answer.stick = 0.0
         if not touches(contact):
             continue
-        rigid_slip(contact, n, middle, kind, slip)
-        limit = contact[MU] * contact[LOAD]
-        for s in range(m):
-            friction_left(contact, strips[:, s], cells, floor, decay, left)
-            strip_tractions(contact, strips[:, s], cells, slip, SECOND_ORDER, left, tractions)
+        slip.x, slip.y, slip.spin = rigid_slip(contact, cells, kind)
+        for s in range(strips.y.size):
+            friction_left(contact, strips, s, cells, law, left)
+            strip_tractions(strip_slip(contact, strips, s, slip), cells, SECOND_ORDER, left, tractions)
             x = y = turn = stuck = 0.0
             for i in range(n):
                 x += tractions[0, i]
                 y += tractions[1, i]
-                turn += cells[CENTRE, i] * tractions[1, i]
+                turn += cells.centre[i] * tractions[1, i]
                 stuck += 1.0 - tractions[2, i]
-            part, half = limit * strips[PART, s], strips[HALF, s]
-            answers[c, 0] += part * x
-            answers[c, 1] += part * y
-            answers[c, 2] += part * (contact[A] * half * turn - contact[B] * strips[Y, s] * x)
-            answers[c, 3] += half * stuck / (n * area)
+            add_strip(contact, strips, s, (x, y, turn), answer)
+            answer.stick += strips.half[s] * stuck / (n * area)
 
 
 @compiled
-def friction_left(contact, strip, cells, floor, decay, left):
-    """Fill ``left`` (2, cells) as ``strip_tractions`` reads it: at the rigid slip of the points."""
-    along = contact[XI_X] - contact[SPIN] * contact[B] * strip[Y]
-    across, turn = contact[XI_Y], contact[SPIN] * contact[A] * strip[HALF]
-    for i in range(cells.shape[1]):
-        left[0, i] = _left(along, across + turn * cells[CENTRE, i], floor, decay)
-        left[1, i] = _left(along, across + turn * cells[MIDDLE, i], floor, decay)
+def friction_left(contact, strips, s, cells, law, left):
+    """Fill ``left`` (2, cells) of strip number s as ``strip_tractions`` reads it: at the rigid slip of the points."""
+    along = contact.xi_x - contact.spin * contact.b * strips.y[s]
+    across, turn = contact.xi_y, contact.spin * contact.a * strips.half[s]
+    for i in range(cells.centre.size):
+        left[0, i] = _left(along, across + turn * cells.centre[i], law)
+        left[1, i] = _left(along, across + turn * cells.middle[i], law)
 
 
 @compiled
-def _left(along, across, floor, decay):
+def _left(along, across, law):
     """Share of the friction that is left at a slip."""
+    floor, decay = law
     return floor + (1.0 - floor) * math.exp(-decay * math.sqrt(along * along + across * across))

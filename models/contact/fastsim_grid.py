@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from models.contact.fastsim_records import Cells, Strips
 from models.contact.inputs import Array
 
 Bound = Literal["intermediate", "parabolic", "elliptic"]
@@ -21,16 +22,23 @@ ROUNDED = 1.0 + 2e-15
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The net of one ellipse, in its own scale.
+    """The net of one ellipse, in its own scale, as tables of doubles hold it.
 
-    strips : (4, strips), rows as in ``fastsim_many``: y/b, half length by a, that by the bound, share of the load
-    cells : (5, cells), rows as in ``fastsim_kernels``
+    strips : (4, strips), rows as the fields of ``Strips``
+    cells : (5, cells), rows as the fields of ``Cells``
     middle : pressure in the middle of the ellipse times a b / N
     """
 
     strips: Array
     cells: Array
     middle: float
+
+    @property
+    def records(self) -> tuple[Strips, Cells]:
+        """The same by name."""
+        y, half, spread, part = self.strips
+        centre, bound, middle, before, rate = self.cells
+        return Strips(y, half, spread, part), Cells(centre, bound, middle, before, rate, self.middle)
 
 
 def strips_of(ratio: Array, cells: int) -> Array:
@@ -43,9 +51,9 @@ def strips_of(ratio: Array, cells: int) -> Array:
     return 2 * np.ceil(wanted / 2.0 - 1e-9).astype(int)
 
 
-def nets(contacts: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
-    """Numbers of the contacts (n, 2 or more), of semi-axes a and b, that have the same net, and that net."""
-    strips = strips_of(contacts[:, 0] / contacts[:, 1], cells)
+def nets(ratio: Array, cells: int, bound: Bound) -> Iterator[tuple[Array, Grid]]:
+    """Numbers of the contacts of a/b = ``ratio`` (n,) that have the same net, and that net."""
+    strips = strips_of(ratio, cells)
     for count in np.unique(strips):
         yield np.flatnonzero(strips == count), grid(cells, int(count), bound)
 

@@ -12,16 +12,9 @@ and only strips side by side keep the processor busy meanwhile.
 
 import math
 
+from models.contact.fastsim_records import LANES
 from models.machine.compiled import compiled, njit
 
-LANES = 24
-"""Strips that are marched at once; the last ones may be empty."""
-U, V0, V1, SUM_X, SUM_Y, SUM_T, SLID, QX, QY, SLIPS = range(10)
-"""Rows of the lanes: the three inputs; sums over the cells of q_x, q_y, t q_y and of slipping cells; the state."""
-ROWS = 10
-CENTRE, BOUND, MIDDLE, BEFORE, RATE = range(5)
-"""Rows of the cells, each about the step that ends in its centre: t there, g there, t in the middle of the step, g
-where it starts (more by a rounding), 1/(8 g) in its middle."""
 PLAIN, SECOND_ORDER = 0, 1
 
 LONGEST = 50.0
@@ -41,11 +34,12 @@ def lateness(z):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def advance(px, py, slips, u, v, turn, g, before, rate):
+def advance(traction, slip, bound):
     """Traction in the next cell, and 1 if it slips there or 0, by the second-order march.
 
-    px, py : traction before, on the bound ``before`` if ``slips`` is 1; u, v : rigid slip in the middle of the step, as
-    traction; turn : change of v over it; g : bound in the next cell; rate : 1 / 8 of 1 / bound in the middle
+    traction : along x and y before, and whether it slips (1), being on the bound, or not (0); slip : rigid slip along x
+    and y in the middle of the step, as traction, and the change of the second over it; bound : in the next cell, where
+    the step starts, and 1 / 8 of 1 / bound in its middle
 
     While a strip slips, with rigid slip w and bound g constant over the step, the angle psi between traction and -w
     obeys psi' = -(|w| / g) sin psi, so tan(psi / 2) shrinks by exp(-|w| step / g). The half angle is kept as the sides
@@ -53,11 +47,14 @@ def advance(px, py, slips, u, v, turn, g, before, rate):
     eighth power, right to z^4 / 12000 of itself. A flag tells whether a strip slips: a traction that equals the bound
     within a tolerance may stick. Where a strip begins to slip, the traction is cut back to the bound.
     """
+    px, py, slips = traction
+    u, v, turn = slip
+    g, before, rate = bound
     x, y = px - u, py - v
     v += turn * lateness((abs(u) + abs(v)) * rate)  # |w| well enough, without its root
-    square, slip = x * x + y * y, u * u + v * v
-    turns = slips * slip > STILL
-    size = math.sqrt(slip if turns else square)
+    square, speed = x * x + y * y, u * u + v * v
+    turns = slips * speed > STILL
+    size = math.sqrt(speed if turns else square)
     h = min(size * rate, LONGEST)
     grown = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))
     grown *= grown
@@ -83,52 +80,53 @@ def cut(x, y, g):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def march_second_order(lanes, cells):
-    """March with half a first step and the exact rotation of a slipping traction; fills sums and states."""
-    _clear(lanes)
+def march_second_order(block, cells):
+    """March with half a first step and the exact rotation of a slipping traction; fills sums and states of a BLOCK."""
+    _clear(block)
     for j in range(LANES):
-        u, v = lanes[U * LANES + j], lanes[V0 * LANES + j] + lanes[V1 * LANES + j] * cells[MIDDLE, 0]
-        x, y, slips = cut(-0.5 * u, -0.5 * v, cells[BOUND, 0])
-        _keep(lanes, j, cells[CENTRE, 0], x, y, slips)
-    change = -2.0 / cells.shape[1]
-    for i in range(1, cells.shape[1]):
-        t, g, middle = cells[CENTRE, i], cells[BOUND, i], cells[MIDDLE, i]
-        before, rate = cells[BEFORE, i], cells[RATE, i]
+        u, v = block.u[j], block.v0[j] + block.v1[j] * cells.middle[0]
+        x, y, slips = cut(-0.5 * u, -0.5 * v, cells.bound[0])
+        _keep(block, j, cells.centre[0], x, y, slips)
+    change = -2.0 / cells.centre.size
+    for i in range(1, cells.centre.size):
+        t, g, middle = cells.centre[i], cells.bound[i], cells.middle[i]
+        bound = g, cells.before[i], cells.rate[i]
         for j in range(LANES):
-            u, v1 = lanes[U * LANES + j], lanes[V1 * LANES + j]
-            v = lanes[V0 * LANES + j] + v1 * middle
-            x, y, slips = lanes[QX * LANES + j], lanes[QY * LANES + j], lanes[SLIPS * LANES + j]
-            x, y, slips = advance(x, y, slips, u, v, v1 * change, g, before, rate)
-            _keep(lanes, j, t, x, y, slips)
+            u, v1 = block.u[j], block.v1[j]
+            v = block.v0[j] + v1 * middle
+            traction = block.qx[j], block.qy[j], block.slips[j]
+            x, y, slips = advance(traction, (u, v, v1 * change), bound)
+            _keep(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def march_plain(lanes, cells):
+def march_plain(block, cells):
     """March of 1982: a whole step into each cell, then the traction is cut back to the bound; fills sums and states."""
-    _clear(lanes)
-    for i in range(cells.shape[1]):
-        t, g = cells[CENTRE, i], cells[BOUND, i]
+    _clear(block)
+    for i in range(cells.centre.size):
+        t, g = cells.centre[i], cells.bound[i]
         for j in range(LANES):
-            x = lanes[QX * LANES + j] - lanes[U * LANES + j]
-            y = lanes[QY * LANES + j] - (lanes[V0 * LANES + j] + lanes[V1 * LANES + j] * t)
+            x = block.qx[j] - block.u[j]
+            y = block.qy[j] - (block.v0[j] + block.v1[j] * t)
             x, y, slips = cut(x, y, g)
-            _keep(lanes, j, t, x, y, slips)
+            _keep(block, j, t, x, y, slips)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def _keep(lanes, j, t, x, y, slips):
+def _keep(block, j, t, x, y, slips):
     """A cell's traction into state and sums."""
-    lanes[QX * LANES + j] = x
-    lanes[QY * LANES + j] = y
-    lanes[SLIPS * LANES + j] = slips
-    lanes[SUM_X * LANES + j] += x
-    lanes[SUM_Y * LANES + j] += y
-    lanes[SUM_T * LANES + j] += t * y
-    lanes[SLID * LANES + j] += slips
+    block.qx[j] = x
+    block.qy[j] = y
+    block.slips[j] = slips
+    block.sum_x[j] += x
+    block.sum_y[j] += y
+    block.sum_t[j] += t * y
+    block.slid[j] += slips
 
 
 @compiled
-def _clear(lanes):
+def _clear(block):
     """Sums and states of all lanes to zero."""
-    for j in range(SUM_X * LANES, ROWS * LANES):
-        lanes[j] = 0.0
+    for j in range(LANES):
+        block.sum_x[j] = block.sum_y[j] = block.sum_t[j] = block.slid[j] = 0.0
+        block.qx[j] = block.qy[j] = block.slips[j] = 0.0

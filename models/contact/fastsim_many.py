@@ -7,37 +7,13 @@ import math
 
 import numpy as np
 
-from models.contact.fastsim_kernels import (
-    BEFORE,
-    BOUND,
-    CENTRE,
-    LANES,
-    MIDDLE,
-    PLAIN,
-    RATE,
-    ROWS,
-    SECOND_ORDER,
-    SLID,
-    SUM_T,
-    SUM_X,
-    SUM_Y,
-    V0,
-    V1,
-    U,
-    advance,
-    cut,
-    march_plain,
-    march_second_order,
-)
+from models.contact.fastsim_kernels import PLAIN, SECOND_ORDER, advance, cut, march_plain, march_second_order
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, LANES, SLIP, Workspace, cells_in, strips_in
 from models.contact.inputs import NOTHING
 from models.machine.compiled import compiled, lean
 
-A, B, LOAD, MU, XI_X, XI_Y, SPIN, L1, L2, L3 = range(10)
-"""Columns of contacts; L1 to L3 are the flexibilities (m^3/N) along x, along y and in spin."""
-Y, HALF, SPREAD, PART = range(4)
-"""Rows of the strips: y/b, half length by a, that by the bound in the strip's middle, share of the load per bound."""
-PER_SLIP, ROOM = 3, ROWS * LANES
-"""Numbers of a rigid slip; of all lanes."""
+A, B, LOAD, MU = range(4)
+"""Places of the first fields of CONTACT, for who keeps contacts in a table of doubles."""
 ONE, THREE, BLENDED = 0, 1, 2
 OF_X, OF_SPIN, AGAINST, REACH, GROWTH = 0.5, 0.52, 0.86, 1.9, 1.3
 SPIN_BY_RATIO, REACH_BY_RATIO, RATIOS = 0.6, 0.45, (0.1, 10.0)
@@ -50,70 +26,69 @@ SLIDING, MOST = 8.0, 100.0
 
 
 @compiled
-def forces(contacts, strips, cells, middle, kind, march, answers):
-    """Fill ``answers`` (n, 4) with fx, fy (N), mz (N m) and the share of the area that sticks.
+def forces(contacts, strips, cells, kind, march, answers):
+    """Fill ``answers``, FORCES (n,).
 
-    contacts : (n, 10), columns as above; strips, cells, middle : a net from ``fastsim_grid``; kind : of flexibility;
-    march : PLAIN or SECOND_ORDER. A contact without load or friction has zeros all over.
+    contacts : CONTACT (n,); strips, cells : a net from ``fastsim_grid``; kind : of flexibility; march : PLAIN or
+    SECOND_ORDER. A contact without load or friction has zeros all over.
     """
-    slips, lanes = np.empty((len(contacts), PER_SLIP)), np.empty(ROOM)
-    forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers)
+    room = Workspace(np.empty(len(contacts), SLIP), np.empty(1, BLOCK))
+    forces_within(contacts, strips, cells, kind, march, room, answers)
 
 
 @lean
-def forces_within(contacts, strips, cells, middle, kind, march, slips, lanes, answers):
-    """``forces`` that makes no array: slips (n, PER_SLIP) and lanes (ROOM,) are room to work in."""
+def forces_within(contacts, strips, cells, kind, march, room, answers):
+    """``forces`` that makes no array; room : ``Workspace``."""
+    slips, block, m = room.slips, room.blocks[0], strips.y.size
     for c in range(len(contacts)):
-        rigid_slip(contacts[c], cells.shape[1], middle, kind, slips[c])
-        answers[c, 0] = answers[c, 1] = answers[c, 2] = answers[c, 3] = 0.0
-    m = strips.shape[1]
+        slip, answer = slips[c], answers[c]
+        slip.x, slip.y, slip.spin = rigid_slip(contacts[c], cells, kind)
+        answer.fx = answer.fy = answer.mz = answer.stick = 0.0
     for first in range(0, len(contacts) * m, LANES):
         count = min(LANES, len(contacts) * m - first)
-        _fill(lanes, first, count, contacts, strips, slips)
+        _fill(block, first, count, contacts, strips, slips)
         if march == SECOND_ORDER:
-            march_second_order(lanes, cells)
+            march_second_order(block, cells)
         else:
-            march_plain(lanes, cells)
-        _collect(lanes, first, count, contacts, strips, slips, answers)
+            march_plain(block, cells)
+        _collect(block, first, count, contacts, strips, answers)
     area = 0.0
     for s in range(m):  # summed as the slipping cells are, so that nothing is left where all slip
-        area += strips[HALF, s] * cells.shape[1]
+        area += strips.half[s] * cells.centre.size
     for c in range(len(contacts)):
         if touches(contacts[c]):
-            answers[c, 3] = 1.0 - answers[c, 3] / area
+            answers[c].stick = 1.0 - answers[c].stick / area
 
 
 @lean
 def touches(contact):
     """Whether there is anything that friction could hold."""
-    return contact[MU] * contact[LOAD] > NOTHING
+    return contact.mu * contact.load > NOTHING
 
 
 @lean
-def rigid_slip(contact, cells, middle, kind, slip):
-    """Fill ``slip`` (3,) with what the march needs.
+def rigid_slip(contact, cells, kind):
+    """What the march needs of the creepages (x, y, spin).
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.
     """
-    a, b, load, mu = contact[A], contact[B], contact[LOAD], contact[MU]
     if not touches(contact):
-        slip[:] = 0.0
-        return
-    bound = mu * middle * load / (a * b)
+        return 0.0, 0.0, 0.0
+    bound = contact.mu * cells.peak * contact.load / (contact.a * contact.b)
     k1, k2, k3 = stiffness(contact, bound, kind)
-    step = 2.0 * a / (cells * bound)
-    slip[0], slip[1], slip[2] = k1 * contact[XI_X] * step, k2 * contact[XI_Y] * step, k3 * contact[SPIN] * step
+    step = 2.0 * contact.a / (cells.centre.size * bound)
+    return k1 * contact.xi_x * step, k2 * contact.xi_y * step, k3 * contact.spin * step
 
 
 @lean
 def stiffness(contact, bound, kind):
     """Inverses of the flexibilities along x, along y and in spin (N/m^3)."""
-    k1, k2, k3 = 1.0 / contact[L1], 1.0 / contact[L2], 1.0 / contact[L3]
+    k1, k2, k3 = 1.0 / contact.l1, 1.0 / contact.l2, 1.0 / contact.l3
     part = blend(contact, bound, kind)[0]
     if part == 0.0:
         return k1, k2, k3
-    mean = 1.0 / mean_flexibility(contact, contact[SPIN] * math.sqrt(contact[A] * contact[B]), kind)
+    mean = 1.0 / mean_flexibility(contact, contact.spin * math.sqrt(contact.a * contact.b), kind)
     return k1 + part * (mean - k1), k2 + part * (mean - k2), k3 + part * (mean - k3)
 
 
@@ -127,9 +102,9 @@ def blend(contact, bound, kind):
     """
     if kind != BLENDED:
         return 1.0 if kind == ONE else 0.0, 0.0, 0.0, 0.0
-    ratio, unit = math.log(min(max(contact[A] / contact[B], RATIOS[0]), RATIOS[1])), contact[A] / bound
-    of_x, of_y, of_z = unit / contact[L1], unit / contact[L2], unit / contact[L3]
-    x, y, z = of_x * contact[XI_X], of_y * contact[XI_Y], of_z * contact[SPIN] * math.sqrt(contact[A] * contact[B])
+    ratio, unit = math.log(min(max(contact.a / contact.b, RATIOS[0]), RATIOS[1])), contact.a / bound
+    of_x, of_y, of_z = unit / contact.l1, unit / contact.l2, unit / contact.l3
+    x, y, z = of_x * contact.xi_x, of_y * contact.xi_y, of_z * contact.spin * math.sqrt(contact.a * contact.b)
     turns = OF_SPIN * math.exp(SPIN_BY_RATIO * ratio)
     square = (OF_X * x) ** 2 + y * y + (turns * z) ** 2 + 2.0 * AGAINST * y * turns * z
     if square == 0.0:
@@ -155,84 +130,104 @@ def mean_flexibility(contact, turn, kind):
     That of 1982 weights by their sizes and divides by their root mean square, which makes up to sqrt(3) times too much
     of mixed ones; the blend's is the mean weighted by their squares.
     """
-    x, y, z = abs(contact[XI_X]), abs(contact[XI_Y]), abs(turn)
+    x, y, z = abs(contact.xi_x), abs(contact.xi_y), abs(turn)
     most = max(x, max(y, z))
     if most == 0.0:
-        return contact[L1]
+        return contact.l1
     x, y, z = x / most, y / most, z / most
     square = x * x + y * y + z * z
     if kind == ONE:
-        return (x * contact[L1] + y * contact[L2] + z * contact[L3]) / math.sqrt(square)
-    return (x * x * contact[L1] + y * y * contact[L2] + z * z * contact[L3]) / square
+        return (x * contact.l1 + y * contact.l2 + z * contact.l3) / math.sqrt(square)
+    return (x * x * contact.l1 + y * y * contact.l2 + z * z * contact.l3) / square
 
 
 @lean
-def _fill(lanes, first, count, contacts, strips, slips):
+def strip_slip(contact, strips, s, slip):
+    """Rigid slip (u, v0, v1) of strip number s, of that of its contact: the traction by the bound in the strip's middle
+    that it builds up over one cell, along x and, at the position t, along y (v0 + v1 t)."""
+    spread = strips.spread[s]
+    return (
+        spread * (slip.x - slip.spin * contact.b * strips.y[s]),
+        spread * slip.y,
+        spread * slip.spin * contact.a * strips.half[s],
+    )
+
+
+@lean
+def _fill(block, first, count, contacts, strips, slips):
     """The strips from number ``first`` on into the lanes; those beyond ``count`` stay at rest."""
-    c, s = first // strips.shape[1], first % strips.shape[1]
+    c, s = first // strips.y.size, first % strips.y.size
     for j in range(LANES):
         if j >= count:
-            lanes[U * LANES + j] = lanes[V0 * LANES + j] = lanes[V1 * LANES + j] = 0.0
+            block.u[j] = block.v0[j] = block.v1[j] = 0.0
             continue
-        spread = strips[SPREAD, s]
-        lanes[U * LANES + j] = spread * (slips[c, 0] - slips[c, 2] * contacts[c, B] * strips[Y, s])
-        lanes[V0 * LANES + j] = spread * slips[c, 1]
-        lanes[V1 * LANES + j] = spread * slips[c, 2] * contacts[c, A] * strips[HALF, s]
+        block.u[j], block.v0[j], block.v1[j] = strip_slip(contacts[c], strips, s, slips[c])
         s += 1
-        if s == strips.shape[1]:
+        if s == strips.y.size:
             c, s = c + 1, 0
 
 
 @lean
-def _collect(lanes, first, count, contacts, strips, slips, answers):
+def _collect(block, first, count, contacts, strips, answers):
     """Sums of the lanes into the forces of their ellipses, and slipping cells weighted by their length."""
-    c, s = first // strips.shape[1], first % strips.shape[1]
+    c, s = first // strips.y.size, first % strips.y.size
     for j in range(count):
-        if touches(contacts[c]):
-            part, half = contacts[c, MU] * contacts[c, LOAD] * strips[PART, s], strips[HALF, s]
-            x = lanes[SUM_X * LANES + j]
-            answers[c, 0] += part * x
-            answers[c, 1] += part * lanes[SUM_Y * LANES + j]
-            arm, off = contacts[c, A] * half, contacts[c, B] * strips[Y, s]
-            answers[c, 2] += part * (arm * lanes[SUM_T * LANES + j] - off * x)
-            answers[c, 3] += half * lanes[SLID * LANES + j]
+        contact, answer = contacts[c], answers[c]
+        if touches(contact):
+            sums = block.sum_x[j], block.sum_y[j], block.sum_t[j]
+            add_strip(contact, strips, s, sums, answer)
+            answer.stick += strips.half[s] * block.slid[j]
         s += 1
-        if s == strips.shape[1]:
+        if s == strips.y.size:
             c, s = c + 1, 0
+
+
+@lean
+def add_strip(contact, strips, s, sums, answer):
+    """Add to the forces of a contact those of strip number s, of its sums of q_x, q_y and t q_y over the cells."""
+    part, (x, y, turn) = contact.mu * contact.load * strips.part[s], sums
+    answer.fx += part * x
+    answer.fy += part * y
+    answer.mz += part * (contact.a * strips.half[s] * turn - contact.b * strips.y[s] * x)
 
 
 @compiled
-def strip_tractions(contact, strip, cells, slip, march, left, answers):
+def strip_tractions(slip, cells, march, left, answers):
     """Tractions by the bound in the strip's middle, along x and y, and slip or not, in ``answers`` (3, cells).
 
-    left : (2, cells), share of the friction that is left in the cells' centres and in the middles of the steps there.
+    slip : of the strip, see ``strip_slip``; left : (2, cells), share of the friction that is left in the cells' centres
+    and in the middles of the steps there.
     """
-    u, v0 = strip[SPREAD] * (slip[0] - slip[2] * contact[B] * strip[Y]), strip[SPREAD] * slip[1]
-    v1, change, before = strip[SPREAD] * slip[2] * contact[A] * strip[HALF], -2.0 / cells.shape[1], 0.0
+    (u, v0, v1), change, before = slip, -2.0 / cells.centre.size, 0.0
     x = y = slips = 0.0
-    for i in range(cells.shape[1]):
-        v, g = v0 + v1 * cells[MIDDLE, i], left[0, i] * cells[BOUND, i]
+    for i in range(cells.centre.size):
+        v, g = v0 + v1 * cells.middle[i], left[0, i] * cells.bound[i]
         if march == PLAIN:
-            x, y, slips = cut(x - u, y - v0 - v1 * cells[CENTRE, i], g)
+            x, y, slips = cut(x - u, y - v0 - v1 * cells.centre[i], g)
         elif i == 0:
             x, y, slips = cut(-0.5 * u, -0.5 * v, g)
         else:
-            rate = cells[RATE, i] / left[1, i]
-            x, y, slips = advance(x, y, slips, u, v, v1 * change, g, before * cells[BEFORE, i], rate)
+            bound = g, before * cells.before[i], cells.rate[i] / left[1, i]
+            x, y, slips = advance((x, y, slips), (u, v, v1 * change), bound)
         before = left[0, i]
         answers[0, i], answers[1, i], answers[2, i] = x, y, slips
 
 
 @compiled
-def point(a, load, mu, xi_x, xi_y, spin, by_ratio, l1, l2, l3, strips, cells, middle, kind, march):
-    """fx, fy, mz of one ellipse of semi-axes a and a ``by_ratio``, flexibilities a (l1, l2, l3); NaN for bad input."""
-    contacts, answers = np.empty((1, 10)), np.empty((1, 4))
+def point(given, unit, strips, cells, peak, kind, march):
+    """fx, fy, mz of one ellipse of the shape of ``unit``, NaN for bad input.
+
+    given : a (m), load, mu, xi_x, xi_y, spin; unit : CONTACT (1,) of the axes and flexibilities of a = 1 m; strips,
+    cells, peak : a net's tables, as Python hands plain arrays over in a fraction of a record's time.
+    """
+    a, load, mu, xi_x, xi_y, spin = given
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
-    own = contacts[0]
-    own[A], own[B], own[LOAD], own[MU] = a, a * by_ratio, load, mu
-    own[XI_X], own[XI_Y], own[SPIN] = xi_x, xi_y, spin
-    own[L1], own[L2], own[L3] = a * l1, a * l2, a * l3
-    forces(contacts, strips, cells, middle, kind, march, answers)
+    contacts, answers = np.empty(1, CONTACT), np.empty(1, FORCES)
+    contact, answer = contacts[0], answers[0]
+    contact.a, contact.b, contact.load, contact.mu = a, a * unit[0].b, load, mu
+    contact.xi_x, contact.xi_y, contact.spin = xi_x, xi_y, spin
+    contact.l1, contact.l2, contact.l3 = a * unit[0].l1, a * unit[0].l2, a * unit[0].l3
+    forces(contacts, strips_in(strips), cells_in(cells, peak), kind, march, answers)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
-    return answers[0, 0] + bad, answers[0, 1] + bad, answers[0, 2] + bad
+    return answer.fx + bad, answer.fy + bad, answer.mz + bad

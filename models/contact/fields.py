@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.contact.fastsim import KINDS, MARCHES, Flexibilities, March, check_choices, contacts_of
+from models.contact.fastsim import KINDS, MARCHES, Flexibilities, March, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, grid, strips_of
-from models.contact.fastsim_kernels import BOUND, CENTRE
-from models.contact.fastsim_many import HALF, PER_SLIP, SPREAD, A, B, Y, rigid_slip, strip_tractions
+from models.contact.fastsim_many import rigid_slip, strip_slip, strip_tractions
+from models.contact.fastsim_records import SLIP
 from models.contact.inputs import Array
 from models.contact.material import Falling, Pair
 from models.core.errors import InputError
@@ -33,13 +33,7 @@ class Fields:
 
 
 def fastsim_fields(
-    a: float,
-    b: float,
-    load: float,
-    mu: float,
-    xi_x: float,
-    xi_y: float,
-    spin: float,
+    ellipse: RollingEllipse,
     pair: Pair,
     *,
     cells: int = 21,
@@ -54,30 +48,30 @@ def fastsim_fields(
     bound: Hertz's only if it is elliptic. Raises InputError as ``fastsim`` does.
     """
     check_choices(cells, bound, flexibilities, march, falling)
-    contacts, shape = contacts_of(a, b, load, mu, xi_x, xi_y, spin, pair)
+    contacts, shape = contacts_of(ellipse, pair)
     if shape:
         raise InputError("", "a, b, load, mu, xi_x, xi_y, spin", list(shape), "must be plain numbers: one ellipse")
     contact = contacts[0]
-    net = grid(cells, int(strips_of(contact[A] / contact[B], cells)), bound)
-    slip = np.zeros(PER_SLIP)
-    rigid_slip(contact, cells, net.middle, KINDS[flexibilities], slip)
-    y, half, spread = (net.strips[row][:, None] for row in (Y, HALF, SPREAD))
+    a, b = contact["a"], contact["b"]
+    net = grid(cells, int(strips_of(a / b, cells)), bound)
+    strips, along = net.records
+    slip = np.array([rigid_slip(contact, along, KINDS[flexibilities])], SLIP)[0]
+    y, half, spread = (row[:, None] for row in (strips.y, strips.half, strips.spread))
     relative, left = np.zeros((3, y.size, cells)), np.ones((2, cells))
     if falling is not None:
         from models.contact.fastsim_falling import friction_left
-    for k, strip in enumerate(net.strips.T):
+    for k in range(y.size):
         if falling is not None:
-            friction_left(contact, strip, net.cells, *falling.law, left)
-        strip_tractions(contact, strip, net.cells, slip, MARCHES[march], left, relative[:, k])
-    peak = max(load, 0.0) * net.middle / (contact[A] * contact[B]) * half / spread
-    scale, shape = mu * peak, (y.size, cells)
-    whole = np.ones(shape)
+            friction_left(contact, strips, k, along, falling.law, left)
+        strip_tractions(strip_slip(contact, strips, k, slip), along, MARCHES[march], left, relative[:, k])
+    peak = max(contact["load"], 0.0) * net.middle / (a * b) * half / spread
+    scale, whole = contact["mu"] * peak, np.ones((y.size, cells))
     return Fields(
-        contact[A] * half * net.cells[CENTRE],
-        contact[B] * y * whole,
-        2 * contact[A] * half / cells * whole,
-        2 * contact[B] / y.size * whole,
-        peak * net.cells[BOUND],
+        a * half * along.centre,
+        b * y * whole,
+        2 * a * half / cells * whole,
+        2 * b / y.size * whole,
+        peak * along.bound,
         scale * relative[0],
         scale * relative[1],
         relative[2] > 0,

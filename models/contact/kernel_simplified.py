@@ -10,38 +10,20 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import cfunc, types
 
 from models.contact.distance_kernels import sides
 from models.contact.inputs import Array, whole_number
-from models.contact.kernel import (
-    APPROACH,
-    AXIS_A,
-    AXIS_B,
-    CREEP_X,
-    CREEP_Y,
-    FINE,
-    FRICTION,
-    FX,
-    FY,
-    INPUTS,
-    MODULUS,
-    MZ,
-    NORMAL,
-    NOT_PLAUSIBLE,
-    OUTPUTS,
-    POISSON,
-    PRESSING,
-    STICK,
-    TURNING,
-)
+from models.contact.kernel import FINE, INPUT, NOT_PLAUSIBLE, OUTPUT, OUTPUTS
 from models.contact.patches import Patch, separate
 from models.contact.simplified_kernels import (
     PARABOLIC,
+    Surface,
     crude_fit,
     crude_net,
     gather,
     march,
+    mesh_of,
     strips,
     tangential,
     tangential_fit,
@@ -50,13 +32,32 @@ from models.contact.simplified_theory import ABOUT, FITS, LEAST_CELLS, PLAIN, SH
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 from models.machine.compiled import compiled
-from models.machine.stack import DOUBLES, beyond
+from models.machine.records import record, records, size_of
+from models.machine.stack import DOUBLES, array, beyond
 
-_CELLS, _LAW, _NET, _SHAPE, _FIT, _LOW, _EDGE, _X, _Y, _DX, _DY, _BOTTOM_X, _BOTTOM_Y = range(13)
-_LINES_X, _LINES_Y, _ROWS, _COLUMNS, _HEAD = range(13, 18)
-"""Places in the table: minus the cells; address of the law; net, shape and fit; least distance and depth at which a
-side is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and
+HEAD = record(
+    "cells",
+    "law",
+    "net",
+    "shape",
+    "fit",
+    "low",
+    "edge",
+    "x",
+    "y",
+    "dx",
+    "dy",
+    "bottom_x",
+    "bottom_y",
+    "lines_x",
+    "lines_y",
+    "rows",
+    "columns",
+)
+"""Head of the table: minus the cells; address of the law; net, shape and fit; least distance and depth at which a side
+is reached (m); first node, spacing and bottom along x and y (m); lengths. Then lines and roots along x and y, and
 padded heights."""
+HEADER = size_of(HEAD)
 MOST_CELLS = 200
 SETTLED = 1e-12
 """Share of the approach, from first touch on, to which the depth settles."""
@@ -99,22 +100,22 @@ def table(distance: Distance, cells: int = 21, options: Options = PLAIN) -> Arra
 @compiled
 def surface_at(numbers, depth):
     """What compiled functions read of the patch at a depth (m), as ``Patch.surface`` has it."""
-    head = carray(numbers, (_HEAD,))
-    m, n = int(head[_LINES_X]), int(head[_LINES_Y])
-    x, y = carray(beyond(numbers, _HEAD), (2, m)), carray(beyond(numbers, _HEAD + 2 * m), (2, n))
-    shape = int(head[_ROWS]), int(head[_COLUMNS])
-    padded = carray(beyond(numbers, _HEAD + 2 * (m + n)), shape)
-    root = math.sqrt(max(depth - head[_LOW], 0.0))
-    x0, x1 = sides(x[0], x[1], head[_BOTTOM_X], root)
-    y0, y1 = sides(y[0], y[1], head[_BOTTOM_Y], root)
-    return padded, (head[_X], head[_Y]), (head[_DX], head[_DY]), (x0, x1, y0, y1), depth, head[_LOW]
+    head = records(numbers, 1, HEAD)[0]
+    m, n = int(head.lines_x), int(head.lines_y)
+    x, y = array(beyond(numbers, HEADER), (2, m)), array(beyond(numbers, HEADER + 2 * m), (2, n))
+    shape = int(head.rows), int(head.columns)
+    padded = array(beyond(numbers, HEADER + 2 * (m + n)), shape)
+    root = math.sqrt(max(depth - head.low, 0.0))
+    x0, x1 = sides(x[0], x[1], head.bottom_x, root)
+    y0, y1 = sides(y[0], y[1], head.bottom_y, root)
+    return Surface(padded, (head.x, head.y), (head.dx, head.dy), (x0, x1, y0, y1), depth, head.low)
 
 
 @compiled
 def fit_at(numbers, depth, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA at a depth (m)."""
-    head = carray(numbers, (_HEAD,))
-    return crude_fit(*surface_at(numbers, depth), int(head[_NET]), int(head[_SHAPE]), int(head[_FIT]), modulus)
+    head = records(numbers, 1, HEAD)[0]
+    return crude_fit(surface_at(numbers, depth), int(head.net), int(head.shape), int(head.fit), modulus)
 
 
 @compiled
@@ -123,8 +124,8 @@ def settle(numbers, approach, modulus):
 
     False position by Illinois' rule: the approach grows with the depth, for one valley in proportion.
     """
-    head = carray(numbers, (_HEAD,))
-    low, most = head[_LOW], head[_EDGE] - head[_LOW]
+    head = records(numbers, 1, HEAD)[0]
+    low, most = head.low, head.edge - head.low
     over = approach - low
     left, off_left, right, off_right = 0.0, -over, 0.0, -over
     depth = min(ABOUT * over, most)
@@ -160,57 +161,54 @@ def simplified(inputs, numbers, outputs):
     All pointers to doubles. Zeros where the bodies do not touch; no answer where the contact reaches the edge of the
     distance.
     """
-    values, out, head = carray(inputs, (INPUTS,)), carray(outputs, (OUTPUTS,)), carray(numbers, (_HEAD,))
-    out[:] = 0.0
-    if values[PRESSING] <= head[_LOW]:
+    values, out, head = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0], records(numbers, 1, HEAD)[0]
+    answers = array(outputs, (OUTPUTS,))
+    answers[:] = 0.0
+    if values.pressing <= head.low:
         return FINE
-    depth, stiffness, volume = settle(numbers, values[PRESSING], values[MODULUS] / (1.0 - values[POISSON]))
+    depth, stiffness, volume = settle(numbers, values.pressing, values.G / (1.0 - values.nu))
     if stiffness * volume > 0.0:
-        _roll(values, numbers, head, depth, stiffness, stiffness * volume, out)
-    if math.isfinite(stiffness * volume + out[FX] + out[FY] + out[MZ]):
+        out.load = stiffness * volume
+        _roll(values, numbers, depth, stiffness, out)
+    if math.isfinite(stiffness * volume + out.fx + out.fy + out.mz):
         return FINE
-    out[:] = math.nan
+    answers[:] = math.nan
     return NOT_PLAUSIBLE
 
 
 @compiled
-def _roll(values, numbers, head, depth, stiffness, load, out):
-    """Fill ``out`` of the patch at a depth: as ``simplified_theory.roll``."""
-    surface = surface_at(numbers, depth)
-    box, cells, net, shear = surface[3], -int(head[_CELLS]), int(head[_NET]), values[MODULUS]
-    y, low_x, high_x, pressure = strips(*surface, cells, cells, int(head[_SHAPE]))
-    width = (box[3] - box[2]) / cells
-    normalise(pressure, low_x, high_x, width, load)
-    traction, flexibility = np.empty((y.size, cells, 2)), 1.0 / stiffness
+def _roll(values, numbers, depth, stiffness, out):
+    """Fill ``out``, the load of which is known, of the patch at a depth: as ``simplified_theory.roll``."""
+    surface, head = surface_at(numbers, depth), records(numbers, 1, HEAD)[0]
+    box, cells, meshes = surface.box, -int(head.cells), int(head.net)
+    net = strips(surface, cells, cells, int(head.shape))
+    normalise(net, out.load)
+    motion = values.xi_x, values.xi_y, values.spin
+    traction, flexibility = np.empty((net.y.size, cells, 2)), 1.0 / stiffness
     fx = fy = mz = stuck = area = 0.0
     for again in (False, True):
         if again:
-            crude = gather(y, low_x, high_x, width, traction, box, net)
-            dx, dy = (box[1] - box[0]) / net, (box[3] - box[2]) / net
-            cover = crude_net(*surface, net, PARABOLIC)[2]
-            u = tangential(crude, dx, dy, values[POISSON]) / (math.pi * shear)
-            fitted = tangential_fit(u, crude, cover, dx, dy, int(head[_FIT]))
+            crude, (dx, dy) = gather(net, traction, box, meshes), mesh_of(box, meshes)
+            cover = crude_net(surface, meshes, PARABOLIC)[2]
+            u = tangential(crude, dx, dy, values.nu) / (math.pi * values.G)
+            fitted = tangential_fit(u, crude, cover, dx, dy, int(head.fit))
             flexibility = fitted if fitted > 0.0 else flexibility
-        motion = values[CREEP_X], values[CREEP_Y], values[TURNING]
-        fx, fy, mz, stuck, area = march(
-            y, low_x, high_x, width, pressure, values[FRICTION], flexibility, *motion, traction
-        )
-    out[FX], out[FY], out[MZ], out[STICK] = fx, fy, mz, stuck / area
-    out[AXIS_A], out[AXIS_B] = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
-    out[NORMAL], out[APPROACH] = load, values[PRESSING]
+        fx, fy, mz, stuck, area = march(net, values.mu, flexibility, motion, traction)
+    out.fx, out.fy, out.mz, out.stick = fx, fy, mz, stuck / area
+    out.a, out.b = 0.5 * (box[1] - box[0]), 0.5 * (box[3] - box[2])
+    out.approach = values.pressing
 
 
 @compiled
-def normalise(pressure, low_x, high_x, width, load):
-    """Scale the pressure of strips (s, n) to carry the load (N), so that full sliding gives mu N exactly."""
-    carried = 0.0
-    strips_, cells = pressure.shape
+def normalise(net, load):
+    """Scale the pressure of a ``FineNet`` to carry the load (N), so that full sliding gives mu N exactly."""
+    carried, (strips_, cells) = 0.0, net.pressure.shape
     for s in range(strips_):
         for i in range(cells):
-            carried += pressure[s, i] * (high_x[s] - low_x[s]) * width / cells
+            carried += net.pressure[s, i] * (net.high_x[s] - net.low_x[s]) * net.width / cells
     for s in range(strips_):
         for i in range(cells):
-            pressure[s, i] *= load / carried
+            net.pressure[s, i] *= load / carried
 
 
 @cache

@@ -8,12 +8,12 @@ with the load, so nothing jumps when two areas of contact grow together.
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from models.contact.distance_kernels import sides
 from models.contact.inputs import Array
+from models.contact.simplified_kernels import Surface
 from models.contact.undeformed_distance import Distance
 from models.core.errors import InputError
 
@@ -76,13 +76,11 @@ class Patch:
             tables.append((np.insert(lines, k, bottom), np.insert(roots, k, 0.0)))
         return tables[0], tables[1]
 
-    def surface(self, depth: float) -> tuple[Any, ...]:
-        """What compiled functions read of the patch at a depth (m): padded heights, first node and spacing along x and
-        y, box, depth and least distance.
-        """
+    def surface(self, depth: float) -> Surface:
+        """What compiled functions read of the patch at a depth (m)."""
         known = self.distance
         origin = float(known.x[0]), float(known.y[0])
-        return known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low
+        return Surface(known.padded, origin, (known.dx, known.dy), self.box(depth), depth, self.low)
 
     def box(self, depth: float) -> Box:
         """Rectangle x0, x1, y0, y1 (m) about {h < depth}, continuous in the depth.

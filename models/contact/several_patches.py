@@ -28,6 +28,7 @@ from models.contact.simplified_kernels import (
     crude_net,
     displacement,
     drag,
+    mesh_of,
     push,
     resultant,
     slope_products,
@@ -71,11 +72,11 @@ def crude(patch: Patch, depth: float, cells: int, shape: int) -> Net:
     if depth <= low:
         return empty
     surface, box = patch.surface(depth), patch.box(depth)
-    height, pressure, cover = crude_net(*surface, cells, shape)
-    volume = float(resultant(*surface, FINER * cells, shape))
+    height, pressure, cover = crude_net(surface, cells, shape)
+    volume = float(resultant(surface, FINER * cells, shape))
     if not (volume > 0.0 and pressure.sum() > 0.0):  # so shallow that rounding leaves nothing of it
         return empty
-    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    dx, dy = mesh_of(box, cells)
     middles = np.arange(cells) + 0.5
     y, x = np.meshgrid(box[2] + middles * dy + patch.place, box[0] + middles * dx, indexing="ij")
     return Net(x, y, height, pressure, cover, (dx, dy), volume)

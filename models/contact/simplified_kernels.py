@@ -1,10 +1,12 @@
 """Compiled parts of Kalker's theory of 1983: fit on the crude net, strips of the fine net, march along them."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from models.contact.distance_kernels import along, row_at, value_and_slopes
+from models.contact.inputs import Array
 from models.machine.compiled import compiled
 
 PARABOLIC, ELLIPTIC = 0, 1
@@ -16,47 +18,78 @@ FINER = 3
 LEAST = 0.2
 """Least stiffness 1/W as a share of depth over mean displacement; a Hertzian contact has about 1.2. A flat or ringlike
 bottom leaves the fit undefined, and this bound keeps it positive."""
+Pair = tuple[float, float]
+
+
+class Surface(NamedTuple):
+    """A patch at a depth: padded heights, first node and spacing along x and y, rectangle x0, x1, y0, y1 about it,
+    depth and least distance (m)."""
+
+    padded: Array
+    origin: Pair
+    step: Pair
+    box: tuple[float, float, float, float]
+    depth: float
+    low: float
+
+
+class FineNet(NamedTuple):
+    """Strips of a patch: y, low and high end in x (s,) and width (m); pressure (s, n) in the cells from the leading
+    edge back (Pa)."""
+
+    y: Array
+    low_x: Array
+    high_x: Array
+    width: float
+    pressure: Array
 
 
 @compiled
-def overlap_pressure(depth, height, low, shape):
+def overlap_pressure(surface, height, shape):
     """W times the pressure at a height: depth - height, or the root that has the same value at the bottom."""
-    over = depth - height
+    over = surface.depth - height
     if over <= 0.0:
         return 0.0
-    return over if shape == PARABOLIC else math.sqrt(over * (depth - low))
+    return over if shape == PARABOLIC else math.sqrt(over * (surface.depth - surface.low))
 
 
 @compiled
-def crude_net(padded, origin, step, box, depth, low, cells, shape):
+def mesh_of(box, cells):
+    """Sizes dx, dy of a mesh of a net of cells x cells over a box."""
+    return (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+
+
+@compiled
+def crude_net(surface, cells, shape):
     """Height, W p and covered share of every mesh (cells, cells), rows along y.
 
     The share of a mesh that the contact covers, for a straight edge: it makes meshes enter and leave without a jump.
     """
     height, pressure, cover = np.empty((cells, cells)), np.empty((cells, cells)), np.empty((cells, cells))
-    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    padded, origin, step, box, depth, _ = surface
+    dx, dy = mesh_of(box, cells)
     for j in range(cells):
         v = (box[2] + (j + 0.5) * dy - origin[1]) / step[1]
         for i in range(cells):
             u = (box[0] + (i + 0.5) * dx - origin[0]) / step[0]
             h, slope_x, slope_y = value_and_slopes(padded, u, v)
             fall = abs(slope_x) * dx / step[0] + abs(slope_y) * dy / step[1]
-            height[j, i], pressure[j, i] = h, overlap_pressure(depth, h, low, shape)
+            height[j, i], pressure[j, i] = h, overlap_pressure(surface, h, shape)
             share = 0.5 + (depth - h) / fall if fall > 0.0 else (1.0 if h < depth else 0.0)
             cover[j, i] = min(max(share, 0.0), 1.0)
     return height, pressure, cover
 
 
 @compiled
-def resultant(padded, origin, step, box, depth, low, points, shape):
+def resultant(surface, points, shape):
     """Sum of W p dA over the box from points x points midpoints."""
-    total = 0.0
-    dx, dy = (box[1] - box[0]) / points, (box[3] - box[2]) / points
+    total, (padded, origin, step, box, _, _) = 0.0, surface
+    dx, dy = mesh_of(box, points)
     for j in range(points):
         row = row_at(padded, (box[2] + (j + 0.5) * dy - origin[1]) / step[1])
         for i in range(points):
             height = along(row, (box[0] + (i + 0.5) * dx - origin[0]) / step[0])
-            total += overlap_pressure(depth, height, low, shape)
+            total += overlap_pressure(surface, height, shape)
     return total * dx * dy
 
 
@@ -131,20 +164,20 @@ def slope_products(u, h, cover, dx, dy, along_y):
 
 
 @compiled
-def crude_fit(padded, origin, step, box, depth, low, cells, shape, kind, modulus):
+def crude_fit(surface, cells, shape, kind, modulus):
     """Stiffness 1/W (Pa/m), approach (m) and sum of W p dA of one patch at a depth.
 
     The approach is the mean of u + h weighted by the pressure: the work of the pressure by the load.
     """
-    height, pressure, cover = crude_net(padded, origin, step, box, depth, low, cells, shape)
-    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    height, pressure, cover = crude_net(surface, cells, shape)
+    dx, dy = mesh_of(surface.box, cells)
     u = displacement(pressure, dx, dy, modulus)
     mean_u, both, square = covariances(u, height, cover)
     if kind == GRADIENT:
         both, square = slope_products(u, height, cover, dx, dy, True)
-    least = LEAST * (depth - low) / mean_u
+    least = LEAST * (surface.depth - surface.low) / mean_u
     stiffness = max(-both / square, least) if square > 0.0 else least
-    total = resultant(padded, origin, step, box, depth, low, FINER * cells, shape)
+    total = resultant(surface, FINER * cells, shape)
     approach = stiffness * weighted_mean(u, pressure) + weighted_mean(height, pressure)
     return stiffness, approach, total
 
@@ -190,11 +223,11 @@ def tangential_fit(u, traction, cover, dx, dy, kind):
     both = square = 0.0
     for k in range(2):
         if kind == GRADIENT:
-            one, two = slope_products(traction[k], u[k], cover, dx, dy, False)
+            product, size = slope_products(traction[k], u[k], cover, dx, dy, False)
         else:
-            _, one, two = covariances(traction[k], u[k], cover)
-        both += one
-        square += two
+            _, product, size = covariances(traction[k], u[k], cover)
+        both += product
+        square += size
     return both / square if square > 0.0 and both > 0.0 else 0.0
 
 
@@ -227,13 +260,13 @@ def drag(x, y, force, at_x, at_y, nu):
 
 
 @compiled
-def strips(padded, origin, step, box, depth, low, rows, cells, shape):
-    """Strips of the fine net: y, low and high end in x (s,), and W p in the cells from the leading edge back (s, n).
+def strips(surface, rows, cells, shape):
+    """``FineNet`` of a patch, with W p for the pressure.
 
     Each of ``rows`` lines gives one strip per interval in which h < depth, its ends where the interpolation passes the
     depth.
     """
-    looks = 2
+    (padded, origin, step, box, depth, _), looks = surface, 2
     width = (box[3] - box[2]) / rows
     first = max(int((box[0] - origin[0]) / step[0] * looks) - 1, 0)
     last = min(int((box[1] - origin[0]) / step[0] * looks) + 2, (padded.shape[1] - 3) * looks)
@@ -260,8 +293,8 @@ def strips(padded, origin, step, box, depth, low, rows, cells, shape):
         length = (high_x[s] - low_x[s]) / cells
         for i in range(cells):
             h = along(row, (high_x[s] - (i + 0.5) * length - origin[0]) / step[0])
-            pressure[s, i] = overlap_pressure(depth, h, low, shape)
-    return y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), pressure
+            pressure[s, i] = overlap_pressure(surface, h, shape)
+    return FineNet(y[:count].copy(), low_x[:count].copy(), high_x[:count].copy(), width, pressure)
 
 
 @compiled
@@ -286,12 +319,13 @@ def crossing(row, depth, inner, outer):
 
 
 @compiled
-def march(y, low_x, high_x, width, pressure, mu, flexibility, xi_x, xi_y, spin, traction):
-    """FASTSIM along strips with the pressure p of every cell; fills the tractions (s, n, 2).
+def march(net, mu, flexibility, motion, traction):
+    """FASTSIM along the strips of a ``FineNet`` at creepages and spin ``motion``; fills the tractions (s, n, 2).
 
     Returns fx, fy (N), mz (N m, about x = y = 0), the area that sticks and the whole area (m^2). The march is the
     second-order one: half a first step, and the exact turning of a slipping traction.
     """
+    (y, low_x, high_x, width, pressure), (xi_x, xi_y, spin) = net, motion
     fx = fy = mz = stuck = area = 0.0
     cells = pressure.shape[1]
     for s in range(y.size):
@@ -339,10 +373,10 @@ def step_on(px, py, u, v, bound, middle, slips):
 
 
 @compiled
-def gather(y, low_x, high_x, width, traction, box, cells):
+def gather(net, traction, box, cells):
     """Mean tractions (2, cells, cells) of the crude meshes: every cell's share by its overlap with the mesh."""
-    sums = np.zeros((2, cells, cells))
-    dx, dy = (box[1] - box[0]) / cells, (box[3] - box[2]) / cells
+    (y, low_x, high_x, width, _), sums = net, np.zeros((2, cells, cells))
+    dx, dy = mesh_of(box, cells)
     steps = traction.shape[1]
     for s in range(y.size):
         length = (high_x[s] - low_x[s]) / steps

@@ -31,7 +31,7 @@ Several patches
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -46,6 +46,7 @@ from models.contact.simplified_kernels import (
     ELLIPTIC,
     GRADIENT,
     PARABOLIC,
+    FineNet,
     crude_fit,
     gather,
     march,
@@ -191,7 +192,7 @@ def load_at_depth(patch: Patch, depth: float, pair: Pair, options: Options = PLA
     if depth <= patch.low:
         return PatchPressure(patch, depth, 0.0, depth, 0.0, (0.0, 0.0, 0.0, 0.0))
     box = patch.box(depth)
-    stiffness, approach, volume = crude_fit(*patch.surface(depth), *options.numbers, pair.modulus)
+    stiffness, approach, volume = crude_fit(patch.surface(depth), *options.numbers, pair.modulus)
     if not (volume > 0.0 and np.isfinite(stiffness)):  # so shallow that rounding leaves nothing of it
         return PatchPressure(patch, depth, 0.0, depth, 0.0, box)
     return PatchPressure(patch, depth, stiffness, approach, volume * stiffness, box)
@@ -261,8 +262,8 @@ def _gathered(approach: float, parts: tuple[PatchPressure, ...], pair: Pair, opt
 
 def _area(part: PatchPressure, rows: int = 100) -> float:
     """Area (m^2) of one patch."""
-    y, low, high, _ = strips(*part.patch.surface(part.depth), rows, 1, PARABOLIC)
-    return float((high - low).sum() * (part.box[3] - part.box[2]) / rows) if y.size else 0.0
+    net = strips(part.patch.surface(part.depth), rows, 1, PARABOLIC)
+    return float((net.high_x - net.low_x).sum() * (part.box[3] - part.box[2]) / rows) if net.y.size else 0.0
 
 
 def roll(
@@ -280,30 +281,30 @@ def roll(
     motion = tuple(creepages(xi_x, xi_y, spin, number).values())
     cells = whole_number("cells", cells, LEAST_CELLS, MOST_CELLS)
     fine = [_fine(part, pressed.options, cells) for part in pressed.patches]
-    tractions = [np.zeros((*strip[-1].shape, 2)) for strip in fine]
+    tractions = [np.zeros((*net.pressure.shape, 2)) for net in fine]
     crude_tractions = []
     # W_1 = W_2 = W_3 is the paper's first estimate. a_1 and a_2 drop out: rolling feels du/dx alone, and they are
     # constant over the patch.
-    for part, strip, traction in zip(pressed.patches, fine, tractions, strict=True):
-        march(*strip, friction, 1.0 / part.stiffness, *motion, traction)
-        crude_tractions.append(gather(*strip[:4], traction, part.box, pressed.options.net))
+    for part, net, traction in zip(pressed.patches, fine, tractions, strict=True):
+        march(net, friction, 1.0 / part.stiffness, motion, traction)
+        crude_tractions.append(gather(net, traction, part.box, pressed.options.net))
     flexibilities = _refitted(pressed, crude_tractions)
     rolled = [
-        march(*strip, friction, flexibility, *motion, traction)
-        for strip, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
+        march(net, friction, flexibility, motion, traction)
+        for net, flexibility, traction in zip(fine, flexibilities, tractions, strict=True)
     ]
     fx, fy, mz, stuck, area = (float(sum(forces[k] for forces in rolled)) for k in range(5))
     power = -(fx * motion[0] + fy * motion[1] + mz * motion[2])
-    fields = tuple(_fields(strip, traction, friction) for strip, traction in zip(fine, tractions, strict=True))
+    fields = tuple(_fields(net, traction, friction) for net, traction in zip(fine, tractions, strict=True))
     return Rolling(fx, fy, mz, stuck / area if area > 0.0 else 0.0, power, tuple(flexibilities), fields)
 
 
-def _fine(part: PatchPressure, options: Options, cells: int) -> tuple[Any, ...]:
-    """Strips of a patch as ``march`` takes them: y, low, high, width and pressure."""
-    y, low, high, pressure = strips(*part.patch.surface(part.depth), cells, cells, SHAPES[options.shape])
-    width = (part.box[3] - part.box[2]) / cells
-    pressure *= part.load / (pressure.sum(axis=1) @ (high - low) * width / cells)  # full sliding gives mu N exactly
-    return y, low, high, width, pressure
+def _fine(part: PatchPressure, options: Options, cells: int) -> FineNet:
+    """Strips of a patch as ``march`` takes them."""
+    net = strips(part.patch.surface(part.depth), cells, cells, SHAPES[options.shape])
+    carried = net.pressure.sum(axis=1) @ (net.high_x - net.low_x) * net.width / cells
+    net.pressure[:] *= part.load / carried  # full sliding gives mu N exactly
+    return net
 
 
 def _refitted(pressed: NormalContact, tractions: list[Array]) -> list[float]:
@@ -313,17 +314,17 @@ def _refitted(pressed: NormalContact, tractions: list[Array]) -> list[float]:
     """
     options, pair = pressed.options, pressed.pair
     nets = [crude(part.patch, part.depth, options.net, PARABOLIC) for part in pressed.patches]
-    found = []
+    flexibilities = []
     for k, (part, net, traction) in enumerate(zip(pressed.patches, nets, tractions, strict=True)):
         u = tangential(traction, *net.step, pair.nu) / (np.pi * pair.G) + dragged(nets, tractions, k, pair)
         fitted = float(tangential_fit(u, traction, net.cover, *net.step, FITS[options.fit]))
-        found.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)
-    return found
+        flexibilities.append(fitted if fitted > 0.0 else 1.0 / part.stiffness)
+    return flexibilities
 
 
-def _fields(fine: tuple[Any, ...], traction: Array, friction: float) -> Fields:
+def _fields(net: FineNet, traction: Array, friction: float) -> Fields:
     """Pressure and tractions by strip and cell."""
-    y, low, high, width, pressure = fine
+    y, low, high, width, pressure = net
     shape = pressure.shape
     length = ((high - low) / shape[1])[:, None]
     x = high[:, None] - (np.arange(shape[1]) + 0.5) * length

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from models.contact import linear_theory
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fields import Fields, fastsim_fields
 from models.contact.hertz import Hertz
 from models.contact.material import Pair
@@ -115,9 +115,9 @@ class Fastsim(OnEllipse):
 
     def roll(self, motion: Motion, cells: int, *, fields: bool = False) -> Rolled:
         """Forces on ``cells`` cells in each strip."""
-        contact = (self.a, self.b, self.pressing.load, self.friction, *motion, self.pair)
-        creep = fastsim(*contact, cells=cells, **self.choices)
-        inside = (fastsim_fields(*contact, cells=cells, **self.choices),) if fields else ()
+        ellipse = RollingEllipse(self.a, self.b, self.pressing.load, self.friction, *motion)
+        creep = fastsim(ellipse, self.pair, cells=cells, **self.choices)
+        inside = (fastsim_fields(ellipse, self.pair, cells=cells, **self.choices),) if fields else ()
         values = creep.fx, creep.fy, creep.mz, creep.stick, creep.dissipation
         fx, fy, mz, stick, lost = (float(value) for value in values)
         return Rolled(fx, fy, mz, stick, lost, inside)

@@ -23,30 +23,10 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-from numba import carray
 
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
-from models.contact.kernel import (
-    BY_APPROACH,
-    CREEP_X,
-    CREEP_Y,
-    FRICTION,
-    FX,
-    FY,
-    INPUTS,
-    MODULUS,
-    MZ,
-    NORMAL,
-    OUTPUTS,
-    POISSON,
-    PRESSING,
-    SHAPE_X,
-    SHAPE_Y,
-    TURNING,
-    contact,
-    net,
-)
+from models.contact.kernel import BY_APPROACH, INPUT, INPUTS, OUTPUT, OUTPUTS, contact, net
 from models.contact.kernel_simplified import table
 from models.contact.material import Pair
 from models.contact.simplified_theory import press
@@ -54,14 +34,17 @@ from models.contact.undeformed_distance import Distance, quadratic
 from models.core.errors import InputError, Refused
 from models.engines.stability import GROWTH, LONG_RUN, Linear, growth, limit
 from models.machine.compiled import njit
-from models.machine.stack import at, beyond, doubles, start
+from models.machine.records import record, records, size_of
+from models.machine.stack import array, at, beyond, doubles, start
 from models.rail.wheel_forces import REGULAR
 
-X, Y, Z, YAW = range(4)
-FREEDOMS = 4
+FREEDOM = record("x", "y", "z", "yaw")
+"""Coordinates of a wheel, their rates, or forces on them."""
+FREEDOMS = size_of(FREEDOM)
 Theory = Literal["none", "linear", "fastsim", "simplified"]
-WHEELS, SPEED, WEIGHT, SUNK, MU, SHEAR, NU, CURVED_X, CURVED_Y, HEADER = range(10)
+HEAD = record("wheels", "speed", "weight", "sunk", "mu", "G", "nu", "curved_x", "curved_y")
 """Head of the table: count; V (m/s); load (N) and approach (m) at rest; mu; G (Pa); nu; A, B (1/m). Then a net."""
+HEADER = size_of(HEAD)
 
 THEORIES = get_args(Theory)
 WIDE = 0.03
@@ -124,12 +107,18 @@ class Wheels:
     def numbers(self) -> Array:
         """The table that ``forces`` reads: head and net."""
         if self.theory == "simplified":
-            sunk, law = press(self.bodies, self.pair, load=self.load).approach, table(self.bodies, self.cells)
+            law = table(self.bodies, self.cells)
         else:
-            sunk = float(by_load(*self.curvatures, self.load, self.pair).approach)
             law = net(self.cells if self.theory == "fastsim" else 0)
-        head = [self.count, self.speed, self.load, sunk, self.mu, self.pair.G, self.pair.nu, *self.curvatures]
+        head = [self.count, self.speed, self.load, self.sunk, self.mu, self.pair.G, self.pair.nu, *self.curvatures]
         return np.concatenate((head, law))
+
+    @cached_property
+    def sunk(self) -> float:
+        """Approach (m) of a wheel at rest to its rail."""
+        if self.theory == "simplified":
+            return press(self.bodies, self.pair, load=self.load).approach
+        return float(by_load(*self.curvatures, self.load, self.pair).approach)
 
     @cached_property
     def bodies(self) -> Distance:
@@ -155,30 +144,30 @@ def forces(numbers, q, v, f):
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
-    head = carray(numbers, (HEADER,))
-    wheels = int(head[WHEELS])
-    position, rate = carray(q, (FREEDOMS * wheels,)), carray(v, (FREEDOMS * wheels,))
-    force = carray(f, (FREEDOMS * wheels,))
-    given, answer = doubles(INPUTS), doubles(OUTPUTS)
-    own, out = carray(given, (INPUTS,)), carray(answer, (OUTPUTS,))
-    own[SHAPE_X], own[SHAPE_Y], own[FRICTION] = head[CURVED_X], head[CURVED_Y], head[MU]
-    own[MODULUS], own[POISSON] = head[SHEAR], head[NU]
-    speed = max(abs(head[SPEED]), REGULAR)
-    forwards = min(1.0, max(0.0, 0.5 + 0.5 * head[SPEED] / REGULAR))
+    head = records(numbers, 1, HEAD)[0]
+    wheels = int(head.wheels)
+    places, rates, sums = records(q, wheels, FREEDOM), records(v, wheels, FREEDOM), records(f, wheels, FREEDOM)
+    inputs, outputs = doubles(INPUTS), doubles(OUTPUTS)
+    given, answer = records(inputs, 1, INPUT)[0], records(outputs, 1, OUTPUT)[0]
+    given.shape_x, given.shape_y, given.mu = head.curved_x, head.curved_y, head.mu
+    given.G, given.nu = head.G, head.nu
+    speed = max(abs(head.speed), REGULAR)
+    forwards = min(1.0, max(0.0, 0.5 + 0.5 * head.speed / REGULAR))
     for way in (1.0, -1.0):
         share = forwards if way > 0.0 else 1.0 - forwards
         if share == 0.0:
             continue
-        for k in range(0, FREEDOMS * wheels, FREEDOMS):
-            own[PRESSING] = head[SUNK] + position[k + Z]
-            own[CREEP_X] = way * rate[k + X] / speed
-            own[CREEP_Y] = (rate[k + Y] - head[SPEED] * position[k + YAW]) / speed
-            own[TURNING] = way * rate[k + YAW] / speed
-            contact(BY_APPROACH, given, beyond(numbers, HEADER), answer)
-            force[k + X] += share * way * out[FX]
-            force[k + Y] += share * out[FY]
-            force[k + Z] += share * (head[WEIGHT] - out[NORMAL])
-            force[k + YAW] += share * way * out[MZ]
+        for k in range(wheels):
+            place, rate, force = places[k], rates[k], sums[k]
+            given.pressing = head.sunk + place.z
+            given.xi_x = way * rate.x / speed
+            given.xi_y = (rate.y - head.speed * place.yaw) / speed
+            given.spin = way * rate.yaw / speed
+            contact(BY_APPROACH, inputs, beyond(numbers, HEADER), outputs)
+            force.x += share * way * answer.fx
+            force.y += share * answer.fy
+            force.z += share * (head.weight - answer.load)
+            force.yaw += share * way * answer.mz
 
 
 @njit(cache=True, error_model="numpy")
@@ -194,7 +183,7 @@ def set_forces(block, size):
     It holds f, q and v (size,) and the numbers; f is cleared before.
     """
     f = at(block)
-    carray(f, (size,))[:] = 0.0
+    array(f, (size,))[:] = 0.0
     forces(beyond(f, 3 * size), beyond(f, size), beyond(f, 2 * size), f)
 
 

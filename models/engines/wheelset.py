@@ -11,13 +11,13 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
-from models.rail.equations import LEAN, LIMIT, ROLL, YAW, Equations, Y, Z
+from models.rail.equations import LIMIT, ROLL, YAW, Body, Equations, Y, Z
 from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
 
 
-def leaning(weight: float, body: Array) -> Array:
+def leaning(weight: float, body: Body) -> Array:
     """A weight's parts (3,) along the track's axes by its part square to the track, on the track of these numbers."""
-    return weight * np.array([0.0, body[LEAN], 1.0])
+    return weight * np.array([0.0, body.lean, 1.0])
 
 
 class EngineWheelset(Equations, ABC):

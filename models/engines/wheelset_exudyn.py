@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.engines.exudyn_coordinates import accelerations, add_node, compiled_forces, march
 from models.engines.exudyn_system import items, lists
 from models.engines.wheelset import EngineWheelset, leaning
-from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, DZ, KX, KZ, MASS, SUNK
+from models.rail.equations import Body
 from models.rail.joint_forces import JOINTS, set_joint_forces, table
 from models.rail.wheelset import GRAVITY
 
@@ -23,10 +23,10 @@ CHAIN = [KIND.PrismaticY, KIND.PrismaticZ, KIND.RevoluteZ, KIND.RevoluteX, KIND.
 """From the track to the wheelset."""
 
 
-def tree(mbs: Any, node: Any, numbers: Array, body: Array) -> Any:
+def tree(mbs: Any, node: Any, numbers: Array, body: Body) -> Any:
     """The wheelset of ``Equations.body`` on a node of five coordinates; ``numbers`` is the table of the rails."""
     zero, forces = lists.Vector3DList([[0.0, 0.0, 0.0]] * JOINTS), compiled_forces(JOINTS, numbers, set_joint_forces)
-    inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag(body[[ACROSS, ALONG, ACROSS]])]
+    inertias = [np.zeros((3, 3))] * (JOINTS - 1) + [np.diag([body.across, body.along, body.across])]
     return mbs.AddObject(
         items.ObjectKinematicTree(
             nodeNumber=node,
@@ -37,27 +37,25 @@ def tree(mbs: Any, node: Any, numbers: Array, body: Array) -> Any:
             jointOffsets=zero,
             linkInertiasCOM=lists.Matrix3DList(inertias),
             linkCOMs=zero,
-            linkMasses=[0.0] * (JOINTS - 1) + [body[MASS]],
+            linkMasses=[0.0] * (JOINTS - 1) + [body.mass],
             forceUserFunction=lambda mbs, t, item, q, v: forces(q, v),
         )
     )
 
 
-def suspension(mbs: Any, wheelset: Any, body: Array) -> None:
+def suspension(mbs: Any, wheelset: Any, body: Body) -> None:
     """Springs and dampers of both ends along the track's axes, if any, and what the vehicle weighs on them."""
     ground = mbs.AddObject(items.ObjectGround())
-    for arm in (body[ARM], -body[ARM]):
-        frame = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=[0.0, arm, body[SUNK]]))
+    for arm in (body.arm, -body.arm):
+        frame = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=[0.0, arm, body.sunk]))
         end = mbs.AddMarker(
             items.MarkerKinematicTreeRigid(objectNumber=wheelset, linkNumber=JOINTS - 1, localPosition=[0.0, arm, 0.0])
         )
-        if body[KX : DZ + 1].any():
+        if body.held:
             mbs.AddObject(
-                items.CartesianSpringDamper(
-                    markerNumbers=[frame, end], stiffness=body[KX : KZ + 1], damping=body[DX : DZ + 1]
-                )
+                items.CartesianSpringDamper(markerNumbers=[frame, end], stiffness=body.stiffness, damping=body.damping)
             )
-        mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=leaning(body[CARRIED], body)))
+        mbs.AddLoad(items.LoadForceVector(markerNumber=end, loadVector=leaning(body.carried, body)))
 
 
 class ExudynWheelset(EngineWheelset):

@@ -14,7 +14,7 @@ from models.contact.inputs import Array
 from models.engines.contact_bridge_mujoco import Marcher, add_joint, blank, compiled, native_law
 from models.engines.mujoco_callback import installed
 from models.engines.wheelset import EngineWheelset, leaning
-from models.rail.equations import ACROSS, ALONG, ARM, CARRIED, DX, KX, MASS, SUNK
+from models.rail.equations import Body
 from models.rail.joint_forces import joint_forces, table
 from models.rail.wheelset import GRAVITY
 
@@ -28,20 +28,21 @@ JOINTS = (
 """Kind and axis, from the track to the wheelset."""
 
 
-def model(numbers: Array, body: Array) -> mujoco.MjModel:
+def model(numbers: Array, body: Body) -> mujoco.MjModel:
     """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
     spec = blank("rails", numbers, "RK4", leaning(GRAVITY, body))
-    wheelset = spec.worldbody.add_body(mass=body[MASS], inertia=body[[ACROSS, ALONG, ACROSS]], explicitinertial=True)
+    inertia = body.across, body.along, body.across
+    wheelset = spec.worldbody.add_body(mass=body.mass, inertia=inertia, explicitinertial=True)
     for joint in JOINTS:
         add_joint(wheelset, *joint)
-    for name, arm in (("right", body[ARM]), ("left", -body[ARM])):
+    for name, arm in (("right", body.arm), ("left", -body.arm)):
         wheelset.add_site(name=name, pos=[0.0, arm, 0.0])
-        spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body[SUNK]])
-        for i, load in enumerate(leaning(body[CARRIED], body)):
-            if body[KX + i] or body[DX + i] or load:
+        spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body.sunk])
+        for i, load in enumerate(leaning(body.carried, body)):
+            if body.stiffness[i] or body.damping[i] or load:
                 strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=name, refsite=f"{name} frame")
                 strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
-                strut.biasprm[:3] = load, -body[KX + i], -body[DX + i]
+                strut.biasprm[:3] = load, -body.stiffness[i], -body.damping[i]
     return compiled(spec)
 
 

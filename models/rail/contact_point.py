@@ -7,20 +7,32 @@ cylinder's axis, seen along the normal, at the place of contact, which is taken 
 """
 
 import math
+from typing import NamedTuple
 
 from models.machine.compiled import inlined
 
 RIGHT, LEFT = 1.0, -1.0
 
 
+class Cone(NamedTuple):
+    """A wheel and its rail: radius of the wheel and half the distance of both places of contact in the middle of the
+    track (m), tangent of the cone's half angle, radius of the rail's head (m)."""
+
+    radius: float
+    half_gauge: float
+    conicity: float
+    head: float
+
+
 @inlined
-def cone_on_rail(side, y, z, roll, yaw, radius, half_gauge, conicity, head):
+def cone_on_rail(side, pose, cone):
     """Contact of one wheel: (penetration, rolling radius, n_y, n_z, x, y, z).
 
-    side : RIGHT or LEFT; y, z : of the wheelset's centre (m); roll, yaw : rad; radius, half_gauge, head : m.
+    side : RIGHT or LEFT; pose : y, z of the wheelset's centre (m), roll, yaw (rad); cone : ``Cone``.
     The normal (0, n_y, n_z) points into the rail; the place is relative to the wheelset's centre, in the track's axes
     (m). Penetration is negative where there is a gap. Yaw and roll must be less than a right angle less the cone's.
     """
+    (y, z, roll, yaw), (radius, half_gauge, conicity, head) = pose, cone
     cosine = 1.0 / math.sqrt(1.0 + conicity * conicity)
     sine = conicity * cosine
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)

@@ -14,25 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from models.contact.inputs import Array
-from models.rail.equations import (
-    ARM,
-    CARRIED,
-    DX,
-    KX,
-    ROLL,
-    ROLL_RATE,
-    SPIN,
-    SUNK,
-    Y_RATE,
-    YAW,
-    YAW_RATE,
-    Z_RATE,
-    Equations,
-    Path,
-    Y,
-    Z,
-)
-from models.rail.wheel_forces import DAMPING_POWER, ELASTIC_POWER, FX, POWER
+from models.rail.equations import ROLL, ROLL_RATE, SPIN, Y_RATE, YAW, YAW_RATE, Z_RATE, Body, Equations, Path, Y, Z
 from models.rail.wheelset import GRAVITY
 
 
@@ -70,9 +52,10 @@ def ledger(equations: Equations, path: Path) -> Ledger:
 def rates_and_powers(equations: Equations, states: Array) -> tuple[Array, Array]:
     """Rates (n, 10) of states and the powers (n, 5) that the works add up, in the order of the ledger."""
     rates, contacts = equations.at(states)
-    out = -contacts.sum(axis=1)
-    drive, dampers = equations.speed * out[:, FX], _suspension(equations.body, states)[1]
-    return rates, np.column_stack([out[:, ELASTIC_POWER], drive, dampers, out[:, DAMPING_POWER], out[:, POWER]])
+    names = "elastic_power", "fx", "damping_power", "power"
+    elastic, ahead, damping, creep = (-contacts[name].sum(axis=1) for name in names)
+    drive, dampers = equations.speed * ahead, _suspension(equations.body, states)[1]
+    return rates, np.column_stack([elastic, drive, dampers, damping, creep])
 
 
 def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
@@ -81,21 +64,21 @@ def energies(equations: Equations, states: Array) -> tuple[Array, Array, Array]:
     across = states[:, ROLL_RATE] ** 2 + (states[:, YAW_RATE] * np.cos(states[:, ROLL])) ** 2
     moved = states[:, Y_RATE] ** 2 + states[:, Z_RATE] ** 2
     kinetic = 0.5 * (w.mass * moved + w.yaw_inertia * across + w.spin_inertia * states[:, SPIN] ** 2)
-    return kinetic, _suspension(body, states)[0], -(w.mass * GRAVITY + 2.0 * body[CARRIED]) * states[:, Z]
+    return kinetic, _suspension(body, states)[0], -(w.mass * GRAVITY + 2.0 * body.carried) * states[:, Z]
 
 
-def _suspension(body: Array, states: Array) -> tuple[Array, Array]:
+def _suspension(body: Body, states: Array) -> tuple[Array, Array]:
     """Energy of the springs (n,) and power into the dampers (n,)."""
     (cr, sr), (cy, sy) = ((np.cos(states[:, k]), np.sin(states[:, k])) for k in (ROLL, YAW))
     axle = np.array([-sy * cr, cy * cr, sr])
     turning = np.array([cy * states[:, ROLL_RATE], sy * states[:, ROLL_RATE], states[:, YAW_RATE]])
     energy = power = np.zeros(len(states))
-    for arm in (body[ARM], -body[ARM]):
+    for arm in (body.arm, -body.arm):
         way, rate = arm * axle, np.cross(turning, arm * axle, axis=0)
         way[1] += states[:, Y] - arm
-        way[2] += states[:, Z] - body[SUNK]
+        way[2] += states[:, Z] - body.sunk
         rate[1] += states[:, Y_RATE]
         rate[2] += states[:, Z_RATE]
-        energy = energy + 0.5 * body[KX : KX + 3] @ way**2
-        power = power + body[DX : DX + 3] @ rate**2
+        energy = energy + 0.5 * np.array(body.stiffness) @ way**2
+        power = power + np.array(body.damping) @ rate**2
     return energy, power

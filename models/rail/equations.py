@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, root
@@ -30,26 +30,12 @@ from models.core.resolved import check_resolved
 from models.core.steps import divides
 from models.core.trajectory import Trajectory
 from models.machine.compiled import inlined, lean, njit
-from models.rail.wheel_forces import (
-    LAWS,
-    LOAD,
-    REPORTED,
-    Rails,
-    carries,
-    numbers,
-    patches,
-    rails_of,
-    room_for,
-    wheel_forces,
-)
+from models.rail.profile_contact import Pose
+from models.rail.wheel_forces import LAWS, REPORT, Rails, carries, patches, rails_of, room_for, wheel_forces
 from models.rail.wheelset import GRAVITY, Wheelset
 
 STATES = 10
 Y, Z, ROLL, YAW, ANGLE, Y_RATE, Z_RATE, ROLL_RATE, YAW_RATE, SPIN = range(STATES)
-MASS, ALONG, ACROSS, ARM, KX, KY, KZ, DX, DY, DZ, CARRIED, SUNK, LEAN, HELD = range(14)
-"""Numbers of the body and its suspension (SI): inertia along and across the axle, half spacing, springs and dampers of
-one side, weight that each side carries, height at which the springs bear no more than that, lean of the track; 1 where
-there is a spring or a damper, else 0."""
 STIFF, LIMIT_OF_RK4 = 2.5, 2.785
 """Steps times the fastest motion's rate up to which a step is allowed, with a margin, and up to which RK4 is stable."""
 MOVED = np.array([3e-7, 3e-8, 3e-7, 3e-7, 3e-3, 3e-6, 3e-6, 3e-6, 3e-6, 3e-5])
@@ -62,10 +48,40 @@ DEEPEST = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
 
 
+Along = tuple[float, float, float]
+"""Of the track's axes."""
+
+
+class Body(NamedTuple):
+    """The body and its suspension (SI): inertia along and across the axle; half spacing, springs and dampers of one
+    side, weight that each side carries, height at which the springs bear no more than that; lean of the track; whether
+    there is a spring or a damper."""
+
+    mass: float
+    along: float
+    across: float
+    arm: float
+    stiffness: Along
+    damping: Along
+    carried: float
+    sunk: float
+    lean: float
+    held: bool
+
+
+class Stages(NamedTuple):
+    """Arrays of the march: sum of the rates, rates and state of a stage (10,); a report of no rows."""
+
+    total: Array
+    rate: Array
+    here: Array
+    none: Array
+
+
 @njit(cache=True, error_model="numpy")
 def rates(state, speed, body, rails, out, report):
-    """Fill ``out`` with the rates of a state (10,), and ``report`` (patches, REPORTED) with the contacts."""
-    set_rates(state, speed, body, rails, out, report, room_for(rails.numbers))
+    """Fill ``out`` with the rates of a state (10,), and ``report``, REPORT (patches,), with the contacts."""
+    set_rates(state, speed, body, rails, out, report, room_for(rails.profile))
 
 
 @inlined
@@ -74,7 +90,8 @@ def set_rates(state, speed, body, rails, out, report, room):
     y, z, roll, yaw = state[Y], state[Z], state[ROLL], state[YAW]
     roll_rate, yaw_rate, spin = state[ROLL_RATE], state[YAW_RATE], state[SPIN]
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
-    force, moment, velocity, turning = room.vectors[0], room.vectors[1], room.vectors[2], room.vectors[3]
+    wheelset = room.wheelset[0]
+    force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
     for k in range(3):
         force[k] = moment[k] = 0.0
     velocity[0], velocity[1], velocity[2] = speed, state[Y_RATE], state[Z_RATE]
@@ -82,34 +99,35 @@ def set_rates(state, speed, body, rails, out, report, room):
     rolling = spin - yaw_rate * sr  # of the wheel against the axes that do not spin
     turning[0], turning[1] = cy * roll_rate + axle_x * rolling, sy * roll_rate + axle_y * rolling
     turning[2] = yaw_rate + axle_z * rolling
-    wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room)
-    force[1] += 2.0 * body[CARRIED] * body[LEAN]
-    force[2] += 2.0 * body[CARRIED]
-    if body[HELD] > 0.0:
-        _hold(state, body, cy * roll_rate, sy * roll_rate, axle, force, moment)
+    wheel_forces(Pose(y, z, roll, yaw), rails, report, room)
+    force[1] += 2.0 * body.carried * body.lean
+    force[2] += 2.0 * body.carried
+    if body.held:
+        _hold(state, body, (cy * roll_rate, sy * roll_rate), axle, force, moment)
     m1 = cy * moment[0] + sy * moment[1]
     across = cy * moment[1] - sy * moment[0]
     m2, m3 = cr * across + sr * moment[2], cr * moment[2] - sr * across
     out[Y], out[Z], out[ROLL], out[YAW] = state[Y_RATE], state[Z_RATE], roll_rate, yaw_rate
     out[ANGLE] = rolling
-    out[Y_RATE] = force[1] / body[MASS] + GRAVITY * body[LEAN]
-    out[Z_RATE] = force[2] / body[MASS] + GRAVITY
-    whirl = body[ALONG] * spin
-    out[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body[ACROSS] - yaw_rate**2 * sr * cr
-    out[SPIN] = m2 / body[ALONG]
-    out[YAW_RATE] = ((m3 - whirl * roll_rate) / body[ACROSS] + 2.0 * roll_rate * yaw_rate * sr) / cr
+    out[Y_RATE] = force[1] / body.mass + GRAVITY * body.lean
+    out[Z_RATE] = force[2] / body.mass + GRAVITY
+    whirl = body.along * spin
+    out[ROLL_RATE] = (m1 + whirl * yaw_rate * cr) / body.across - yaw_rate**2 * sr * cr
+    out[SPIN] = m2 / body.along
+    out[YAW_RATE] = ((m3 - whirl * roll_rate) / body.across + 2.0 * roll_rate * yaw_rate * sr) / cr
 
 
 @lean
-def _hold(state, body, turn_x, turn_y, axle, force, moment):
-    """Add springs and dampers of both ends; turn_x, turn_y : of the axle's own axes (rad/s)."""
+def _hold(state, body, turning, axle, force, moment):
+    """Add springs and dampers of both ends; turning : of the axle's own axes about x and y (rad/s)."""
+    (turn_x, turn_y), (kx, ky, kz), (dx, dy, dz) = turning, body.stiffness, body.damping
     for side in (1.0, -1.0):
-        arm, turn_z = side * body[ARM], state[YAW_RATE]
+        arm, turn_z = side * body.arm, state[YAW_RATE]
         ax, ay, az = arm * axle[0], arm * axle[1], arm * axle[2]
         vx, vy, vz = turn_y * az - turn_z * ay, turn_z * ax - turn_x * az, turn_x * ay - turn_y * ax
-        fx = -body[KX] * ax - body[DX] * vx
-        fy = -body[KY] * (state[Y] + ay - arm) - body[DY] * (state[Y_RATE] + vy)
-        fz = -body[KZ] * (state[Z] + az - body[SUNK]) - body[DZ] * (state[Z_RATE] + vz)
+        fx = -kx * ax - dx * vx
+        fy = -ky * (state[Y] + ay - arm) - dy * (state[Y_RATE] + vy)
+        fz = -kz * (state[Z] + az - body.sunk) - dz * (state[Z_RATE] + vz)
         force[0] += fx
         force[1] += fy
         force[2] += fz
@@ -119,16 +137,20 @@ def _hold(state, body, turn_x, turn_y, axle, force, moment):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def march(state, speed, body, rails, step, count, every, path, reports):
-    """RK4: ``count`` steps (s) from ``state``, which is moved; every so many steps one goes into path and reports."""
-    room, some, none = room_for(rails.numbers), np.empty((3, STATES)), np.empty((0, REPORTED))
-    return _march(state, speed, body, rails, step, count, every, path, reports, room, some, none)
+def march(state, parameters, steps, path, reports):
+    """RK4 from ``state``, which is moved; how many steps were made.
+
+    parameters : of ``Equations``; steps : of a length (s), how many, and every so many steps one goes into path and
+    reports.
+    """
+    stages = Stages(np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(0, REPORT))
+    return _march(state, parameters, steps, path, reports, room_for(parameters[2].profile), stages)
 
 
 @lean
-def _march(state, speed, body, rails, step, count, every, path, reports, room, some, none):
+def _march(state, parameters, steps, path, reports, room, stages):
     """The same with all arrays made: it counts no references to them, which takes 5 % of a bare wheelset's time."""
-    total, rate, here = some[0], some[1], some[2]
+    (speed, body, rails), (step, count, every), (total, rate, here, none) = parameters, steps, stages
     for i in range(count + 1):
         row = i // every
         for stage in range(4):  # one call of the rates, or it is compiled four times
@@ -154,7 +176,7 @@ def _march(state, speed, body, rails, step, count, every, path, reports, room, s
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Path(Trajectory):
-    """A run, states (n, 10) as above; contacts (n, patches, REPORTED) of ``wheel_forces``, right first."""
+    """A run, states (n, 10) as above; contacts, REPORT (n, patches) of ``wheel_forces``, right first."""
 
     contacts: Array
 
@@ -182,27 +204,27 @@ class Equations:
         number("lean", self.lean, "a slope across the track from -1 to 1", -1.0, 1.0)
 
     @cached_property
-    def body(self) -> Array:
-        """Numbers of the body and its suspension (14,)."""
+    def body(self) -> Body:
+        """The body and its suspension."""
         w = self.wheelset
         carried = (w.load - w.mass * GRAVITY) / 2.0
         sunk = float(w.ellipse.approach) / w.slant[1]
         if w.profiles:  # the height in the middle of the track at which smooth rails carry the load
-            contact = numbers(w)
-            sunk = float(brentq(lambda z: carries(z, contact) - w.load, 0.0, DEEPEST, xtol=1e-15))
-        held = [w.stiffness_x, w.stiffness_y, w.stiffness_z, w.damping_x, w.damping_y, w.damping_z]
-        return np.array(
-            [w.mass, w.spin_inertia, w.yaw_inertia, w.half_spacing, *held, carried, sunk, self.lean, any(held)]
-        )
+            rails = rails_of(w)
+            sunk = float(brentq(lambda z: carries(z, rails) - w.load, 0.0, DEEPEST, xtol=1e-15))
+        stiffness, damping = (w.stiffness_x, w.stiffness_y, w.stiffness_z), (w.damping_x, w.damping_y, w.damping_z)
+        held = any(stiffness + damping)
+        inertia = w.mass, w.spin_inertia, w.yaw_inertia
+        return Body(*inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), held)
 
     @cached_property
-    def parameters(self) -> tuple[float, Array, Rails]:
+    def parameters(self) -> tuple[float, Body, Rails]:
         """What the compiled functions take after the state: speed, body and rails."""
         return float(self.speed), self.body, rails_of(self.wheelset, self.law, self.cells)
 
     def blank(self, *shape: int) -> Array:
-        """Contacts (*shape, patches, REPORTED) that are not known yet."""
-        return np.full((*shape, patches(self.parameters[2].numbers), REPORTED), np.nan)
+        """Contacts, REPORT (*shape, patches), that are not known yet."""
+        return np.full((*shape, patches(self.parameters[2].profile)), np.nan, REPORT)
 
     def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
@@ -211,7 +233,7 @@ class Equations:
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:
-        """Rates (n, 10) by the written equations and contacts (n, patches, REPORTED) at states (n, 10)."""
+        """Rates (n, 10) by the written equations and contacts, REPORT (n, patches), at states (n, 10)."""
         every, contacts = np.empty_like(states), self.blank(len(states))
         for state, rate, contact in zip(states, every, contacts, strict=True):
             rates(state, *self.parameters, rate, contact)
@@ -221,7 +243,7 @@ class Equations:
     def rest(self) -> Array:
         """The steady state (10,) in the middle of the track: height and spin such that nothing accelerates."""
         start = np.zeros(STATES)
-        start[Z], start[SPIN] = self.body[SUNK], -self.speed / self.wheelset.radius
+        start[Z], start[SPIN] = self.body.sunk, -self.speed / self.wheelset.radius
         return self._settled(start, (Z, SPIN), (Z_RATE, SPIN))
 
     def displaced(self, shift: float) -> Array:
@@ -237,7 +259,7 @@ class Equations:
     def _settled(self, start: Array, coordinates: tuple[int, int], accelerations: tuple[int, int]) -> Array:
         """The state with two of its values such that two accelerations vanish."""
         places = list(coordinates)
-        scale = np.maximum(np.abs(start[places]), self.body[SUNK])
+        scale = np.maximum(np.abs(start[places]), self.body.sunk)
 
         def moved(unknown: Array) -> Array:
             state = start.copy()
@@ -276,7 +298,7 @@ class Equations:
         """States and contacts of a path that are kept; ``state`` (10,) is moved."""
         kept = count // every + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
-        done = march(state, *self.parameters, step, count, every, states, contacts)
+        done = march(state, self.parameters, (step, count, every), states, contacts)
         if done < count:
             raise RunFailed("wheelset", "leaves the track", done * step)
         return states, contacts
@@ -291,13 +313,13 @@ class Equations:
 
     def check_loads(self, path: Path, step: float) -> None:
         """Raise RunFailed if the step was too large for a patch that carried more than at rest: all is wrong then."""
-        for k in sorted(set(path.contacts[:, :, LOAD].argmax(axis=0))):
+        for k in sorted(set(path.contacts["load"].argmax(axis=0))):
             rate = float(np.abs(np.linalg.eigvals(slopes(partial(Equations.rates, self), path.states[k]))).max())
             if not step * rate <= LIMIT_OF_RK4:
                 raise RunFailed(
                     self.ENGINE,
                     f"the step of {step:g} s is too large for contacts that carry "
-                    f"{path.contacts[k, :, LOAD].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
+                    f"{path.contacts[k]['load'].max():.3g} N, whose motion has a rate of {rate:.4g} 1/s",
                     path.times[k],
                 )
 

@@ -4,33 +4,58 @@ Joints, from the track to the wheelset: sliding along y and along z, yaw about z
 about the axle. The rate of the last is the wheelset's spin against axes that do not spin: the spin of ``equations`` is
 more by yaw' sin roll. The track moves along x with the speed of travel, so that x is no coordinate.
 
-The compiled functions find all numbers in one table: a head, the contact's numbers, FASTSIM's strips and cells.
+The compiled functions find all numbers in one table.
 """
 
 import math
 
 import numpy as np
-from numba import carray
 
 from models.contact.inputs import Array
-from models.machine.compiled import njit
-from models.machine.stack import at, beyond
-from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
-from models.rail.wheel_forces import REPORTED, Rails, room_for, wheel_forces
+from models.machine.compiled import inlined, njit
+from models.machine.records import record, records, size_of
+from models.machine.stack import array, at, beyond
+from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Body, Y, Z
+from models.rail.profile_contact import KNOT, NODE, PROFILE, LaidProfile, Pose
+from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
 
 JOINTS = 5
-SPEED, LAW, MIDDLE, NUMBERS, STRIPS, CELLS, HEADER = range(7)
-"""Head of the table: speed (m/s), creep law, FASTSIM's middle; count of the numbers, of strips and of cells."""
+HEAD = record("speed", "law", "middle", "nodes", "knots", "strips", "cells")
+"""Head of the table: speed (m/s), creep law, FASTSIM's middle; counts of the wheel's nodes, of the rail's knots, of
+strips and of cells. Then WHEELS, PROFILE, nodes, knots, and FASTSIM's strips and cells."""
+IN_HEAD, IN_WHEELS, IN_PROFILE, IN_NODE, IN_KNOT = (size_of(kind) for kind in (HEAD, WHEELS, PROFILE, NODE, KNOT))
 PER_STRIP, PER_CELL = 4, 5
 """Rows of the strips and of the cells, see ``fastsim_grid``."""
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
-def table(speed: float, body: Array, rails: Rails) -> Array:
+def table(speed: float, body: Body, rails: Rails) -> Array:
     """What the compiled functions read, from ``Equations.parameters``."""
-    numbers, strips, cells = rails.numbers, rails.strips, rails.cells
-    head = [speed, rails.law, rails.middle, numbers.size, strips.shape[1], cells.shape[1]]
-    return np.concatenate((head, numbers, strips.ravel(), cells.ravel()))
+    strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
+    head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
+    parts = (rails.wheels, profile, nodes, knots)
+    return np.concatenate((head, *(part.view(float) for part in parts), strips.ravel(), cells.ravel()))
+
+
+@inlined
+def rails_at(numbers):
+    """``Rails`` that lie in a table at a pointer to doubles."""
+    head = records(numbers, 1, HEAD)[0]
+    nodes, knots, strips, cells = int(head.nodes), int(head.knots), int(head.strips), int(head.cells)
+    wheels = beyond(numbers, IN_HEAD)
+    profile = beyond(wheels, IN_WHEELS)
+    first_node = beyond(profile, IN_PROFILE)
+    first_knot = beyond(first_node, IN_NODE * nodes)
+    first_strip = beyond(first_knot, IN_KNOT * knots)
+    first_cell = beyond(first_strip, PER_STRIP * strips)
+    return Rails(
+        records(wheels, 1, WHEELS),
+        LaidProfile(records(profile, 1, PROFILE), records(first_node, nodes, NODE), records(first_knot, knots, KNOT)),
+        array(first_strip, (PER_STRIP, strips)),
+        array(first_cell, (PER_CELL, cells)),
+        head.middle,
+        int(head.law),
+    )
 
 
 def to_joints(states: Array) -> Array:
@@ -63,25 +88,24 @@ def joint_forces(numbers, q, v, f):
 
     Not a number where the wheelset has left the track: engines do not ask before they go on.
     """
-    head = carray(numbers, (HEADER,))
-    strips, cells = int(head[STRIPS]), int(head[CELLS])
-    first = HEADER + int(head[NUMBERS])
-    contact = carray(beyond(numbers, HEADER), (int(head[NUMBERS]),))
-    net = carray(beyond(numbers, first), (PER_STRIP, strips))
-    along = carray(beyond(numbers, first + PER_STRIP * strips), (PER_CELL, cells))
-    y, z, yaw, roll, _ = carray(q, (JOINTS,))
-    y_rate, z_rate, yaw_rate, roll_rate, spin = carray(v, (JOINTS,))
-    out = carray(f, (JOINTS,))
+    rails, speed = rails_at(numbers), records(numbers, 1, HEAD)[0].speed
+    y, z, yaw, roll, _ = array(q, (JOINTS,))
+    y_rate, z_rate, yaw_rate, roll_rate, spin = array(v, (JOINTS,))
+    out = array(f, (JOINTS,))
     if not abs(y) + abs(z) + abs(yaw) + abs(roll) < LIMIT:
         out[:] = np.nan
         return
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     axle_x, axle_y, axle_z = -sy * cr, cy * cr, sr
-    velocity = np.array([head[SPEED], y_rate, z_rate])
-    turning = np.array([cy * roll_rate + axle_x * spin, sy * roll_rate + axle_y * spin, yaw_rate + axle_z * spin])
-    force, moment, report = np.zeros(3), np.zeros(3), np.empty((0, REPORTED))
-    rails = Rails(contact, net, along, head[MIDDLE], int(head[LAW]))
-    wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room_for(contact))
+    room = room_for(rails.profile)
+    wheelset = room.wheelset[0]
+    force, moment, velocity, turning = wheelset.force, wheelset.moment, wheelset.velocity, wheelset.turning
+    velocity[0], velocity[1], velocity[2] = speed, y_rate, z_rate
+    turning[0], turning[1] = cy * roll_rate + axle_x * spin, sy * roll_rate + axle_y * spin
+    turning[2] = yaw_rate + axle_z * spin
+    for k in range(3):
+        force[k] = moment[k] = 0.0
+    wheel_forces(Pose(y, z, roll, yaw), rails, np.empty(0, REPORT), room)
     out[0] += force[1]
     out[1] += force[2]
     out[2] += moment[2]
@@ -93,5 +117,5 @@ def joint_forces(numbers, q, v, f):
 def set_joint_forces(block):
     """``joint_forces`` in one block of doubles at an address: f, q and v (5,), and the table; f is cleared before."""
     f = at(block)
-    carray(f, (JOINTS,))[:] = 0.0
+    array(f, (JOINTS,))[:] = 0.0
     joint_forces(beyond(f, 3 * JOINTS), beyond(f, JOINTS), beyond(f, 2 * JOINTS), f)

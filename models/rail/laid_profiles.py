@@ -3,6 +3,7 @@
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -16,6 +17,7 @@ from models.contact.wheel_on_rail import Pose, Side, Track, Wheelset, laid, plac
 from models.core.errors import InputError
 from models.core.scene_file import SceneFile
 from models.core.strict import Strict, quantity
+from models.rail.profile_contact import KNOT, NODE, PROFILE, LaidProfile
 
 BUILT_IN = {"wheel": WHEELS, "rail": RAILS}
 SPACING, OF_KNOTS = 1e-4, 2.5e-4
@@ -84,7 +86,7 @@ def _profile(name: str, kind: Kind, smoothing: float) -> Profile:
 
 
 @cache
-def profile_numbers(profiles: Profiles, radius: float) -> Array:
+def laid_profile(profiles: Profiles, radius: float) -> LaidProfile:
     """What ``profile_on_rail`` reads, for wheels of a radius (m) at the taping line."""
     side = profiles.side(radius)
     tip = int(np.argmax(side.wheel.z))
@@ -97,10 +99,20 @@ def profile_numbers(profiles: Profiles, radius: float) -> Array:
     cubic = CubicSpline(knots, side.rail.curve(knots)).c
     rail = np.column_stack([knots, np.vstack([cubic[::-1].T, np.zeros(4)])])
     level = side.clearance(Pose(0.0, 0.0, 0.0, 0.0)) - radius
-    head = [int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]
-    numbers = np.concatenate((head, nodes.ravel(), rail.ravel()))
-    numbers.flags.writeable = False
-    return numbers
+    head = [[int(nodes[:, 3].max()) + 1, len(nodes), len(rail), SPACING, side.wheelset.arm, level]]
+    return LaidProfile(*(_frozen(*pair) for pair in ((head, PROFILE), (nodes, NODE), (rail, KNOT))))
+
+
+def no_profile() -> LaidProfile:
+    """That of a wheelset on cones: without a zone, a node or a knot."""
+    return LaidProfile(np.zeros(1, PROFILE), np.empty(0, NODE), np.empty(0, KNOT))
+
+
+def _frozen(rows: Any, kind: np.dtype) -> Array:
+    """Records (n,) of rows of numbers, not to be changed."""
+    made = np.ascontiguousarray(rows, float).view(kind)[:, 0]
+    made.flags.writeable = False
+    return made
 
 
 def _even(y: Array, z: Array, spacing: float) -> Array:

@@ -22,21 +22,46 @@ hundredth parts (``energy`` adds up what was done on the way).
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from models.contact.hertz import aspect
+from models.contact.inputs import Array
 from models.machine.compiled import lean, njit
+from models.machine.records import record
 
-ZONES, NODES, KNOTS, SPACING, ARM, LEVEL, HEADER = range(7)
-"""Head of a profile's numbers: counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes
-along the contour (m), distance of the taping line from the middle of the axle, height of the axle over the rail's top
-where both wheels just touch in the middle of the track. Then, by node, place from the taping line, radius, slope and
-zone; then, by knot, place from the middle of the track and the four coefficients of the cubic beyond it."""
-OF_NODE, OF_KNOT = 4, 5
-DEPTH, N_Y, N_Z, X_, Y_, Z_, ALONG, ACROSS, TOUCH = range(9)
-"""Columns of a touch: penetration (m), normal into the rail, place from the wheelset's centre in the track's axes (m),
+PROFILE = record("zones", "nodes", "knots", "spacing", "arm", "level")
+"""Counts of zones, of the wheel's nodes and of the rail's knots; distance of the nodes along the contour (m), distance
+of the taping line from the middle of the axle, height of the axle over the rail's top where both wheels just touch in
+the middle of the track."""
+NODE = record("y", "radius", "slope", "zone")
+"""Of the wheel: place from the taping line (m), radius (m), slope and zone."""
+KNOT = record("y", "c0", "c1", "c2", "c3")
+"""Of the rail: place from the middle of the track (m) and the coefficients of the cubic beyond it."""
+TOUCH = record("depth", "n_y", "n_z", "x", "y", "z", "along", "across")
+"""A contact: penetration (m), normal into the rail, place from the wheelset's centre in the track's axes (m),
 curvatures A and B of the undeformed distance along and across (1/m)."""
+_SUMS = record("w2", "w3", "s1", "s2", "n_y", "n_z", "x", "y", "z", "radius")
+
+
+class Pose(NamedTuple):
+    """A wheelset's centre over the middle of the track (m), roll and yaw (rad)."""
+
+    y: float
+    z: float
+    roll: float
+    yaw: float
+
+
+class LaidProfile(NamedTuple):
+    """A wheel's profile and that of its rail: PROFILE (1,), NODE (nodes,), KNOT (knots,)."""
+
+    head: Array
+    nodes: Array
+    knots: Array
+
+
 COARSE = 5
 """Nodes from one to the next that is always looked at."""
 MARGIN = 2e-5
@@ -47,40 +72,40 @@ SWEEPS = 6
 """Times that the patches' shares are found anew; each makes the error of the last some hundred times less."""
 SHARPEST = 500.0
 """Curvature (1/m) of a patch that only one node lies in."""
-W2, W3, S1, S2, NY, NZ, RX, RY, RZ, RADIUS, SUMS = range(11)
 _LEAST = 1e-40
 """m^2: sums of squares of depths far below an atom's are none."""
 
 
 @njit(cache=True, error_model="numpy")
-def profile_on_rail(side, y, z, roll, yaw, p, modulus, touches):
-    """Fill ``touches`` (zones, TOUCH) of the right (side 1) or left (-1) wheel; a depth of 0 or less is no contact.
+def profile_on_rail(side, pose, profile, modulus, touches):
+    """Fill ``touches``, TOUCH (zones,), of the right (side 1) or left (-1) wheel; a depth of 0 or less is no contact.
 
-    y, z : of the wheelset's centre (m), roll, yaw : rad, as in ``models.rail``; p : numbers of the profiles;
-    modulus : E* (Pa).
+    pose : ``Pose``; profile : ``LaidProfile``; modulus : E* (Pa).
     """
-    sums = np.zeros((int(p[ZONES]), SUMS))
-    pose = _pose(side * y, z + p[LEVEL], side * roll, side * yaw)  # the left wheel is the right one in a mirror
+    head = profile.head[0]
+    sums = np.zeros(int(head.zones), _SUMS)
+    y, z, roll, yaw = pose
+    seen = _seen(side * y, z + head.level, side * roll, side * yaw)  # the left wheel is the right one in a mirror
     knot, before = 0, -1.0
-    for j in range(0, int(p[NODES]), COARSE):
-        node = _node(j, pose, p, knot)
+    for j in range(0, int(head.nodes), COARSE):
+        node = _node(j, seen, profile, knot)
         knot = node[-1]
         if max(before, node[0]) > -MARGIN:
             for i in range(max(0, j - COARSE), j):
-                fine = _node(i, pose, p, knot)
+                fine = _node(i, seen, profile, knot)
                 if fine[0] > 0.0:
-                    _add(i, fine, p, sums)
+                    _add(i, fine, profile, sums)
         before = node[0]
     together = 0
     for zone in range(len(sums)):
-        _patch(side, sums[zone], pose, touches[zone])
-        together += touches[zone, DEPTH] > 0.0
+        _patch(side, sums[zone], seen, touches[zone])
+        together += touches[zone].depth > 0.0
     if together > 1:
         settled(touches, modulus)
 
 
 @lean
-def _pose(y, z, roll, yaw):
+def _seen(y, z, roll, yaw):
     """Place, cosines and sines of roll and yaw, and what the nearest point of a circle needs."""
     cr, sr, cy, sy = math.cos(roll), math.sin(roll), math.cos(yaw), math.sin(yaw)
     lead = sr * sy / cy
@@ -89,84 +114,86 @@ def _pose(y, z, roll, yaw):
 
 
 @lean
-def _node(j, pose, p, knot):
+def _node(j, seen, profile, knot):
     """Depth of a node's circle along the rail's normal (m), place x, y, z from the centre, slope of the rail, knot."""
-    y, z, cr, sr, cy, sy, lead, level, steer = pose
-    at, rail = HEADER + OF_NODE * j, HEADER + OF_NODE * int(p[NODES])
-    sine = min(1.0, max(-1.0, -p[at + 2] * steer))
+    y, z, cr, sr, cy, sy, lead, level, steer = seen
+    head, node, knots = profile.head[0], profile.nodes[j], profile.knots
+    sine = min(1.0, max(-1.0, -node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
-    ahead = p[at + 1] * (sine - cosine * lead) * level
-    down = p[at + 1] * (cosine + sine * lead) * level
-    own = p[ARM] + p[at]
-    across = cr * own - sr * down
-    place_x, place_y, place_z = cy * ahead - sy * across, sy * ahead + cy * across, sr * own + cr * down
-    here, last = y + place_y, int(p[KNOTS]) - 1
-    if not p[rail] <= here < p[rail + OF_KNOT * last]:
+    ahead = node.radius * (sine - cosine * lead) * level
+    down = node.radius * (cosine + sine * lead) * level
+    arm = head.arm + node.y
+    across = cr * arm - sr * down
+    place_x, place_y, place_z = cy * ahead - sy * across, sy * ahead + cy * across, sr * arm + cr * down
+    here, last = y + place_y, int(head.knots) - 1
+    if not knots[0].y <= here < knots[last].y:
         return -1.0, place_x, place_y, place_z, 0.0, knot
-    while here < p[rail + OF_KNOT * knot]:
+    while here < knots[knot].y:
         knot -= 1
-    while here >= p[rail + OF_KNOT * (knot + 1)]:
+    while here >= knots[knot + 1].y:
         knot += 1
-    k = rail + OF_KNOT * knot
-    t = here - p[k]
-    over = z + place_z - (p[k + 1] + t * (p[k + 2] + t * (p[k + 3] + t * p[k + 4])))
+    cubic = knots[knot]
+    t = here - cubic.y
+    over = z + place_z - (cubic.c0 + t * (cubic.c1 + t * (cubic.c2 + t * cubic.c3)))
     if over < -FAR:
         return -1.0, place_x, place_y, place_z, 0.0, knot
-    slope = p[k + 2] + t * (2.0 * p[k + 3] + 3.0 * t * p[k + 4])
+    slope = cubic.c1 + t * (2.0 * cubic.c2 + 3.0 * t * cubic.c3)
     return over / math.sqrt(1.0 + slope * slope), place_x, place_y, place_z, slope, knot
 
 
 @lean
-def _add(j, node, p, sums):
+def _add(j, at, profile, sums):
     """Add a node in contact to the sums of its zone, or of the two that pass into each other there."""
-    depth, place_x, place_y, place_z, slope, _ = node
-    at, length, upright = HEADER + OF_NODE * j, j * p[SPACING], 1.0 / math.sqrt(1.0 + slope * slope)
-    zone = int(p[at + 3])
-    share = p[at + 3] - zone
+    depth, place_x, place_y, place_z, slope, _ = at
+    node, length, upright = profile.nodes[j], j * profile.head[0].spacing, 1.0 / math.sqrt(1.0 + slope * slope)
+    zone = int(node.zone)
+    share = node.zone - zone
     for part in range(2):
         weight = (share if part == 1 else 1.0 - share) * depth**2
         if weight > 0.0:
             to = sums[zone + part]
-            to[W2] += weight
-            to[W3] += weight * depth
-            to[S1] += weight * length
-            to[S2] += weight * length * length
-            to[NY] -= weight * slope * upright
-            to[NZ] += weight * upright
-            to[RX] += weight * place_x
-            to[RY] += weight * place_y
-            to[RZ] += weight * place_z
-            to[RADIUS] += weight * p[at + 1]
+            to.w2 += weight
+            to.w3 += weight * depth
+            to.s1 += weight * length
+            to.s2 += weight * length * length
+            to.n_y -= weight * slope * upright
+            to.n_z += weight * upright
+            to.x += weight * place_x
+            to.y += weight * place_y
+            to.z += weight * place_z
+            to.radius += weight * node.radius
 
 
 @lean
-def _patch(side, sums, pose, touch):
+def _patch(side, sums, seen, touch):
     """One touch from its zone's sums."""
-    touch[:] = 0.0
-    whole = sums[W2]
+    touch.depth = touch.n_y = touch.n_z = touch.x = touch.y = touch.z = touch.along = touch.across = 0.0
+    whole = sums.w2
     if whole <= _LEAST:
         return
-    middle, size = sums[S1] / whole, math.hypot(sums[NY], sums[NZ])
-    depth, n_y, n_z = 3.5 / 3.0 * sums[W3] / whole, sums[NY] / size, sums[NZ] / size
-    spread = max(0.0, 7.0 * (sums[S2] / whole - middle * middle))
-    touch[DEPTH], touch[N_Y], touch[N_Z] = depth, side * n_y, n_z
-    touch[X_], touch[Y_], touch[Z_] = sums[RX] / whole, side * sums[RY] / whole, sums[RZ] / whole
-    _, _, cr, sr, cy = pose[:5]
-    touch[ALONG] = 0.5 * (n_z * cr - n_y * cy * sr) * whole / sums[RADIUS]
-    touch[ACROSS] = depth / (spread + depth / SHARPEST)
+    middle, size = sums.s1 / whole, math.hypot(sums.n_y, sums.n_z)
+    depth, n_y, n_z = 3.5 / 3.0 * sums.w3 / whole, sums.n_y / size, sums.n_z / size
+    spread = max(0.0, 7.0 * (sums.s2 / whole - middle * middle))
+    touch.depth, touch.n_y, touch.n_z = depth, side * n_y, n_z
+    touch.x, touch.y, touch.z = sums.x / whole, side * sums.y / whole, sums.z / whole
+    _, _, cr, sr, cy = seen[:5]
+    touch.along = 0.5 * (n_z * cr - n_y * cy * sr) * whole / sums.radius
+    touch.across = depth / (spread + depth / SHARPEST)
 
 
 @njit(cache=True, error_model="numpy")
 def settled(touches, modulus):
-    """Reduce the depths of one wheel's touches (zones, TOUCH) by what each presses down under the others.
+    """Reduce the depths of one wheel's touches, TOUCH (zones,), by what each presses down under the others.
 
     modulus : E* (Pa). A load N presses a half-space down by N / (pi E* r) at a distance r, to which the mean square
     lengths of both patches are added.
     """
     n = len(touches)
-    own, load, axis = touches[:, DEPTH].copy(), np.zeros(n), np.empty(n)
+    alone, load, axis = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        load[i], axis[i] = pressed(own[i], touches[i, ALONG], touches[i, ACROSS], modulus)[:2]
+        touch = touches[i]
+        alone[i] = touch.depth
+        load[i], axis[i] = pressed(touch.depth, touch.along, touch.across, modulus)[:2]
     stiff = load.copy()
     for _ in range(SWEEPS):
         for i in range(n):
@@ -174,15 +201,16 @@ def settled(touches, modulus):
             for j in range(n):
                 if j != i and load[j] > 0.0:
                     down += load[j] * _alike(touches[i], touches[j], axis[i] ** 2 + axis[j] ** 2)
-            touches[i, DEPTH] = own[i] - down / (math.pi * modulus)
-            load[i] = stiff[i] * (max(0.0, touches[i, DEPTH]) / own[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
+            depth = alone[i] - down / (math.pi * modulus)
+            touches[i].depth = depth
+            load[i] = stiff[i] * (max(0.0, depth) / alone[i]) ** 1.5 if stiff[i] > 0.0 else 0.0
 
 
 @lean
-def _alike(one, other, squares):
+def _alike(first, second, squares):
     """Cosine between the normals of two touches by their distance (1/m)."""
-    apart = (one[X_] - other[X_]) ** 2 + (one[Y_] - other[Y_]) ** 2 + (one[Z_] - other[Z_]) ** 2
-    return (one[N_Y] * other[N_Y] + one[N_Z] * other[N_Z]) / math.sqrt(apart + squares / 5.0)
+    apart = (first.x - second.x) ** 2 + (first.y - second.y) ** 2 + (first.z - second.z) ** 2
+    return (first.n_y * second.n_y + first.n_z * second.n_z) / math.sqrt(apart + squares / 5.0)
 
 
 @lean

@@ -8,8 +8,8 @@ from scipy.optimize import root
 
 from models.contact.inputs import Array, quantity
 from models.core.errors import InputError, RunFailed
-from models.rail.profile_contact import ACROSS, ALONG, DEPTH, N_Z, TOUCH, X_, Z_, pressed
-from models.rail.wheel_forces import MODULUS, contact_points, numbers, patches
+from models.rail.profile_contact import TOUCH, Pose, pressed
+from models.rail.wheel_forces import contact_points, patches, rails_of
 from models.rail.wheelset import Wheelset
 
 SCALE = 1e-5
@@ -22,7 +22,7 @@ SHIFTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """z (m) and roll (rad) of the wheelset; touches (patches, TOUCH), loads (patches,) in N, right wheel first."""
+    """z (m) and roll (rad) of the wheelset; touches, TOUCH (patches,), loads (patches,) in N, right wheel first."""
 
     z: float
     roll: float
@@ -32,7 +32,7 @@ class Held:
     def radii(self) -> Array:
         """Rolling radius (2,) of the right and the left wheel, the mean of its patches by their loads (m)."""
         axle = np.array([0.0, np.cos(self.roll), np.sin(self.roll)])
-        places = self.touches[:, X_ : Z_ + 1]
+        places = np.column_stack([self.touches[name] for name in "xyz"])
         radius = np.linalg.norm(places - np.outer(places @ axle, axle), axis=1)
         weighed, loads = (radius * self.loads).reshape(2, -1).sum(axis=1), self.loads.reshape(2, -1).sum(axis=1)
         return weighed / loads
@@ -45,19 +45,20 @@ def held(wheelset: Wheelset, shift: float) -> Held:
     """
     if wheelset.profiles is None:
         raise InputError("", "wheelset", None, "has cones: this needs profiles")
-    contact, half = numbers(wheelset), 0.5 * wheelset.load
+    rails, half = rails_of(wheelset), 0.5 * wheelset.load
     z, roll = wheelset.profiles.touching(wheelset.radius, shift)
 
     def pose(unknown: Array) -> Held:
-        touches = np.zeros((patches(contact), TOUCH))
+        touches = np.zeros(patches(rails.profile), TOUCH)
         here = (z + unknown[0] * SCALE, roll + unknown[1] * SCALE)
-        contact_points(shift, *here, 0.0, contact, touches)
-        loads = np.array([pressed(*touch[[DEPTH, ALONG, ACROSS]], contact[MODULUS])[0] for touch in touches])
+        contact_points(Pose(shift, *here, 0.0), rails, touches)
+        modulus = rails.wheels["modulus"][0]
+        loads = np.array([pressed(touch.depth, touch.along, touch.across, modulus)[0] for touch in touches])
         return Held(*here, touches, loads)
 
     def off(unknown: Array) -> Array:
         now = pose(unknown)
-        return (now.loads * now.touches[:, N_Z]).reshape(2, -1).sum(axis=1) / half - 1.0
+        return (now.loads * now.touches["n_z"]).reshape(2, -1).sum(axis=1) / half - 1.0
 
     solved = root(off, [5.0, 0.0], tol=1e-14)
     if np.abs(solved.fun).max() > PRECISION:

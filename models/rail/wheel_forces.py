@@ -24,60 +24,68 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import grid, strips_of
-from models.contact.fastsim_many import SPIN, XI_X, forces
+from models.contact.fastsim_many import forces
+from models.contact.fastsim_records import CONTACT, FORCES, cells_in, strips_in
 from models.contact.inputs import Array
 from models.contact.linear_theory import coefficient_at, flexibilities_at
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean, njit
-from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
-from models.rail.laid_profiles import profile_numbers
-from models.rail.profile_contact import ACROSS, ALONG, N_Y, N_Z, TOUCH, X_, Y_, Z_, ZONES, pressed, profile_on_rail
-from models.rail.profile_contact import DEPTH as DEEP
+from models.machine.records import record
+from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
+from models.rail.laid_profiles import laid_profile, no_profile
+from models.rail.profile_contact import TOUCH, LaidProfile, Pose, pressed, profile_on_rail
 from models.rail.wheelset import Wheelset
 
 REGULAR = 0.1
 """Speed (m/s) below which creepage is no longer relative to the speed of travel."""
 LINEAR, FASTSIM = 0, 1
 LAWS = {"linear": LINEAR, "fastsim": FASTSIM}
-RADIUS, HALF_GAUGE, CONICITY, HEAD, MODULUS, SHEAR, POISSON, FRICTION, DAMPING, CLEARANCE, FLANGE, NUMBERS = range(12)
-"""Numbers of the contact, as ``numbers`` gives them (SI): modulus is E*, flange its spring's stiffness; then those of
-the profiles, if the wheelset has some."""
-(
-    LOAD,
-    FX,
-    FY,
-    MZ,
-    XI_1,
-    XI_2,
-    XI_3,
-    A,
-    B,
-    DEPTH,
-    POWER,
-    ANGLE,
-    PLACE_X,
-    PLACE_Y,
-    PLACE_Z,
-    FLANGE_FORCE,
-    ELASTIC_POWER,
-    DAMPING_POWER,
-    REPORTED,
-) = range(19)
-"""Columns of what a patch reports: normal force, creep forces and moment on the wheel in its own axes, creepages and
-spin, semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the
-wheelset's centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and
-flange and of the contact's damping (W)."""
-VX, ASIDE, TURN, RATE, VY, ELASTIC, PUSH, PATCH, MOVED = range(9)
-"""Columns of a patch's motion: slip along, across (m/s) and about the normal (1/s); speed of approach and velocity
-across the track (m/s), elastic normal force (N), lateral force of a cone's flange (N), number of the patch."""
+LEAST_CELLS, MOST_CELLS = 3, 200
+WHEELS = record(
+    "radius", "half_gauge", "conicity", "head", "modulus", "shear", "nu", "friction", "damping", "clearance", "flange"
+)
+"""Numbers of the contact (SI): those of ``Cone``; modulus is E*, shear is G, flange its spring's stiffness."""
+REPORT = record(
+    "load",
+    "fx",
+    "fy",
+    "mz",
+    "xi_x",
+    "xi_y",
+    "spin",
+    "a",
+    "b",
+    "depth",
+    "power",
+    "angle",
+    "x",
+    "y",
+    "z",
+    "flange_force",
+    "elastic_power",
+    "damping_power",
+)
+"""What a patch reports: normal force, creep forces and moment on the wheel in its own axes, creepages and spin,
+semi-axes, penetration, power of the creep forces (W), angle of the rail's surface (rad), place from the wheelset's
+centre in the track's axes (m), lateral force of a cone's flange (N), powers of the elastic normal force and flange and
+of the contact's damping (W)."""
+MOTION = record("vx", "vy", "aside", "turn", "rate", "elastic", "push", "patch")
+"""Motion of a patch in contact: that of ``Motion``, elastic normal force (N), lateral force of a cone's flange (N),
+number of the patch."""
+WHEELSET = np.dtype(
+    (np.record, np.dtype([(name, np.float64, (3,)) for name in ("velocity", "turning", "force", "moment")], align=True))
+)
+"""Of the wheelset in the track's axes: velocity of its centre, the speed of travel included (m/s); angular velocity,
+spin about the axle included (rad/s); force (N) and moment about the centre (N m) on it."""
 BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
 
 
 class Rails(NamedTuple):
-    """What wheels roll on, and by which law: ``numbers`` of the contact; strips, cells and middle of FASTSIM's ``net``;
-    law : LINEAR or FASTSIM."""
+    """What wheels roll on, and by which law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's net
+    (``Grid``); law : LINEAR or FASTSIM."""
 
-    numbers: Array
+    wheels: Array
+    profile: LaidProfile
     strips: Array
     cells: Array
     middle: float
@@ -87,11 +95,11 @@ class Rails(NamedTuple):
 class Room(NamedTuple):
     """Arrays that are written over in every call: to make one costs as much as a wheel's kinematics.
 
-    vectors (4, 3): of ``equations.set_rates``; of ``wheel_forces``: touches (patches, TOUCH), and of those in contact,
-    first to last, contacts (patches, 10), motion (patches, MOVED), creep forces found (patches, 4) and other ones.
+    wheelset : WHEELSET (1,); touches : TOUCH (patches,); of those in contact, first to last, contacts : CONTACT,
+    motion : MOTION, creep forces found and other ones : FORCES.
     """
 
-    vectors: Array
+    wheelset: Array
     touches: Array
     contacts: Array
     motion: Array
@@ -132,73 +140,70 @@ class Pressed(NamedTuple):
     push: float
 
 
-def numbers(wheelset: Wheelset) -> Array:
-    """The contact's numbers, in the order above: (11,), or more for profiles."""
-    w, pair = wheelset, wheelset.pair
-    shape = [w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu]
-    forces = [w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness]
-    return np.concatenate((shape, forces, profile_numbers(w.profiles, w.radius) if w.profiles else []))
-
-
-def rails_of(wheelset: Wheelset, law: str, cells: int) -> Rails:
+def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) -> Rails:
     """The rails under a wheelset, with FASTSIM's net for its ellipse at rest (see ``fastsim_grid``)."""
-    if isinstance(cells, bool) or not isinstance(cells, int) or not 3 <= cells <= 200:
-        raise InputError("", "cells", cells, "must be a whole number from 3 to 200")
-    ellipse = wheelset.ellipse
+    if isinstance(cells, bool) or not isinstance(cells, int) or not LEAST_CELLS <= cells <= MOST_CELLS:
+        raise InputError("", "cells", cells, f"must be a whole number from {LEAST_CELLS} to {MOST_CELLS}")
+    w, pair, ellipse = wheelset, wheelset.pair, wheelset.ellipse
+    shape = w.radius, w.half_gauge, w.conicity, w.head_radius, pair.modulus, pair.G, pair.nu
+    wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
+    profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
     net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
-    return Rails(numbers(wheelset), net.strips, net.cells, net.middle, LAWS[law])
+    own = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
+    return Rails(wheels, own, net.strips, net.cells, net.middle, LAWS[law])
 
 
 @lean
-def patches(p):
+def patches(profile):
     """How many contacts both wheels together can have: one each of cones, one for each zone of profiles."""
-    return 2 if p.size == NUMBERS else 2 * int(p[NUMBERS + ZONES])
+    return 2 if profile.nodes.size == 0 else 2 * int(profile.head[0].zones)
 
 
 @njit(cache=True, error_model="numpy")
-def room_for(p):
-    """``Room`` for the contacts of these numbers."""
-    n = patches(p)
+def room_for(profile):
+    """``Room`` for the contacts of a wheelset on these profiles."""
+    n = patches(profile)
     return Room(
-        np.empty((4, 3)),
-        np.empty((n, TOUCH)),
-        np.empty((n, 10)),
-        np.empty((n, MOVED)),
-        np.empty((n, 4)),
-        np.empty((n, 4)),
+        np.empty(1, WHEELSET),
+        np.empty(n, TOUCH),
+        np.empty(n, CONTACT),
+        np.empty(n, MOTION),
+        np.empty(n, FORCES),
+        np.empty(n, FORCES),
     )
 
 
 @inlined
-def contact_points(y, z, roll, yaw, p, touches):
-    """Fill ``touches`` (patches, TOUCH), the right wheel's first; without a normal where nothing is near."""
-    each = len(touches) // 2
+def contact_points(pose, rails, touches):
+    """Fill ``touches``, TOUCH (patches,), the right wheel's first; without a normal where nothing is near."""
+    each, wheels = len(touches) // 2, rails.wheels[0]
     for k in range(2):
-        side, wheel = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
-        if p.size > NUMBERS:
-            profile_on_rail(side, y, z, roll, yaw, p[NUMBERS:], p[MODULUS], wheel)
+        side, own = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
+        if rails.profile.nodes.size > 0:
+            profile_on_rail(side, pose, rails.profile, wheels.modulus, own)
             continue
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(
-            side, y, z, roll, yaw, p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]
-        )
-        touch = wheel[0]
-        touch[DEEP], touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_] = depth, n_y, n_z, cx, cy, cz
-        touch[ALONG], touch[ACROSS] = _along(rolling, p[CONICITY]), 0.5 / p[HEAD]
+        cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
+        touch = own[0]
+        touch.depth, touch.n_y, touch.n_z, touch.x, touch.y, touch.z = depth, n_y, n_z, cx, cy, cz
+        touch.along, touch.across = _along(rolling, wheels.conicity), 0.5 / wheels.head
 
 
 @njit(cache=True, error_model="numpy")
-def carries(z, p):
+def carries(z, rails):
     """Vertical part (N) of the elastic normal forces with the wheelset's centre at a height z (m) over the middle."""
-    touches, whole = np.zeros((patches(p), TOUCH)), 0.0
-    contact_points(0.0, z, 0.0, 0.0, p, touches)
-    for touch in touches:
-        whole += touch[N_Z] * pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])[0]
+    touches, whole = np.zeros(patches(rails.profile), TOUCH), 0.0
+    contact_points(Pose(0.0, z, 0.0, 0.0), rails, touches)
+    for k in range(len(touches)):
+        touch = touches[k]
+        whole += touch.n_z * pressed(touch.depth, touch.along, touch.across, rails.wheels[0].modulus)[0]
     return whole
 
 
 @inlined
-def _linear(a, b, x, y, spin, shear, poisson):
-    """Creep forces and moment of one patch by Kalker's coefficients."""
+def _linear(a, b, motion, shear, poisson):
+    """Creep forces and moment of one patch by Kalker's coefficients, at creepages and spin ``motion``."""
+    x, y, spin = motion
     if a <= 0.0:
         a, b, x, y, spin = 1.0, 1.0, 0.0, 0.0, 0.0
     area, ratio = a * b, a / b
@@ -211,110 +216,109 @@ def _linear(a, b, x, y, spin, shear, poisson):
 @inlined
 def _one_way(sign, contacts, slip, speed, rails, found):
     """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
+    by = max(abs(speed), REGULAR)
     for k in range(len(contacts)):
-        contacts[k, XI_X] = sign * slip[k, VX] / max(abs(speed), REGULAR)
-        contacts[k, XI_X + 1] = slip[k, ASIDE] / max(abs(speed), REGULAR)
-        contacts[k, SPIN] = sign * slip[k, TURN] / max(abs(speed), REGULAR)
+        contact = contacts[k]
+        contact.xi_x, contact.xi_y = sign * slip[k].vx / by, slip[k].aside / by
+        contact.spin = sign * slip[k].turn / by
     if rails.law == FASTSIM:
-        forces(contacts, rails.strips, rails.cells, rails.middle, BLEND, ORDER, found)
+        forces(contacts, strips_in(rails.strips), cells_in(rails.cells, rails.middle), BLEND, ORDER, found)
     else:
-        shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
+        shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
         for k in range(len(contacts)):
-            a, b, x, y, spin = (
-                contacts[k, 0],
-                contacts[k, 1],
-                contacts[k, XI_X],
-                contacts[k, XI_X + 1],
-                contacts[k, SPIN],
-            )
-            found[k, 0], found[k, 1], found[k, 2] = _linear(a, b, x, y, spin, shear, poisson)
+            c, force = contacts[k], found[k]
+            force.fx, force.fy, force.mz = _linear(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
 
 
 @lean
-def _both_ways(forwards, contacts, slip, speed, rails, some, found):
-    """Fill fx, fy, mz of wheels that roll forwards by a share, with ``some`` as room."""
-    found[:] = 0.0
+def _both_ways(forwards, contacts, slip, speed, rails, room):
+    """Fill fx, fy, mz, found of the room, of wheels that roll forwards by a share."""
+    for k in range(len(contacts)):
+        room.found[k].fx = room.found[k].fy = room.found[k].mz = 0.0
+    other = room.other[: len(contacts)]
     for sign in (1.0, -1.0):
         share = forwards if sign > 0.0 else 1.0 - forwards
         if share > 0.0:
-            _one_way(sign, contacts, slip, speed, rails, some)
+            _one_way(sign, contacts, slip, speed, rails, other)
             for k in range(len(contacts)):
-                found[k, 0] += share * sign * some[k, 0]
-                found[k, 1] += share * some[k, 1]
-                found[k, 2] += share * sign * some[k, 2]
+                room.found[k].fx += share * sign * other[k].fx
+                room.found[k].fy += share * other[k].fy
+                room.found[k].mz += share * sign * other[k].mz
 
 
 @inlined
-def creep(contacts, slip, speed, rails, some, found):
-    """Fill fx, fy, mz of contacts (n, 10) from their slip, the first columns of their motion (n, MOVED).
+def creep(contacts, slip, speed, rails, room):
+    """Fill fx, fy, mz, found of the room, of contacts (CONTACT) from their slip (MOTION).
 
-    The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image. ``some``,
-    of the shape of ``found`` (n, 4), is written over.
+    The creepages are written into the contacts; for a wheel that rolls backwards those of its mirror image.
     """
     if rails.law == FASTSIM:
-        shear, poisson = rails.numbers[SHEAR], rails.numbers[POISSON]
-        for contact in contacts:
-            contact[7], contact[8], contact[9] = flexibilities_at(contact[0], contact[1], shear, poisson)
+        shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
+        for k in range(len(contacts)):
+            c = contacts[k]
+            c.l1, c.l2, c.l3 = flexibilities_at(c.a, c.b, shear, poisson)
     if speed >= REGULAR:
-        _one_way(1.0, contacts, slip, speed, rails, found)
+        _one_way(1.0, contacts, slip, speed, rails, room.found[: len(contacts)])
     else:
-        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, some, found)
+        _both_ways(max(0.0, 0.5 + 0.5 * speed / REGULAR), contacts, slip, speed, rails, room)
 
 
 @inlined
-def wheel_forces(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room):
-    """Add what both rails do to the wheelset to ``force`` and ``moment`` (3,), about its centre, in the track's axes.
+def wheel_forces(pose, rails, report, room):
+    """Add what both rails do to the wheelset to its force and moment.
 
-    y, z : of the wheelset's centre (m), roll, yaw : rad; velocity (3,) : of the centre in the track, the speed of
-    travel first (m/s); turning (3,) : angular velocity, spin about the axle included, in the track's axes (rad/s);
-    report (patches, REPORTED) is filled, or has no rows where nobody asks; room : written over.
+    pose : ``Pose``; report : REPORT (patches,), filled, or of no rows where nobody asks; room : ``Room``, its wheelset
+    given in, all else written over.
     """
-    if rails.law == LINEAR and rails.numbers.size == NUMBERS and velocity[0] >= REGULAR:
-        _linear_cones(y, z, roll, yaw, velocity, turning, rails.numbers, force, moment, report)
+    if rails.law == LINEAR and rails.profile.nodes.size == 0 and room.wheelset[0].velocity[0] >= REGULAR:
+        _linear_cones(pose, rails.wheels[0], room.wheelset[0], report)
     else:
-        patch_by_patch(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room)
+        patch_by_patch(pose, rails, report, room)
 
 
 @inlined
-def _linear_cones(y, z, roll, yaw, velocity, turning, p, force, moment, report):
+def _linear_cones(pose, wheels, wheelset, report):
     """``patch_by_patch`` of cones with the linear law, rolling forwards: nothing is written down in between."""
-    speed, radius, gauge, cone, head = velocity[0], p[RADIUS], p[HALF_GAUGE], p[CONICITY], p[HEAD]  # read once
-    modulus, shear, poisson, damping = p[MODULUS], p[SHEAR], p[POISSON], p[DAMPING]
+    cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)  # read once, as what follows
+    speed, modulus, shear, poisson = wheelset.velocity[0], wheels.modulus, wheels.shear, wheels.nu
+    damping, velocity, turning = wheels.damping, wheelset.velocity, wheelset.turning
     for side in (RIGHT, LEFT):
-        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, y, z, roll, yaw, radius, gauge, cone, head)
+        depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
         place = Place(n_y, n_z, cx, cy, cz)
         motion = _moving(place, velocity, turning)
-        elastic, a, b = pressed(depth, _along(rolling, cone), 0.5 / head, modulus)
-        creeping = _linear(a, b, motion.vx / speed, motion.aside / speed, motion.turn / speed, shear, poisson)
+        elastic, a, b = pressed(depth, _along(rolling, cone.conicity), 0.5 / cone.head, modulus)
+        slip = motion.vx / speed, motion.aside / speed, motion.turn / speed
+        creeping = _linear(a, b, slip, shear, poisson)
         load = elastic * max(0.0, 1.0 + damping * motion.rate)
-        press = Pressed(depth, a, b, elastic, load, _flange(side, y, p))
-        _act(place, press, creeping, force, moment)
+        press = Pressed(depth, a, b, elastic, load, _flange(side, pose.y, wheels))
+        _act(place, press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
             _tell(place, motion, press, creeping, speed, report[0 if side == RIGHT else 1])
 
 
 @lean
-def patch_by_patch(y, z, roll, yaw, velocity, turning, rails, force, moment, report, room):
+def patch_by_patch(pose, rails, report, room):
     """``wheel_forces`` of all patches, laws and directions."""
-    touches, contacts, motions, n, some = room.touches, room.contacts, room.motion, len(room.touches), 0
-    p = rails.numbers
-    contact_points(y, z, roll, yaw, p, touches)
+    touches, wheels, wheelset, n, count = room.touches, rails.wheels[0], room.wheelset[0], len(room.touches), 0
+    velocity, on_cones = wheelset.velocity, rails.profile.nodes.size == 0
+    contact_points(pose, rails, touches)
     for k in range(n):
-        if touches[k, N_Z] != 0.0 or touches[k, N_Y] != 0.0:
-            push = _flange(RIGHT if 2 * k < n else LEFT, y, p) if p.size == NUMBERS else 0.0
-            _press(touches[k], velocity, turning, p, push, contacts[some], motions[some])
-            motions[some, PATCH], some = k, some + 1
-    creep(contacts[:some], motions[:some], velocity[0], rails, room.other[:some], room.found[:some])
-    report[:] = 0.0
-    for i in range(some):
-        k, contact, m = int(motions[i, PATCH]), contacts[i], motions[i]
-        place, depth = _place(touches[k]), touches[k, DEEP]
-        press = Pressed(depth, contact[0], contact[1], m[ELASTIC], contact[2], m[PUSH])
-        creeping = room.found[i, 0], room.found[i, 1], room.found[i, 2]
-        _act(place, press, creeping, force, moment)
+        if touches[k].n_z != 0.0 or touches[k].n_y != 0.0:
+            push = _flange(RIGHT if 2 * k < n else LEFT, pose.y, wheels) if on_cones else 0.0
+            _press(touches[k], wheelset, wheels, push, room.contacts[count], room.motion[count])
+            room.motion[count].patch, count = k, count + 1
+    creep(room.contacts[:count], room.motion[:count], velocity[0], rails, room)
+    for k in range(len(report)):
+        _blank(report[k])
+    for i in range(count):
+        contact, m, answer = room.contacts[i], room.motion[i], room.found[i]
+        touch = touches[int(m.patch)]
+        press = Pressed(touch.depth, contact.a, contact.b, m.elastic, contact.load, m.push)
+        creeping = answer.fx, answer.fy, answer.mz
+        _act(_place(touch), press, creeping, wheelset.force, wheelset.moment)
         if len(report) > 0:
-            motion = Motion(m[VX], m[VY], m[ASIDE], m[TURN], m[RATE])
-            _tell(place, motion, press, creeping, velocity[0], report[k])
+            motion = Motion(m.vx, m.vy, m.aside, m.turn, m.rate)
+            _tell(_place(touch), motion, press, creeping, velocity[0], report[int(m.patch)])
 
 
 @inlined
@@ -324,15 +328,15 @@ def _along(rolling, conicity):
 
 
 @inlined
-def _flange(side, y, p):
+def _flange(side, y, wheels):
     """Lateral force (N) of a cone's flange."""
-    return -side * p[FLANGE] * max(0.0, side * y - p[CLEARANCE])
+    return -side * wheels.flange * max(0.0, side * y - wheels.clearance)
 
 
 @inlined
 def _place(touch):
-    """``Place`` of a touch (TOUCH,)."""
-    return Place(touch[N_Y], touch[N_Z], touch[X_], touch[Y_], touch[Z_])
+    """``Place`` of a touch."""
+    return Place(touch.n_y, touch.n_z, touch.x, touch.y, touch.z)
 
 
 @inlined
@@ -346,14 +350,14 @@ def _moving(place, velocity, turning):
 
 
 @inlined
-def _press(touch, velocity, turning, p, push, contact, motion):
-    """Kinematics and normal force of one patch: its contact (10,) for the creep law, its motion (MOVED,)."""
-    moving = _moving(_place(touch), velocity, turning)
-    elastic, a, b = pressed(touch[DEEP], touch[ALONG], touch[ACROSS], p[MODULUS])
-    motion[VX], motion[VY], motion[ASIDE], motion[TURN], motion[RATE] = moving
-    motion[ELASTIC], motion[PUSH] = elastic, push
-    contact[0], contact[1], contact[3] = a, b, p[FRICTION]
-    contact[2] = elastic * max(0.0, 1.0 + p[DAMPING] * moving.rate)
+def _press(touch, wheelset, wheels, push, contact, motion):
+    """Kinematics and normal force of one patch: its contact for the creep law, its motion."""
+    moving = _moving(_place(touch), wheelset.velocity, wheelset.turning)
+    elastic, a, b = pressed(touch.depth, touch.along, touch.across, wheels.modulus)
+    motion.vx, motion.vy, motion.aside, motion.turn, motion.rate = moving
+    motion.elastic, motion.push = elastic, push
+    contact.a, contact.b, contact.mu = a, b, wheels.friction
+    contact.load = elastic * max(0.0, 1.0 + wheels.damping * moving.rate)
 
 
 @inlined
@@ -371,16 +375,24 @@ def _act(place, press, creeping, force, moment):
 
 
 @lean
+def _blank(report):
+    """Zeros for a patch that touches nothing."""
+    report.load = report.fx = report.fy = report.mz = report.xi_x = report.xi_y = report.spin = 0.0
+    report.a = report.b = report.depth = report.power = report.angle = report.x = report.y = report.z = 0.0
+    report.flange_force = report.elastic_power = report.damping_power = 0.0
+
+
+@lean
 def _tell(place, motion, press, creeping, speed, report):
     """Fill one patch's report."""
     fx, fy, mz = creeping
     vx, vy, aside, turn, rate = motion
-    report[LOAD], report[FX], report[FY], report[MZ] = press.load, fx, fy, mz
+    report.load, report.fx, report.fy, report.mz = press.load, fx, fy, mz
     by = max(abs(speed), REGULAR)
-    report[XI_1], report[XI_2], report[XI_3] = vx / by, aside / by, turn / by
-    report[A], report[B], report[DEPTH] = press.a, press.b, press.depth
-    report[ANGLE] = math.atan2(-place.n_y, place.n_z)
-    report[POWER] = fx * vx + fy * aside + mz * turn
-    report[PLACE_X], report[PLACE_Y], report[PLACE_Z], report[FLANGE_FORCE] = place.x, place.y, place.z, press.push
-    report[ELASTIC_POWER] = press.push * vy - press.elastic * rate
-    report[DAMPING_POWER] = (press.elastic - press.load) * rate
+    report.xi_x, report.xi_y, report.spin = vx / by, aside / by, turn / by
+    report.a, report.b, report.depth = press.a, press.b, press.depth
+    report.angle = math.atan2(-place.n_y, place.n_z)
+    report.power = fx * vx + fy * aside + mz * turn
+    report.x, report.y, report.z, report.flange_force = place.x, place.y, place.z, press.push
+    report.elastic_power = press.push * vy - press.elastic * rate
+    report.damping_power = (press.elastic - press.load) * rate

@@ -18,16 +18,20 @@ import numpy as np
 
 from models.contact.fastsim import KINDS, MARCHES
 from models.contact.fastsim_grid import Grid, grid, strips_of
-from models.contact.fastsim_many import LOAD, MU, PER_SLIP, ROOM, SPIN, XI_X, XI_Y, A, B, forces, forces_within
+from models.contact.fastsim_many import forces, forces_within
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.core.errors import InputError
 from models.machine.compiled import lean
-from models.machine.stack import array, doubles
+from models.machine.records import records, stacked
+from models.machine.stack import start
 
 SLOW = 0.1
 """Speed (m/s) of the tread below which slip is relative to it."""
 THREE, ORDER = KINDS["three"], MARCHES["second-order"]
 FIRST = 7
 """Place of the first flexibility among a contact's numbers."""
+UNIT = {"a": 1.0, "b": 1.0, "load": 1.0, "mu": 1e9, "xi_y": 1.0, "l1": 1.0, "l2": 1.0, "l3": 1.0}
+"""A contact that sticks all over and whose side force is C."""
 
 
 @cache
@@ -40,10 +44,11 @@ def net(cells: int) -> Grid:
 
 def shape_factor(cells: int) -> float:
     """C / (a^2 b k) as the net sums it up, nearly 8/3."""
-    of, found = net(cells), np.empty((1, 4))
-    contact = np.array([[1.0, 1.0, 1.0, 1e9, 0.0, 1.0, 0.0, 1.0, 1.0, 1.0]])
-    forces(contact, of.strips, of.cells, of.middle, THREE, ORDER, found)
-    return -float(found[0, 1])
+    contacts, answers = np.zeros(1, CONTACT), np.empty(1, FORCES)
+    for name, value in UNIT.items():
+        contacts[name] = value
+    forces(contacts, *net(cells).records, THREE, ORDER, answers)
+    return -float(answers["fy"][0])
 
 
 @lean
@@ -51,38 +56,41 @@ def tyre_forces(contacts, slides, strips, cells, middle, found):
     """Fill ``found`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning. No array is made.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
-    (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s).
+    (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s);
+    strips, cells, middle : the patch's net as ``Grid`` holds it.
     """
     w = len(contacts)
-    slips, lanes, slowest = array(doubles(PER_SLIP * w), (w, PER_SLIP)), array(doubles(ROOM), (ROOM,)), SLOW
+    patches, answers = records(start(contacts), w, CONTACT), records(start(found), w, FORCES)
+    lines, along = strips_in(strips), cells_in(cells, middle)
+    room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), SLOW
     for i in range(w):
         slowest = min(slowest, slides[i, 3])
-    _creepages(1.0, contacts, slides)
-    forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, found)
+    _creepages(1.0, patches, slides)
+    forces_within(patches, lines, along, THREE, ORDER, room, answers)
     if slowest < SLOW:
-        some = array(doubles(4 * w), (w, 4))
-        _creepages(-1.0, contacts, slides)
-        forces_within(contacts, strips, cells, middle, THREE, ORDER, slips, lanes, some)
-        _mix(slides, some, found)
+        backwards = stacked(w, FORCES)
+        _creepages(-1.0, patches, slides)
+        forces_within(patches, lines, along, THREE, ORDER, room, backwards)
+        _mix(slides, backwards, answers)
 
 
 @lean
-def _creepages(sign, contacts, slides):
+def _creepages(sign, patches, slides):
     """Of tyres that roll forwards (sign 1) or backwards (-1)."""
-    for i in range(len(contacts)):
-        speed = max(abs(slides[i, 3]), SLOW)
-        contacts[i, XI_X], contacts[i, XI_Y] = sign * slides[i, 0] / speed, slides[i, 1] / speed
-        contacts[i, SPIN] = sign * slides[i, 2] / speed
+    for i in range(len(patches)):
+        patch, speed = patches[i], max(abs(slides[i, 3]), SLOW)
+        patch.xi_x, patch.xi_y = sign * slides[i, 0] / speed, slides[i, 1] / speed
+        patch.spin = sign * slides[i, 2] / speed
 
 
 @lean
-def _mix(slides, backwards, found):
+def _mix(slides, backwards, answers):
     """Forces of rolling forwards with their share, and those of rolling backwards, seen from ahead, with theirs."""
-    for i in range(len(found)):
-        share = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / SLOW))
-        found[i, 0] = share * found[i, 0] - (1.0 - share) * backwards[i, 0]
-        found[i, 1] = share * found[i, 1] + (1.0 - share) * backwards[i, 1]
-        found[i, 2] = share * found[i, 2] - (1.0 - share) * backwards[i, 2]
+    for i in range(len(answers)):
+        share, answer, behind = min(1.0, max(0.0, 0.5 + 0.5 * slides[i, 3] / SLOW)), answers[i], backwards[i]
+        answer.fx = share * answer.fx - (1.0 - share) * behind.fx
+        answer.fy = share * answer.fy + (1.0 - share) * behind.fy
+        answer.mz = share * answer.mz - (1.0 - share) * behind.mz
 
 
 def brush(
@@ -94,7 +102,8 @@ def brush(
     """
     slides = np.atleast_2d(np.asarray(slides, float))
     contacts, found, of = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
-    contacts[:, [A, B, LOAD, MU]] = half_length, half_width, load, mu
-    contacts[:, FIRST:] = 1.0 / stiffness
+    patches = contacts.view(CONTACT)
+    patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu
+    patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / stiffness
     tyre_forces(contacts, slides, of.strips, of.cells, of.middle, found)
     return found[:, :3]

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from models.core.discretisation import not_estimated
-from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
+from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
 from models.rail.equations import ROLL, YAW, Path, Y, Z
 from models.rail.joint_forces import JOINTS, to_joints
-from models.rail.wheel_forces import ANGLE, FX, FY, LOAD
+from models.rail.profile_contact import Pose
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import started
 from models.systems.wheelset.run import run as simulate
@@ -72,15 +72,13 @@ def arrows(w: Wheelset, path: Path) -> tuple[Arrow, ...]:
     """Normal force and creep force on the wheels where they touch, of the contacts of a path."""
     every = []
     for k, (name, side) in enumerate(SIDES.items()):
-        cone = [
-            cone_on_rail(side, *state[[Y, Z, ROLL, YAW]], w.radius, w.half_gauge, w.conicity, w.head_radius)
-            for state in path.states
-        ]
-        points = np.array(cone)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
+        cone = Cone(w.radius, w.half_gauge, w.conicity, w.head_radius)
+        touched = [cone_on_rail(side, Pose(*state[[Y, Z, ROLL, YAW]].tolist()), cone) for state in path.states]
+        points = np.array(touched)[:, -3:] + path.states[:, [Y, Z]] @ np.eye(3)[1:]  # in the track's axes
         contact = path.contacts[:, k]
-        sine, cosine, none = np.sin(contact[:, ANGLE]), np.cos(contact[:, ANGLE]), 0.0 * contact[:, ANGLE]
-        normal = contact[:, LOAD, None] * np.stack([none, sine, -cosine], 1)
-        creep = np.stack([contact[:, FX], contact[:, FY] * cosine, contact[:, FY] * sine], 1)
+        sine, cosine, none = np.sin(contact["angle"]), np.cos(contact["angle"]), 0.0 * contact["angle"]
+        normal = contact["load"][:, None] * np.stack([none, sine, -cosine], 1)
+        creep = np.stack([contact["fx"], contact["fy"] * cosine, contact["fy"] * sine], 1)
         every += [
             Arrow(f"{kind}, {name}", kind, "wheelset", points, force)
             for kind, force in zip(KINDS, (normal, creep), strict=True)

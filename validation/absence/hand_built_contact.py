@@ -26,15 +26,20 @@ CALLS = 200
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def forces(axis, load, friction, creep_x, creep_y, flexible_x, flexible_y, strips, bound):
-    """fx, fy (N) of a contact of two equal semi-axes (m); strips (2, n): half length by the axis, share of the load;
-    bound (cells,): traction that a cell may bear by that in the strip's middle."""
-    cells, count, fx, fy = bound.size, strips.shape[1], 0.0, 0.0
+def forces(contact, creep, flexible, halves, shares, bound):
+    """fx, fy (N) of a contact of two equal semi-axes.
+
+    contact : semi-axis (m), load (N), coefficient of friction; creep, flexible : creepages and flexibilities (m^3/N)
+    along and across; halves, shares (n,) : half length of a strip by the axis, share of the load; bound (cells,) :
+    traction that a cell may bear by that in the strip's middle
+    """
+    axis, load, friction = contact
+    cells, count, fx, fy = bound.size, halves.size, 0.0, 0.0
     for k in range(count):
-        half, share = strips[0, k], strips[1, k]
+        half, share = halves[k], shares[k]
         middle = friction * load * share / half * cells * count / (4.0 * axis * axis)
         step = 2.0 * axis * half / cells / middle
-        u, v, x, y, sum_x, sum_y = step * creep_x / flexible_x, step * creep_y / flexible_y, 0.0, 0.0, 0.0, 0.0
+        u, v, x, y, sum_x, sum_y = step * creep[0] / flexible[0], step * creep[1] / flexible[1], 0.0, 0.0, 0.0, 0.0
         for i in range(cells):
             x, y = x - u, y - v
             size = math.sqrt(x * x + y * y)
@@ -48,20 +53,20 @@ def forces(axis, load, friction, creep_x, creep_y, flexible_x, flexible_y, strip
 def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
     """The product's call and the written one, CALLS times: fx, fy (N)."""
     pair = Pair()
-    own = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
-    flexible = [float(value) for value in flexibilities(AXIS, AXIS, pair)]
-    net = grid(CELLS, own.net.strips.shape[1], "intermediate")
-    strips, bound = net.strips[[1, 3]].copy(), net.cells[1].copy()
+    product = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
+    flexible = tuple(float(value) for value in flexibilities(AXIS, AXIS, pair))[:2]
+    contact = AXIS, LOAD, FRICTION
+    strips, cells = grid(CELLS, product.net.strips.shape[1], "intermediate").records
 
     def ours() -> Array:
         for _ in range(CALLS):
-            found = own(AXIS, LOAD, FRICTION, *CREEP, 0.0)
-        return np.array(found[:2])
+            rolled = product(AXIS, LOAD, FRICTION, *CREEP, 0.0)
+        return np.array(rolled[:2])
 
     def theirs() -> Array:
         for _ in range(CALLS):
-            found = forces(AXIS, LOAD, FRICTION, *CREEP, flexible[0], flexible[1], strips, bound)
-        return np.array(found)
+            written = forces(contact, CREEP, flexible, strips.half, strips.part, cells.bound)
+        return np.array(written)
 
     return ours, theirs
 

@@ -14,11 +14,13 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from models.contact.fastsim_many import PER_SLIP, ROOM, forces_within
+from models.contact.fastsim_many import forces_within
+from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
 from models.engines.contact_bridge_mujoco import native_law
 from models.engines.mujoco_callback import installed
 from models.engines.mujoco_tree import principal
 from models.machine.compiled import lean
+from models.machine.records import records, size_of, stacked
 from models.machine.stack import array, beyond, doubles, row
 from models.multibody.numbers import Handling
 from models.multibody.tree import cross, dot, plus, three, times
@@ -26,8 +28,9 @@ from models.tyre.bristles import ORDER, THREE, net, shape_factor
 from models.vehicles.free_vehicle import SPECK
 
 SIZE, CELLS = 23, 21
-HEAD, WHEEL, MOUNT, SEAT, CONTACT = 14, 18, 15, 6, 10
+HEAD, WHEEL, MOUNT, SEAT = 14, 18, 15, 6
 """Numbers in the table that ``numbers_of`` writes."""
+TOUCH = size_of(CONTACT)
 
 
 @lean
@@ -42,7 +45,7 @@ def law(numbers, q, v, f):
     z = s_pitch, -s_roll * c_pitch, c_roll * c_pitch
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, ahead, aside = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
-    contacts, slips, found = doubles(4 * CONTACT), doubles(4 * PER_SLIP), doubles(16)
+    contacts, found = doubles(4 * TOUCH), stacked(4, FORCES)
     places, pushes = doubles(12), doubles(12)
     moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
     for i in range(4):
@@ -59,32 +62,30 @@ def law(numbers, q, v, f):
                 9 + 3 * i,
                 row(places, 3, i),
                 row(pushes, 3, i),
-                row(contacts, CONTACT, i),
+                row(contacts, TOUCH, i),
             ),
         )
     _bar(head[6], head[7], head[8], 0, places, pushes, q, f)
     _bar(head[9], head[10], head[11], 2, places, pushes, q, f)
     forces_within(
-        array(contacts, (4, CONTACT)),
-        array(beyond(cells, 5 * CELLS), (4, int(head[12]))),
-        array(cells, (5, CELLS)),
-        head[13],
+        records(contacts, 4, CONTACT),
+        strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
+        cells_in(array(cells, (5, CELLS)), head[13]),
         THREE,
         ORDER,
-        array(slips, (4, PER_SLIP)),
-        array(doubles(ROOM), (ROOM,)),
-        array(found, (4, 4)),
+        Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
+        found,
     )
     along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
-        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), row(found, 4, i), 9 + 3 * i
-        force, radius = (push[0] + creep[0], push[1] + creep[1], push[2]), q[3] + place[2]
+        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), found[i], 9 + 3 * i
+        force, radius = (push[0] + creep.fx, push[1] + creep.fy, push[2]), q[3] + place[2]
         f[k] += dot(x, force)
         f[k + 1] += dot(z, force)
-        f[k + 2] -= radius * creep[0]
-        moment = plus(moment, plus(cross(three(place, 0), force), (radius * creep[1], -radius * creep[0], creep[2])))
-        along, across, lift = along + creep[0], across + creep[1], lift + row(contacts, CONTACT, i)[2]
-        turn += (head[0] + place[0]) * creep[1] - place[1] * creep[0] + creep[2]
+        f[k + 2] -= radius * creep.fx
+        moment = plus(moment, plus(cross(three(place, 0), force), (radius * creep.fy, -radius * creep.fx, creep.mz)))
+        along, across, lift = along + creep.fx, across + creep.fy, lift + row(contacts, TOUCH, i)[2]
+        turn += (head[0] + place[0]) * creep.fy - place[1] * creep.fx + creep.mz
     middle = times(z, head[2])
     speed = ahead + turning[1] * middle[2] - turning[2] * middle[1] - v[2] * middle[1]
     drag = -head[1] * abs(speed) * speed

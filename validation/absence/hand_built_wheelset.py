@@ -1,7 +1,7 @@
 """A free wheelset on cones written out for that alone: Kalker's linear creep forces and Hertz' load, nothing else.
 
 No suspension, flange, contact damping, profiles or FASTSIM, and no way to have them; the equations are those in the
-head of ``models.rail.equations``, and what it tells of its contacts are the columns of ``models.rail.wheel_forces``.
+head of ``models.rail.equations``, and what it tells of its contacts is the REPORT of ``models.rail.wheel_forces``.
 Where cones touch rails, Hertz' theory and Kalker's coefficients are the contact's.
 """
 
@@ -12,11 +12,13 @@ import numpy as np
 
 from models.contact.linear_theory import coefficient_at
 from models.machine.compiled import lean, njit
-from models.rail.contact_point import LEFT, RIGHT, cone_on_rail
-from models.rail.profile_contact import pressed
-from models.rail.wheel_forces import numbers
+from models.machine.records import size_of
+from models.rail.contact_point import LEFT, RIGHT, Cone, cone_on_rail
+from models.rail.profile_contact import Pose, pressed
+from models.rail.wheel_forces import REPORT, rails_of
 
-STATES, COLUMNS = 10, 18
+STATES = 10
+SIZE = size_of(REPORT)
 
 
 @lean
@@ -24,15 +26,16 @@ def rates(state, speed, p, told, out, report):
     """Rates (10,) of y, z, roll, yaw, angle of spin and of their rates; report (2, 18) of the contacts, if it is told;
     p: mass, inertias along and across, weight of each side, radius, half gauge, conicity, head radius, modulus, shear
     modulus, Poisson's ratio."""
-    mass, along, across, carried, radius, gauge, cone, head, modulus, shear, poisson = p
+    mass, along, across, carried, radius, gauge, conicity, head, modulus, shear, poisson = p
+    cone = Cone(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     own = spin - yaw_rate * sr
     wx, wy, wz = cy * roll_rate - sy * cr * own, sy * roll_rate + cy * cr * own, yaw_rate + sr * own
     fy = fz = mx = my = mz = 0.0
     for side in (RIGHT, LEFT):
-        depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, y, z, roll, yaw, radius, gauge, cone, head)
-        load, a, b = pressed(depth, 0.5 / (rolling * np.sqrt(1.0 + cone * cone)), 0.5 / head, modulus)
+        depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, Pose(y, z, roll, yaw), cone)
+        load, a, b = pressed(depth, 0.5 / (rolling * np.sqrt(1.0 + conicity * conicity)), 0.5 / head, modulus)
         vx, vy, vz = speed + wy * pz - wz * py, y_rate + wz * px - wx * pz, z_rate + wx * py - wy * px
         slip, turning = n_z * vy - n_y * vz, wy * n_y + wz * n_z
         xi_x, xi_y, xi_spin, ahead, aside, moment = vx / speed, slip / speed, turning / speed, 0.0, 0.0, 0.0
@@ -71,7 +74,7 @@ def rates(state, speed, p, told, out, report):
                 -load * (n_y * vy + n_z * vz),
                 0.0,
             )
-            for k in range(COLUMNS):
+            for k in range(SIZE):
                 report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
@@ -100,14 +103,14 @@ def march(state, speed, step, p, path, reports):
 
 
 def run(wheelset: Any, state: np.ndarray, speed: float, step: float, steps: int) -> Callable[[], Any]:
-    """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts
-    (steps + 1, 2, 18)."""
+    """One run of a free wheelset (``models.rail.wheelset``) that gives its states (steps + 1, 10) and its contacts,
+    REPORT (steps + 1, 2)."""
     w = wheelset
-    p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *numbers(w)[:7].tolist())
+    p = (w.mass, w.spin_inertia, w.yaw_inertia, (w.load - w.mass * 9.81) / 2.0, *rails_of(w).wheels[0].tolist()[:7])
 
     def marched() -> tuple[np.ndarray, np.ndarray]:
-        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, COLUMNS))
+        path, reports = np.empty((steps + 1, STATES)), np.empty((steps + 1, 2, SIZE))
         march(state, speed, step, p, path, reports)
-        return path, reports
+        return path, reports.view(REPORT)[..., 0]
 
     return marched

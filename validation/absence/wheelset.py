@@ -39,13 +39,13 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
 
     equations = equations_of(scene, engine, SPEED)
     _, body, rails = equations.parameters
-    profiles = rails.numbers.size > forces.NUMBERS  # they have flanges of their own
+    wheels, profiles = rails.wheels[0], rails.profile.nodes.size > 0  # profiles have flanges of their own
     counts = {
-        "springs": int((body[eq.KX : eq.KZ + 1] > 0.0).sum()),
-        "dampers": int((body[eq.DX : eq.DZ + 1] > 0.0).sum()),
+        "springs": sum(stiffness > 0.0 for stiffness in body.stiffness),
+        "dampers": sum(damping > 0.0 for damping in body.damping),
         "creep nets": int(rails.law == forces.FASTSIM),
-        "flanges": int(rails.numbers[forces.FLANGE] > 0.0 and not profiles),
-        "contact damping": int(rails.numbers[forces.DAMPING] > 0.0),
+        "flanges": int(wheels.flange > 0.0 and not profiles),
+        "contact damping": int(wheels.damping > 0.0),
         "profiles": int(profiles),
     }
     if engine != "reference":

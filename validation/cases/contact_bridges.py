@@ -10,12 +10,12 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
 from models.contact.inputs import Array
 from models.contact.patches import separate
 from models.contact.simplified_theory import press, roll
-from models.engines.contact_bridge import FREEDOMS, SUNK, YAW, Theory, Wheels, X, Y, Z, add_forces, forces
+from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
 from models.engines.mujoco_callback import installed
@@ -210,16 +210,17 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:
         pressed: Any
         creep: Any
-        for k in range(0, wheels.size, FREEDOMS):
-            approach, mu, speed = numbers[SUNK] + q[k + Z], wheels.mu, wheels.speed
-            slip = v[k + X] / speed, v[k + Y] / speed - q[k + YAW], v[k + YAW] / speed
+        for k, (place, rate) in enumerate(zip(q.view(FREEDOM), v.view(FREEDOM), strict=True)):
+            approach, mu, speed = wheels.sunk + place["z"], wheels.mu, wheels.speed
+            slip = rate["x"] / speed, rate["y"] / speed - place["yaw"], rate["yaw"] / speed
             if bodies is not None:
                 pressed = press(bodies, wheels.pair, approach=approach)
                 creep = roll(pressed, mu, *slip, cells=wheels.cells)
             else:
                 pressed = by_approach(*wheels.curvatures, approach, wheels.pair)
-                creep = fastsim(pressed.a, pressed.b, pressed.load, mu, *slip, wheels.pair, cells=wheels.cells)
-            f[k : k + FREEDOMS] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
+                ellipse = RollingEllipse(pressed.a, pressed.b, pressed.load, mu, *slip)
+                creep = fastsim(ellipse, wheels.pair, cells=wheels.cells)
+            f[FREEDOMS * k : FREEDOMS * (k + 1)] += creep.fx, creep.fy, wheels.load - pressed.load, creep.mz
 
     return add
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.patches import Patch, separate
 from models.contact.simplified_theory import PAPER, PLAIN, NormalContact, Options, load_at_depth, press, roll
@@ -160,7 +160,7 @@ def _times() -> dict[str, list[float]]:
     distance, creepage = quadratic(CURVATURE, 1.5 * CURVATURE, 2.5 * a, 2.5 * b), (1e-3, 5e-4, 0.3)
     contact, (patch,) = press(distance, PAIR, load=1e5), separate(distance)
     jobs: dict[str, Callable[[], Any]] = {
-        "1982": lambda: fastsim(a, b, 1e5, FRICTION, *creepage, PAIR, cells=45),
+        "1982": lambda: fastsim(RollingEllipse(a, b, 1e5, FRICTION, *creepage), PAIR, cells=45),
         "roll": lambda: roll(contact, FRICTION, *creepage),
         "press": lambda: press(distance, PAIR, load=1e5),
         "depth": lambda: load_at_depth(patch, 5e-5, PAIR),

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import ellipe
 
 from models.contact.fastsim import KINDS as KINDS_OF_FLEXIBILITY
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.fastsim_grid import POWERS
 from models.contact.inputs import Array
@@ -96,7 +96,7 @@ def creepages(kinds: tuple[str, ...], levels: tuple[float, ...]) -> Contacts:
 
 def _vector(columns: Contacts, **options: Any) -> Array:
     """Forces (n, 2) by mu N."""
-    answers = fastsim(**columns, pair=PAIR, **options)
+    answers = fastsim(RollingEllipse(**columns), PAIR, **options)
     return np.stack([answers.fx, answers.fy], axis=1) / (FRICTION * LOAD)
 
 
@@ -179,7 +179,7 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
 def _limits() -> list[Row]:
     """Small creepages against the linear theory, and the direction of full sliding."""
     columns = creepages(("x", "y", "spin"), (1e-6,))
-    answers = fastsim(**columns, pair=PAIR)
+    answers = fastsim(RollingEllipse(**columns), PAIR)
     linear = np.stack(
         linear_forces(columns["a"], columns["b"], columns["xi_x"], columns["xi_y"], columns["spin"], PAIR)
     )
@@ -189,7 +189,7 @@ def _limits() -> list[Row]:
     turn = np.random.default_rng((SEED, 999)).uniform(-np.pi, np.pi, len(sliding["a"]))
     most = np.hypot(sliding["xi_x"], sliding["xi_y"])
     sliding["xi_x"], sliding["xi_y"] = most * np.cos(turn), most * np.sin(turn)
-    slid = fastsim(**sliding, pair=PAIR)
+    slid = fastsim(RollingEllipse(**sliding), PAIR)
     slides = slid.stick == 0.0
     off = np.abs(np.angle(-(slid.fx + 1j * slid.fy) * np.exp(-1j * turn), deg=True))[slides].max()
     short = np.abs(np.hypot(slid.fx, slid.fy) / (FRICTION * LOAD) - 1.0)[slides].max()
@@ -222,7 +222,8 @@ def _spun() -> list[Row]:
     most = FRICTION * LOAD * 0.375 * longer * ellipe(1.0 - (shorter / longer) ** 2)
     rows = []
     for bound in POWERS:
-        spun = fastsim(a=a, b=b, load=LOAD, mu=FRICTION, xi_x=0.0, xi_y=0.0, spin=1e5, pair=PAIR, bound=bound)
+        ellipse = RollingEllipse(a=a, b=b, load=LOAD, mu=FRICTION, xi_x=0.0, xi_y=0.0, spin=1e5)
+        spun = fastsim(ellipse, PAIR, bound=bound)
         beyond = float(np.max(np.abs(spun.mz) / most - 1.0))
         what = f"moment of sliding about the centre beyond that of Hertz's pressure, {bound} bound, a/b 0.1 to 10"
         name = f"fastsim.spun.{bound}"
@@ -244,7 +245,7 @@ def _derivatives() -> list[Row]:
     """Analytic derivatives against central differences of the forces."""
     columns = creepages(tuple(KINDS), LEVELS)
     scale = {"xi_x": 1e-3, "xi_y": 1e-3, "spin": 1e-3 / MEAN_AXIS, "load": LOAD}
-    known, off = derivatives(**columns, pair=PAIR), []
+    known, off = derivatives(RollingEllipse(**columns), PAIR), []
     for k, (name, unit) in enumerate(scale.items()):
         ends = [_moved(columns, name, sign * 1e-6 * unit) for sign in (1.0, -1.0)]
         off.append(np.abs((ends[0] - ends[1]) / 2e-6 - known.slopes[..., k] * unit) / UNITS)
@@ -270,7 +271,7 @@ def _moved(columns: Contacts, name: str, step: float) -> Array:
     if name == "load":
         grown = np.cbrt(moved["load"] / columns["load"])
         moved |= {"a": columns["a"] * grown, "b": columns["b"] * grown}
-    creep = fastsim(**moved, pair=PAIR)
+    creep = fastsim(RollingEllipse(**moved), PAIR)
     return np.stack([creep.fx, creep.fy, creep.mz], axis=1)
 
 

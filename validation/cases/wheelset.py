@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from models.rail import equations as eq
-from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.energy import ledger
 from models.rail.equations import Equations
@@ -176,7 +175,7 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
         for engine in IMPLEMENTATIONS:
             equations = implementation(engine)(*setup)
             paths[engine] = equations.run(equations.displaced(4e-3), DURATION, step)
-            power = paths[engine].contacts[:, :, wf.POWER]
+            power = paths[engine].contacts["power"]
             positive, steps = positive + int((power > 0.0).sum()), steps + power.size
         for first, second in pairs:
             gap = float(np.abs(paths[first].states - paths[second].states).max())

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from models.contact.accuracy import KNOTS, band, moment_band, spin_share, used_with_moment
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_axes
 from models.contact.inputs import Array
 from models.contact.theories import Simplified
@@ -74,8 +74,9 @@ def forces(name: str, cases: list[Case], cells: int) -> Array:
     moved, nus = np.empty((len(cases), 3)), np.array([case.pair.nu for case in cases])
     for nu in np.unique(nus):
         rows = np.flatnonzero(nus == nu)
-        contacts = (*axes[:, rows], LOAD, FRICTION, *motions[:, rows], cases[rows[0]].pair)
-        creep = fastsim(*contacts, cells=cells, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
+        (a, b), (x, y, spin), pair = axes[:, rows], motions[:, rows], cases[rows[0]].pair
+        ellipses = RollingEllipse(a, b, LOAD, FRICTION, x, y, spin)
+        creep = fastsim(ellipses, pair, cells=cells, bound=bound, flexibilities=kind)  # type: ignore[arg-type]
         moved[rows] = np.stack([creep.fx, creep.fy, creep.mz], axis=1)
     return moved / unit
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Ellipse, fastsim
+from models.contact.fastsim import Ellipse, RollingEllipse, fastsim
 from models.contact.fastsim_grid import grid
-from models.contact.fastsim_kernels import LANES, ROWS, march_plain, march_second_order
+from models.contact.fastsim_kernels import march_plain, march_second_order
+from models.contact.fastsim_records import BLOCK, LANES
 from models.contact.material import Pair
 from models.machine.compiled import compiled
 from models.machine.timing import median, paired_ratio, spelled
@@ -25,29 +26,21 @@ WHY = "median of interleaved rounds, seconds of the processor"
 def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], list[list[str]]]:
     """Rows for a call and for a cell, and a table (what, time, by the bound)."""
     draw = np.random.default_rng(5)
-    lanes = _zeros(ROWS * LANES)
-    lanes[: 3 * LANES] = draw.normal(0.0, 0.3, 3 * LANES)
-    cells, values = grid(CELLS, CELLS + 1, "intermediate").cells, draw.uniform(1.0, 2.0, CELLS * LANES)
-    creep = tuple(draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
-    many: dict[str, Any] = {
-        "a": axis,
-        "b": axis,
-        "load": load,
-        "mu": mu,
-        "xi_x": creep[0],
-        "xi_y": creep[1],
-        "spin": draw.normal(0.0, 0.3, CONTACTS),
-        "pair": pair,
-    }
+    blocks = _blocks(1)
+    for name in ("u", "v0", "v1"):
+        blocks[name] = draw.normal(0.0, 0.3, LANES)
+    (_, cells), values = grid(CELLS, CELLS + 1, "intermediate").records, draw.uniform(1.0, 2.0, CELLS * LANES)
+    along, across = (draw.normal(0.0, 2e-3, CONTACTS) for _ in range(2))
+    many = RollingEllipse(axis, axis, load, mu, along, across, draw.normal(0.0, 0.3, CONTACTS))
     calls = {n: Ellipse(1.0, pair, cells=n) for n in (12, CELLS)}
     marched = REPEATS * CELLS * LANES
     jobs: dict[str, tuple[Callable[[], Any], float]] = {
         "bound": (partial(_bound, values, REPEATS), marched),
-        "plain": (partial(_plain, lanes, cells, REPEATS), marched),
-        "second": (partial(_second, lanes, cells, REPEATS), marched),
+        "plain": (partial(_plain, blocks, cells, REPEATS), marched),
+        "second": (partial(_second, blocks, cells, REPEATS), marched),
         **{f"call {n}": (partial(_call, e, (axis, load, mu, 1e-3, 5e-4, 0.2)), REPEATS) for n, e in calls.items()},
         **{
-            f"many {march}": (partial(fastsim, **many, march=march), CONTACTS * CELLS * (CELLS + 1))
+            f"many {march}": (partial(fastsim, many, pair, march=march), CONTACTS * CELLS * (CELLS + 1))
             for march in ("plain", "second-order")
         },
     }
@@ -105,20 +98,20 @@ def _bound(values, repeats):
     return total
 
 
-def _zeros(count: int) -> np.ndarray:
-    """Zeros that begin with a vector register: inside one, the march costs half as much again."""
-    room = np.zeros(count + 8)
+def _blocks(count: int) -> np.ndarray:
+    """Blocks of zeros that begin with a vector register: inside one, the march costs half as much again."""
+    room = np.zeros(count * BLOCK.itemsize // 8 + 8)
     first = -room.ctypes.data % 64 // 8
-    return room[first : first + count]
+    return room[first : first + room.size - 8].view(BLOCK)
 
 
 @compiled
-def _plain(lanes, cells, repeats):
+def _plain(blocks, cells, repeats):
     for _ in range(repeats):
-        march_plain(lanes, cells)
+        march_plain(blocks[0], cells)
 
 
 @compiled
-def _second(lanes, cells, repeats):
+def _second(blocks, cells, repeats):
     for _ in range(repeats):
-        march_second_order(lanes, cells)
+        march_second_order(blocks[0], cells)

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Creep, fastsim
+from models.contact.fastsim import Creep, RollingEllipse, fastsim
 from models.contact.fastsim_grid import Bound, nets
-from models.contact.fastsim_kernels import BOUND, CENTRE
-from models.contact.fastsim_many import HALF, PART, Y
 from models.contact.inputs import Array
 from models.contact.material import Pair
 
@@ -66,7 +64,7 @@ def contacts(seed: int, stream: int, count: int) -> dict[str, Any]:
 
 def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) -> dict[str, float]:
     """Largest violation of each invariant, by mu N and the creepages where it has a size; not finite counts as inf."""
-    creep = fastsim(**columns, pair=pair, **options)
+    creep = fastsim(RollingEllipse(**columns), pair, **options)
     limit = columns["mu"] * np.maximum(columns["load"], 0.0)
     least, arm = np.maximum(limit, np.finfo(float).tiny), np.maximum(columns["a"], columns["b"])
     motion = np.hypot(columns["xi_x"], columns["xi_y"]) + np.abs(columns["spin"]) * arm
@@ -80,7 +78,7 @@ def worst(columns: Mapping[str, Any], options: Mapping[str, Any], pair: Pair) ->
     def unlike(name: str) -> float:
         factors, sizes = ALIKE[name]
         changed = {key: value * factors.get(key, 1.0) for key, value in columns.items()}
-        return _most(np.abs(forces - relative(fastsim(**changed, pair=pair, **options), sizes)))
+        return _most(np.abs(forces - relative(fastsim(RollingEllipse(**changed), pair, **options), sizes)))
 
     forces = relative(creep, (1.0, 1.0, 1.0))
     return {
@@ -118,9 +116,10 @@ def most_power(columns: Mapping[str, Any], cells: int = 21, bound: Bound = "inte
     """Largest power by the rolling speed (N), (n,), that friction takes from the motion; also xi_x, xi_y, spin."""
     a, b, xi_x, xi_y, spin = (columns[name][:, None, None] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     work = np.zeros(len(columns["a"]))
-    for rows, net in nets(np.column_stack([columns["a"], columns["b"]]), cells, bound):
-        y, half, part = (net.strips[row][:, None] for row in (Y, HALF, PART))
-        along, across = -b[rows] * y, a[rows] * half * net.cells[CENTRE]
+    for rows, net in nets(columns["a"] / columns["b"], cells, bound):
+        strips, along_strip = net.records
+        y, half, part = (values[:, None] for values in (strips.y, strips.half, strips.part))
+        along, across = -b[rows] * y, a[rows] * half * along_strip.centre
         slip = np.hypot(xi_x[rows] + spin[rows] * along, xi_y[rows] + spin[rows] * across)
-        work[rows] = np.sum(part * net.cells[BOUND] * slip, axis=(1, 2))
+        work[rows] = np.sum(part * along_strip.bound * slip, axis=(1, 2))
     return columns["mu"] * np.maximum(columns["load"], 0.0) * work

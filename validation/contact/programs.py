@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.contact.fastsim import Creep, fastsim
+from models.contact.fastsim import Creep, RollingEllipse, fastsim
 from models.contact.hertz import by_axes
 from models.contact.simplified_theory import CELLS, PAPER, NormalContact, Rolling, roll
 from models.machine.seconds import cost
@@ -23,7 +23,7 @@ def compare(cases: list[Case]) -> dict[str, Any]:
     pressed = {(c.a, c.b): _pressed(c) for c in cases}
 
     def old(case: Case) -> Creep:
-        return fastsim(case.a, case.b, case.load, case.friction, *case.motion, case.pair, **OLD)
+        return fastsim(RollingEllipse(case.a, case.b, case.load, case.friction, *case.motion), case.pair, **OLD)
 
     def new(case: Case) -> Rolling:
         return roll(pressed[case.a, case.b], case.friction, *case.motion)

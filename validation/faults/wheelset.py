@@ -17,7 +17,6 @@ from models.rail.eigenvalues import wavelength
 from models.rail.energy import energies, rates_and_powers
 from models.rail.equations import Equations
 from models.rail.linear import klingel
-from models.rail.profile_contact import N_Y, Y_, Z_
 from models.rail.wheelset import CHOSEN
 from validation.faults.campaign import Campaign, Check, Fault, off
 from validation.faults.patches import Context, Patch, attribute, with_globals
@@ -80,26 +79,26 @@ def _report(state: Array, law: Law = "fastsim") -> Array:
 def _friction() -> float:
     """Creep forces of wheels that slide all over, by mu N, less 1; infinite if they have power."""
     report = _report(states()[SLIDING])
-    if report[:, wf.POWER].max() > 0.0:
+    if report["power"].max() > 0.0:
         return np.inf
-    bound = CHOSEN.friction * report[:, wf.LOAD]
-    return float(np.abs(np.hypot(report[:, wf.FX], report[:, wf.FY]) / bound - 1.0).max())
+    bound = CHOSEN.friction * report["load"]
+    return float(np.abs(np.hypot(report["fx"], report["fy"]) / bound - 1.0).max())
 
 
 def _rest() -> float:
     """Spin and carried load at rest."""
     rest = equations().rest
     report = _report(rest)
-    up = report[:, wf.LOAD] * np.cos(report[:, wf.ANGLE]) - report[:, wf.FY] * np.sin(report[:, wf.ANGLE])
+    up = report["load"] * np.cos(report["angle"]) - report["fy"] * np.sin(report["angle"])
     return max(abs(rest[eq.SPIN] * CHOSEN.radius / SPEED + 1.0), abs(up.sum() / CHOSEN.load - 1.0))
 
 
 def _linear() -> float:
     """Creep forces and moment of the linear law against Kalker's theory at the creepages that are reported."""
     report = _report(states()[0], "linear")
-    a, b, x, y, spin = report[:, [wf.A, wf.B, wf.XI_1, wf.XI_2, wf.XI_3]].T
+    a, b, x, y, spin = (report[name] for name in ("a", "b", "xi_x", "xi_y", "spin"))
     wanted = kalker(a, b, x, y, spin, CHOSEN.pair)
-    return max(off(report[:, k], value) for k, value in zip((wf.FX, wf.FY, wf.MZ), wanted, strict=True))
+    return max(off(report[name], value) for name, value in zip(("fx", "fy", "mz"), wanted, strict=True))
 
 
 CHECKS = {
@@ -126,7 +125,8 @@ def written(**functions: Any) -> Patch:
         def context() -> Iterator[None]:
             each = with_globals(wf.patch_by_patch.py_func, **functions)
             faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=each)
-            with mock.patch.multiple(eq, wheel_forces=faulty, rates=eq.rates.py_func, set_rates=eq.set_rates.py_func):
+            plain = {name: getattr(eq, name).py_func for name in ("rates", "set_rates", "room_for")}
+            with mock.patch.multiple(eq, wheel_forces=faulty, **plain):
                 yield
 
         return context
@@ -161,57 +161,57 @@ def creeping(change: Callable[[Any, Any], None], speed: float = 1.0) -> Patch:
 def touching(change: Callable[[Any], None]) -> Patch:
     """Places of contact changed."""
 
-    def contact_points(y: float, z: float, roll: float, yaw: float, p: Any, touches: Any) -> None:
-        wf.contact_points(y, z, roll, yaw, p, touches)
+    def contact_points(pose: Any, rails: Any, touches: Any) -> None:
+        wf.contact_points(pose, rails, touches)
         change(touches)
 
     return written(contact_points=contact_points)
 
 
-def times(column: int, factor: float, which: int = 0) -> Callable[..., None]:
-    """Multiply a column of one of the arrays."""
+def times(name: str, factor: float, which: int = 0) -> Callable[..., None]:
+    """Multiply a field of one of the arrays."""
 
     def change(*arrays: Any) -> None:
-        arrays[which][:, column] *= factor
+        arrays[which][name] *= factor
 
     return change
 
 
-spin_reversed = times(2, -1.0, which=1)
+spin_reversed = times("turn", -1.0, which=1)
 
 
 def _shared(contacts: Any, slip: Any) -> None:
-    contacts[:, 2] = contacts[:, 2].mean()
+    contacts["load"] = contacts["load"].mean()
 
 
 def _turned_back(contacts: Any, slip: Any, *rest: Any) -> None:
     """The creep law with the moment of spin the other way."""
     wf.creep(contacts, slip, *rest)
-    rest[-1][:, 2] *= -1.0
+    rest[-1].found["mz"] *= -1.0
 
 
 def _swapped(touches: Any) -> None:
     """Each wheel on its own side with the other one's contact."""
-    sides = touches[:, [Y_, N_Y]].copy()
+    sides = {name: touches[name].copy() for name in ("y", "n_y")}
     touches[:] = touches[::-1].copy()
-    touches[:, [Y_, N_Y]] = sides
+    for name, values in sides.items():
+        touches[name] = values
 
 
 def _no_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    whirl, cosine = body[eq.ALONG] * state[eq.SPIN] / body[eq.ACROSS], np.cos(state[eq.ROLL])
+    whirl, cosine = body.along * state[eq.SPIN] / body.across, np.cos(state[eq.ROLL])
     rates[eq.ROLL_RATE] -= whirl * state[eq.YAW_RATE] * cosine
     rates[eq.YAW_RATE] += whirl * state[eq.ROLL_RATE] / cosine
 
 
 def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
-    rates[eq.ROLL_RATE] -= body[eq.ALONG] * state[eq.SPIN] / body[eq.ACROSS] * state[eq.YAW_RATE]
+    rates[eq.ROLL_RATE] -= body.along * state[eq.SPIN] / body.across * state[eq.YAW_RATE]
 
 
 def _damped_twice(real: Any) -> Any:
     def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
-        body = body.copy()
-        body[eq.DX : eq.DZ + 1] *= 2.0
-        real(state, speed, body, *rest)
+        doubled = tuple(2.0 * damping for damping in body.damping)
+        real(state, speed, body._replace(damping=doubled), *rest)
 
     return rates
 
@@ -221,10 +221,10 @@ FAULTS = (
     Fault("sign of the spin moment", "creep law", written(creep=_turned_back)),
     Fault("creepage by a speed 2 % off", "creep law", creeping(lambda contacts, slip: None, 1.02)),
     Fault("load not distributed: both wheels have the mean", "creep law", creeping(_shared)),
-    Fault("friction 1 % off", "creep law", creeping(times(3, 1.01))),
+    Fault("friction 1 % off", "creep law", creeping(times("mu", 1.01))),
     Fault("depth, place and radius of left and right contact swapped", "contact", touching(_swapped)),
-    Fault("normal leans the other way", "contact", touching(times(N_Y, -1.0))),
-    Fault("arm of the contact forces 1 % off", "contact", touching(times(Z_, 1.01))),
+    Fault("normal leans the other way", "contact", touching(times("n_y", -1.0))),
+    Fault("arm of the contact forces 1 % off", "contact", touching(times("z", 1.01))),
     Fault("no gyroscopic moments", "body", after(_no_gyroscope)),
     Fault("one gyroscopic moment missing", "body", after(_one_gyroscope)),
     Fault("dampers twice as strong", "suspension", attribute("models.rail.equations:rates", _damped_twice)),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from models.contact import hertz
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.fastsim_derivatives import derivatives
 from models.contact.linear_theory import forces
 from models.contact.material import Pair
@@ -20,7 +20,7 @@ A, B, LOAD, MU = 6e-3, 4e-3, 80e3, 0.3
 
 def no_creepage(implementation: str, folder: Path) -> float:
     """Forces without creepage, and whether their derivatives are numbers."""
-    answer = derivatives(A, B, LOAD, MU, 0.0, 0.0, 0.0, PAIR)
+    answer = derivatives(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 0.0), PAIR)
     return float(np.abs(answer.forces).max() + (0.0 if np.isfinite(answer.slopes).all() else np.inf))
 
 
@@ -35,7 +35,7 @@ def next_to_none(implementation: str, folder: Path) -> float:
     """Creepages of 1e-300 to 1e-12 against the linear theory."""
     small = 10.0 ** np.arange(-300.0, -11.0, 12.0)
     motion = (small, -0.5 * small, 30.0 * small)
-    answer, linear = fastsim(A, B, LOAD, MU, *motion, PAIR), forces(A, B, *motion, PAIR)
+    answer, linear = fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR), forces(A, B, *motion, PAIR)
     off = np.hypot(answer.fx / linear[0] - 1.0, (answer.fy - linear[1]) / np.abs(linear[0]))
     return float(np.abs(off).max())
 
@@ -44,7 +44,7 @@ def against(implementation: str, folder: Path) -> float:
     """Spin whose pole is anywhere in the ellipse: error of 21 cells by mu N, all bounded."""
     pole = np.linspace(-1.0, 1.0, 41)
     motion = (np.zeros(41), -0.5 * A * pole, np.full(41, 0.5))
-    coarse, fine = (fastsim(A, B, LOAD, MU, *motion, PAIR, cells=cells) for cells in (21, 201))
+    coarse, fine = (fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=cells) for cells in (21, 201))
     return float(np.hypot(coarse.fx - fine.fx, coarse.fy - fine.fy).max() / (MU * LOAD))
 
 
@@ -52,8 +52,8 @@ def against_naive(folder: Path) -> str:
     """The march of 1982 on the same cells."""
     motion = (0.0, -0.25 * A, 0.5)
     plain, fine = (
-        fastsim(A, B, LOAD, MU, *motion, PAIR, march="plain"),
-        fastsim(A, B, LOAD, MU, *motion, PAIR, cells=201),
+        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, march="plain"),
+        fastsim(RollingEllipse(A, B, LOAD, MU, *motion), PAIR, cells=201),
     )
     return f"the plain march is {100 * abs(plain.fy - fine.fy) / (MU * LOAD):.1f} % of mu N off on as many cells"
 
@@ -62,20 +62,21 @@ def lift_off(implementation: str, folder: Path) -> float:
     """Force by mu N as the load goes to nothing and below: full sliding, then exactly none."""
     load = np.concatenate((10.0 ** np.arange(-12.0, 5.0), [0.0, -1.0, -1e3]))
     contact = hertz.by_load(1.1, 0.8, load, PAIR)
-    answer = fastsim(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0, PAIR)
+    answer = fastsim(RollingEllipse(contact.a, contact.b, load, MU, 0.02, 0.0, 0.0), PAIR)
     return float(np.abs(answer.fx + MU * np.maximum(load, 0.0)).max() / (MU * load.max()))
 
 
 def flipping(implementation: str, folder: Path) -> float:
     """Largest deviation of a creep curve from a smooth one, by mu N, over 2001 creepages."""
     creep = np.linspace(0.0, 4e-3, 2001)
-    force = fastsim(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep, PAIR).fx / (MU * LOAD)
+    force = fastsim(RollingEllipse(A, B, LOAD, MU, creep, 0.5 * creep, 50.0 * creep), PAIR).fx / (MU * LOAD)
     return float(np.abs(np.diff(force, 2)).max())
 
 
 def locked(implementation: str, folder: Path) -> float:
     """A locked wheel, and spin of a thousand per metre: |F| beyond mu N."""
-    answer = fastsim(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3, PAIR)
+    ellipses = RollingEllipse(A, B, LOAD, [1e-6, 0.3, 1.0], [[1.0], [0.0], [-1.0]], [[0.0], [1.0], [1.0]], 1e3)
+    answer = fastsim(ellipses, PAIR)
     return float(np.max(np.hypot(answer.fx, answer.fy) / (np.array([1e-6, 0.3, 1.0]) * LOAD) - 1.0, initial=0.0))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from models.contact import hertz
-from models.contact.fastsim import March, fastsim
+from models.contact.fastsim import March, RollingEllipse, fastsim
 from models.contact.linear_theory import forces
 from models.contact.material import Pair
 from models.contact.normal_problem import NormalSolution, centres, solve_normal
@@ -22,7 +22,7 @@ CELL, RADIUS, SPHERE = 1.5e-4, 0.3, 1e4
 
 
 def _linear_error(cells: int, march: March) -> float:
-    answer = fastsim(A, B, LOAD, MU, SMALL, 0.0, 0.0, PAIR, cells=cells, march=march)
+    answer = fastsim(RollingEllipse(A, B, LOAD, MU, SMALL, 0.0, 0.0), PAIR, cells=cells, march=march)
     return abs(float(answer.fx / forces(A, B, SMALL, 0.0, 0.0, PAIR)[0]) - 1.0)
 
 
@@ -45,14 +45,15 @@ def _drawn(count: int = 400) -> np.ndarray:
 def reversed_signs(implementation: str, folder: Path) -> float:
     """All creepages turned round: forces that do not turn round exactly, by mu N."""
     along, across, spin = _drawn()
-    first, second = (fastsim(A, B, LOAD, MU, s * along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    ellipses = (RollingEllipse(A, B, LOAD, MU, s * along, s * across, s * spin) for s in (1.0, -1.0))
+    first, second = (fastsim(ellipse, PAIR) for ellipse in ellipses)
     return float(max(np.abs(first.fx + second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
 def mirrored(implementation: str, folder: Path) -> float:
     """Left and right exchanged: lateral creepage, spin and lateral force change their sign; by mu N."""
     along, across, spin = _drawn()
-    first, second = (fastsim(A, B, LOAD, MU, along, s * across, s * spin, PAIR) for s in (1.0, -1.0))
+    first, second = (fastsim(RollingEllipse(A, B, LOAD, MU, along, s * across, s * spin), PAIR) for s in (1.0, -1.0))
     return float(max(np.abs(first.fx - second.fx).max(), np.abs(first.fy + second.fy).max()) / (MU * LOAD))
 
 
@@ -60,13 +61,14 @@ def power(implementation: str, folder: Path) -> float:
     """Most power gained per metre, by mu N times the creepage, 21 cells."""
     along, across, spin = _drawn()
     size = MU * LOAD * (np.hypot(along, across) + A * np.abs(spin))
-    return float(max(np.max(-fastsim(A, B, LOAD, MU, along, across, spin, PAIR).dissipation / size), 0.0))
+    lost = fastsim(RollingEllipse(A, B, LOAD, MU, along, across, spin), PAIR).dissipation
+    return float(max(np.max(-lost / size), 0.0))
 
 
 def only_spin(implementation: str, folder: Path) -> float:
     """Nothing but spin: force along the rail, and of small spin across it against the linear theory."""
-    small = fastsim(A, B, LOAD, MU, 0.0, 0.0, 1e-6, PAIR)
-    large = fastsim(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3], PAIR)
+    small = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, 1e-6), PAIR)
+    large = fastsim(RollingEllipse(A, B, LOAD, MU, 0.0, 0.0, [0.1, 1.0, 10.0, 1e3]), PAIR)
     wanted = float(forces(A, B, 0.0, 0.0, 1e-6, PAIR)[1])
     return max(abs(float(small.fy) / wanted - 1.0), float(np.abs(large.fx).max()) / (MU * LOAD))
 

@@ -44,9 +44,9 @@ def off(equations: Equations, **values: float) -> np.ndarray:
 
 def beyond_friction(motion: Motion, mu: float) -> float:
     """Largest tangential force by mu N less 1, or infinity for one that has power or is there without a bound."""
-    force = np.hypot(motion.contacts[..., wf.FX], motion.contacts[..., wf.FY])
-    bound = mu * motion.contacts[..., wf.LOAD]
-    if motion.contacts[..., wf.POWER].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
+    force = np.hypot(motion.contacts["fx"], motion.contacts["fy"])
+    bound = mu * motion.contacts["load"]
+    if motion.contacts["power"].max() > 0.0 or (force[bound == 0.0] > 0.0).any():
         return np.inf
     loaded = bound > 0.0
     return float(np.max(force[loaded] / bound[loaded] - 1.0, initial=0.0))
@@ -94,7 +94,7 @@ def energies(motion: Motion, w: Wheelset) -> np.ndarray:
     """Energy (J) of a wheelset without suspension whose contacts are elastic: of motion, of weight, of the contacts."""
     _, z, roll, _, _, vy, vz, roll_rate, yaw_rate, spin = motion.states.T
     turning = w.yaw_inertia * (roll_rate**2 + (yaw_rate * np.cos(roll)) ** 2) + w.spin_inertia * spin**2
-    pressed = 0.4 * (motion.contacts[..., wf.LOAD] * motion.contacts[..., wf.DEPTH]).sum(axis=1)
+    pressed = 0.4 * (motion.contacts["load"] * motion.contacts["depth"]).sum(axis=1)
     return 0.5 * (w.mass * (vy**2 + vz**2) + turning) - w.load * z + pressed
 
 
@@ -103,7 +103,7 @@ def falling(implementation: str, folder: Path, **moved: float) -> float:
     elastic = FREE.changed(friction=0.0, contact_damping=0.0, flange_clearance=0.1)
     wheelset = built(implementation, elastic)
     motion = wheelset.run(off(wheelset, **moved), 0.06, 5e-5)
-    loads = motion.contacts[..., wf.LOAD]
+    loads = motion.contacts["load"]
     if not ((loads == 0.0).any(axis=0) & (loads > 0.0).any(axis=0)).all():
         return np.inf  # nothing has lifted off, or nothing has landed
     gained = energies(motion, elastic)
@@ -128,7 +128,7 @@ def light(implementation: str, folder: Path, mass: float) -> float:
     if beyond_friction(motion, toy.friction) > 1e-12:
         return np.inf
     contact = motion.contacts[-1]
-    up = contact[:, wf.LOAD] * np.cos(contact[:, wf.ANGLE]) - contact[:, wf.FY] * np.sin(contact[:, wf.ANGLE])
+    up = contact["load"] * np.cos(contact["angle"]) - contact["fy"] * np.sin(contact["angle"])
     return float(abs(up.sum() / toy.load - 1.0))
 
 
@@ -146,11 +146,11 @@ def pure_spin(implementation: str, folder: Path) -> float:
     own = CHOSEN.changed(conicity=0.5)
     wheelset = built(implementation, own, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
-    bound = own.friction * contact[:, wf.LOAD]
-    if np.abs(contact[:, wf.FY] / bound).min() < 0.1:
+    bound = own.friction * contact["load"]
+    if np.abs(contact["fy"] / bound).min() < 0.1:
         return np.inf
-    moment = contact[:, wf.FX] * contact[:, wf.PLACE_Z] - contact[:, wf.MZ] * np.sin(contact[:, wf.ANGLE])
-    return float(max(np.abs(moment / (bound * own.radius)).max(), abs(contact[:, wf.FY].sum()) / bound[0]))
+    moment = contact["fx"] * contact["z"] - contact["mz"] * np.sin(contact["angle"])
+    return float(max(np.abs(moment / (bound * own.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
 
 
 def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
@@ -226,7 +226,7 @@ def too_large_naive(folder: Path) -> str:
     for step in (STEP, STEP / 8.0):
         states, contacts = np.empty((1, eq.STATES)), own.blank(1)
         state = off(own, **LANDING)
-        eq.march(state, *own.parameters, step, round(0.1 / step), 1_000_000, states, contacts)
+        eq.march(state, own.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 

@@ -20,7 +20,6 @@ from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import model, native_law
 from models.engines.mujoco_callback import installed
 from models.multibody.numbers import Handling, Tyres
-from models.rail import wheel_forces as wf
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
@@ -107,8 +106,8 @@ def jumping(implementation: str, folder: Path) -> float:
     """Energy that the ledger of a wheelset leaves open while contacts come and go, by what creep took."""
     own = built(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
     motion = own.run(off(own, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
-    carries = motion.contacts[:, :, wf.LOAD] > 0.0
-    if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts[:, :, wf.POWER].max() > 0.0:
+    carries = motion.contacts["load"] > 0.0
+    if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts["power"].max() > 0.0:
         return np.inf
     book = ledger(Equations(own.wheelset, own.speed, own.law, own.cells), motion)
     return float(np.abs(book.residual).max() / book.creep[-1])

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from models.contact.accuracy import band, cells_error, halved, moment_band, slenderness, spin_share, used_with_moment
-from models.contact.fastsim import fastsim
+from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_load
 from models.contact.inputs import Array
 from models.core.errors import InputError
@@ -128,10 +128,11 @@ def _forces(values: dict[str, Any], built: Build, method: Method, errors: bool =
     else:
         a, b = values["a"], values["b"]
     choices: dict[str, Any] = method.model_dump(include={"march", "bound", "flexibilities"})
-    fine = fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=method.cells, **choices)
+    ellipses = RollingEllipse(a, b, load, friction, xi_x, xi_y, spin)
+    fine = fastsim(ellipses, pair, cells=method.cells, **choices)
     forces = [fine.fx, fine.fy, fine.mz, fine.stick, fine.dissipation]
     if errors:
-        coarse = fastsim(a, b, load, friction, xi_x, xi_y, spin, pair, cells=halved(method.cells), **choices)
+        coarse = fastsim(ellipses, pair, cells=halved(method.cells), **choices)
         limit = friction * np.maximum(load, 0.0)
         a, b = (np.where(limit > 0, axis, 1.0) for axis in (a, b))
         share = spin_share(a, b, np.array([xi_x, xi_y, spin]), pair.nu)

@@ -33,7 +33,7 @@ def assumptions(equations: Equations) -> list[Assumption]:
     listed = [_presses(wheelset), _small_yaw(), _rolls(equations), _half_space(), _slow_slip(equations)]
     listed += [_elastic()] if yields(wheelset.material) else []
     listed += [_no_slip(wheelset)] if equations.law == "linear" else []
-    listed += [_travel(wheelset)] if equations.body[-1] > 0.0 else []
+    listed += [_travel(wheelset)] if equations.body.held else []
     if wheelset.profiles is not None:
         return [*listed, _within_profiles(wheelset)]
     return [*listed, _climbs(wheelset), _flange_way(wheelset)]
@@ -77,7 +77,7 @@ def _touching(watched: Callable[[Array], Array]) -> Callable[[Result], Watched]:
     """The largest value among the patches of each wheel that carry something, 0 where none does."""
 
     def of_path(path: Path) -> Watched:
-        each, load = path.contacts.shape[1] // 2, path.contacts[:, :, wf.LOAD]
+        each, load = path.contacts.shape[1] // 2, path.contacts["load"]
         values = np.where(load > 0.0, np.abs(watched(path.contacts)), 0.0)
         return {"right wheel": values[:, :each].max(axis=1), "left wheel": values[:, each:].max(axis=1)}
 
@@ -89,9 +89,7 @@ def _presses(wheelset: Wheelset) -> Assumption:
         "wheels press",
         "both wheels stay on their rails",
         "start with a smaller displacement, or travel below the critical speed",
-        _of_path(
-            lambda path: by_wheel(path.contacts, path.contacts[:, :, wf.LOAD] * np.cos(path.contacts[:, :, wf.ANGLE]))
-        ),
+        _of_path(lambda path: by_wheel(path.contacts, path.contacts["load"] * np.cos(path.contacts["angle"]))),
         "N",
         least=LEAST_LOAD * wheelset.load / 2.0,
     )
@@ -124,8 +122,8 @@ def _half_space() -> Assumption:
     """Of a Hertzian contact the penetration by its shorter semi-axis is about that semi-axis by its radius."""
 
     def watched(contacts: Array) -> Array:
-        short = np.minimum(contacts[:, :, wf.A], contacts[:, :, wf.B])
-        return contacts[:, :, wf.DEPTH] / np.where(short > 0.0, short, np.inf)
+        short = np.minimum(contacts["a"], contacts["b"])
+        return contacts["depth"] / np.where(short > 0.0, short, np.inf)
 
     return Assumption(
         "half-space",
@@ -139,8 +137,8 @@ def _half_space() -> Assumption:
 
 def _elastic() -> Assumption:
     def watched(contacts: Array) -> Array:
-        area = np.pi * contacts[:, :, wf.A] * contacts[:, :, wf.B]
-        return 1.5e-6 * contacts[:, :, wf.LOAD] / np.where(area > 0.0, area, np.inf)
+        area = np.pi * contacts["a"] * contacts["b"]
+        return 1.5e-6 * contacts["load"] / np.where(area > 0.0, area, np.inf)
 
     return Assumption(
         "elastic",
@@ -158,7 +156,7 @@ def _slow_slip(equations: Equations) -> Assumption:
         "constant friction",
         "friction is the same however fast the wheels slip",
         "give wheelset.override.friction as it is for such slip, or travel slower",
-        _touching(lambda contacts: speed * np.hypot(contacts[:, :, wf.XI_1], contacts[:, :, wf.XI_2])),
+        _touching(lambda contacts: speed * np.hypot(contacts["xi_x"], contacts["xi_y"])),
         "m/s",
         most=FAST_SLIP,
     )
@@ -167,7 +165,7 @@ def _slow_slip(equations: Equations) -> Assumption:
 def _no_slip(wheelset: Wheelset) -> Assumption:
     def watched(path: Path) -> Watched:
         contacts = path.contacts
-        creep, limit = np.hypot(contacts[:, :, wf.FX], contacts[:, :, wf.FY]), contacts[:, :, wf.LOAD]
+        creep, limit = np.hypot(contacts["fx"], contacts["fy"]), contacts["load"]
         used = shares(creep, wheelset.friction * limit)
         return {"patches": used.max(axis=1)}
 
@@ -198,7 +196,7 @@ def _travel(wheelset: Wheelset) -> Assumption:
 
 def _climbs(wheelset: Wheelset) -> Assumption:
     def watched(path: Path) -> Watched:
-        part = shares(path.contacts[:, :, wf.FLANGE_FORCE], path.contacts[:, :, wf.LOAD])
+        part = shares(path.contacts["flange_force"], path.contacts["load"])
         return {"right wheel": part[:, 0], "left wheel": part[:, 1]}
 
     return Assumption(
@@ -230,7 +228,7 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
 
     def watched(path: Path) -> Watched:
         contacts = path.contacts
-        load, half = contacts[:, :, wf.LOAD], contacts[:, :, wf.B]
+        load, half = contacts["load"], contacts["b"]
         wheel, rail = np.abs(_along_axle(path)) - side.wheelset.arm, np.abs(_across_track(path))
         ends = {
             "flange's tip": wheel - tip - TIP,
@@ -252,10 +250,10 @@ def _within_profiles(wheelset: Wheelset) -> Assumption:
 def _along_axle(path: Path) -> Array:
     """Places (n, patches) of the contacts along the axle from its middle (m)."""
     roll, yaw, contacts = path.states[:, ROLL, None], path.states[:, YAW, None], path.contacts
-    x, y, z = (contacts[:, :, k] for k in (wf.PLACE_X, wf.PLACE_Y, wf.PLACE_Z))
+    x, y, z = (contacts[name] for name in "xyz")
     return np.asarray(np.cos(roll) * (np.cos(yaw) * y - np.sin(yaw) * x) + np.sin(roll) * z)
 
 
 def _across_track(path: Path) -> Array:
     """Places (n, patches) of the contacts from the middle of the track (m)."""
-    return np.asarray(path.states[:, Y, None] + path.contacts[:, :, wf.PLACE_Y])
+    return np.asarray(path.states[:, Y, None] + path.contacts["y"])

@@ -15,7 +15,6 @@ from models.core.discretisation import Estimate, stated
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, joined, result
 from models.core.told import gathered
-from models.rail import wheel_forces as wf
 from models.rail.eigenvalues import growth, hunting, locus, uncertainty, wavelength
 from models.rail.equations import ROLL, SPIN, YAW, Path, Y, Z
 from models.rail.limit_cycle import Orbit, Unknown, attained, beside, bifurcation, refined, solved
@@ -26,14 +25,8 @@ from models.systems.wheelset.scene import WheelsetScene
 from models.systems.wheelset.stated_error import FEWEST, with_error, with_error_of_cycles
 
 STATES = {"y": (Y, "m"), "z": (Z, "m"), "roll": (ROLL, "rad"), "yaw": (YAW, "rad"), "spin": (SPIN, "rad/s")}
-CONTACTS = {
-    "normal": (wf.LOAD, "N"),
-    "fx": (wf.FX, "N"),
-    "fy": (wf.FY, "N"),
-    "mz": (wf.MZ, "N m"),
-    "power": (wf.POWER, "W"),
-}
-"""What is saved of every path, with its place and unit."""
+CONTACTS = {"normal": ("load", "N"), "fx": ("fx", "N"), "fy": ("fy", "N"), "mz": ("mz", "N m"), "power": ("power", "W")}
+"""What is saved of every path, with its place or field and its unit."""
 SPEED: Unknown = "speed"
 AMPLITUDE: Unknown = "amplitude"
 """What is sought of a cycle: along a branch, and at a speed."""
@@ -78,7 +71,7 @@ def _labelled(scene: WheelsetScene, engine: str, motion: Path, **more: Any) -> R
     steps, times = len(motion.times) - 1, Channel("time", motion.times, "s")
     channels = {name: Channel("time", motion.states[:, k], unit) for name, (k, unit) in STATES.items()}
     channels |= {
-        name: Channel(("time", "patch"), motion.contacts[:, :, k], unit) for name, (k, unit) in CONTACTS.items()
+        name: Channel(("time", "patch"), motion.contacts[field], unit) for name, (field, unit) in CONTACTS.items()
     }
     counts = {"steps": steps, "force calls": 4 * steps}
     return result(scene, channels, {"time": times}, engine=engine, counts=counts, detail=motion, **more)

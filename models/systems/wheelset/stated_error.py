@@ -25,7 +25,6 @@ from models.core.discretisation import (
 )
 from models.core.errors import InputError, RunFailed
 from models.core.result import Result
-from models.rail import wheel_forces as wf
 from models.rail.equations import YAW, Path, Y
 from models.rail.limit_cycle import Orbit
 from models.systems.wheelset.assumptions import by_wheel
@@ -65,10 +64,7 @@ def with_error(run: Result, scene: WheelsetScene, march: March) -> Result:
 
 def series(path: Path) -> Series:
     """The principal channels of a path."""
-    forces = {
-        name: np.stack([*by_wheel(path.contacts, path.contacts[:, :, k]).values()], axis=1)
-        for name, k in (("fx", wf.FX), ("fy", wf.FY))
-    }
+    forces = {name: np.stack([*by_wheel(path.contacts, path.contacts[name]).values()], axis=1) for name in ("fx", "fy")}
     return Series(path.times, {"y": path.states[:, Y], "yaw": path.states[:, YAW], **forces})
 
 

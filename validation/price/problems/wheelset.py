@@ -19,7 +19,7 @@ from models.advice.price.problem import Setting
 from models.contact.inputs import Array
 from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import MISSING
-from models.engines.contact_bridge import FREEDOMS, Wheels, Y, add_forces, check_step, forces, linear
+from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
 from models.engines.contact_bridge_mujoco import Marcher, model, native_law
 from models.engines.exudyn import counted
@@ -184,7 +184,7 @@ class RollingWheels:
         """The quantities of a state (8,): creep forces (2,) in N and displacements (2,) in m, along and across."""
         force = np.zeros(FREEDOMS)
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
-        return {"creep force": force[:2], "displacement": state[: Y + 1]}
+        return {"creep force": force[:2], "displacement": state[:2]}
 
     def _off(self, found: dict[str, Array]) -> dict[str, float]:
         return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}

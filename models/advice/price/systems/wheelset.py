@@ -17,7 +17,7 @@ FIRST = 0.25
 """s: of a longer path only so much is searched."""
 USUAL = "y"
 QUANTITIES = {**STATES, **CONTACTS}
-"""Places and units of what can be asked about: of states, or of the contacts of all patches."""
+"""Places or fields, and units of what can be asked about: of states, or of the contacts of all patches."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,11 @@ class OwnWheelset(Meshed):
         """The quantity of all paths side by side; each is judged."""
         for speed, one in zip(self.speeds, run, strict=True):
             judged_path(self.scene, self.own, speed, one)
-        place, times = QUANTITIES[self.quantity][0], run[0].times
-        columns = [one.states[:, [place]] if self.quantity in STATES else one.contacts[:, :, place] for one in run]
+        name, times = self.quantity, run[0].times
+        if name in STATES:
+            columns = [one.states[:, [STATES[name][0]]] for one in run]
+        else:
+            columns = [one.contacts[CONTACTS[name][0]] for one in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:

@@ -1,0 +1,76 @@
+"""What FASTSIM's compiled functions read and write, by name: contacts and forces row by row, the net, the work space.
+
+Records lie in memory as their fields follow, without gaps: a table of doubles becomes an array of records, or rows of a
+net, at no cost.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from models.contact.inputs import Array
+from models.machine.compiled import inlined
+from models.machine.records import record
+
+LANES = 24
+"""Strips that are marched at once; the last ones may be empty."""
+CONTACT = record("a", "b", "load", "mu", "xi_x", "xi_y", "spin", "l1", "l2", "l3")
+"""One ellipse: semi-axes (m), load (N), coefficient of friction, creepages and spin (1/m), flexibilities (m^3/N) along
+x, along y and in spin."""
+FORCES = record("fx", "fy", "mz", "stick")
+"""Creep forces (N) and moment (N m) on the wheel, share of the area that sticks."""
+SLIP = record("x", "y", "spin")
+"""Rigid slip of a contact, see ``fastsim_many.rigid_slip``."""
+BLOCK = np.dtype(
+    [
+        (name, np.float64, (LANES,))
+        for name in ("u", "v0", "v1", "sum_x", "sum_y", "sum_t", "slid", "qx", "qy", "slips")
+    ],
+    align=True,
+)
+"""The strips that are marched at once: the three numbers of each (``fastsim_kernels``); sums over the cells of q_x,
+q_y, t q_y and of slipping cells; the state. One record, as the compiler must know that its lanes do not overlap."""
+
+
+class Strips(NamedTuple):
+    """Strips of an ellipse, (m,) each: y/b, half length by a, that by the bound in the strip's middle, share of the
+    load per bound."""
+
+    y: Array
+    half: Array
+    spread: Array
+    part: Array
+
+
+class Cells(NamedTuple):
+    """Cells of a strip, (n,) each, about the step that ends in the cell's centre: t there, the bound g there, t in the
+    middle of the step, g where it starts (more by a rounding), 1/(8 g) in its middle.
+
+    peak : pressure in the middle of the ellipse times a b / N.
+    """
+
+    centre: Array
+    bound: Array
+    middle: Array
+    before: Array
+    rate: Array
+    peak: float
+
+
+class Workspace(NamedTuple):
+    """Arrays that a march writes over: a SLIP for each contact, one BLOCK."""
+
+    slips: Array
+    blocks: Array
+
+
+@inlined
+def strips_in(table):
+    """``Strips`` that lie in a table (4, m) of a net."""
+    return Strips(table[0], table[1], table[2], table[3])
+
+
+@inlined
+def cells_in(table, peak):
+    """``Cells`` that lie in a table (5, n) of a net."""
+    return Cells(table[0], table[1], table[2], table[3], table[4], peak)
