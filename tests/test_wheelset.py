@@ -63,7 +63,7 @@ def test_cone_touches_where_its_surface_is_nearest_to_the_axis_of_the_head(side)
 def test_roll_and_equivalent_conicity_are_those_of_the_geometry():
     y = 1e-5
     pose = (y, 0.0, -CHOSEN.tilt * y, 0.0)
-    right, left = (cone_on_rail(side, *pose, *CONE) for side in (RIGHT, LEFT))
+    right, left = (cone_on_rail(side, Pose(*pose), CONE) for side in (RIGHT, LEFT))
     assert (right[0], left[0]) == pytest.approx((0.0, 0.0), abs=3e-11)  # second order: tilt y^2 = 7e-12
     assert (right[1] - left[1]) / (2 * y) == pytest.approx(CHOSEN.equivalent_conicity, rel=1e-6)
     assert CHOSEN.coned(0.2).equivalent_conicity == pytest.approx(0.2, rel=1e-9)
@@ -98,7 +98,7 @@ def test_load_is_a_spring_across_and_a_negative_one_in_yaw():
     def fall(y, yaw):
         z = roll = 0.0
         for _ in range(20):
-            right, left = (cone_on_rail(side, POSE, CONE)[0] for side in (RIGHT, LEFT))
+            right, left = (cone_on_rail(side, Pose(y, z, roll, yaw), CONE)[0] for side in (RIGHT, LEFT))
             z, roll = z - (right + left) / 2, roll - (right - left) / (2 * CHOSEN.half_gauge)
         return z
 
