@@ -52,9 +52,8 @@ def windowed(distance: float, window: float, height: float, slope: float) -> tup
 
 
 @njit(cache=True)
-def sines_at(s, waves):
-    """Height (m, down) and slope at one station."""
-    amplitude, wavenumber, phase, window = waves
+def sines_at(s, amplitude, wavenumber, phase, window):
+    """Height (m, down) and slope at one station; to be handed ``Waves`` from Python would take as long again."""
     height, slope = 0.0, 0.0
     if s > 0.0:
         for i in range(amplitude.size):
@@ -68,7 +67,7 @@ def sines_at(s, waves):
 def sines(s, waves, height, slope):
     """Fill ``height`` and ``slope`` at every station of the flat array ``s``."""
     for j in range(s.size):
-        height[j], slope[j] = sines_at(s[j], waves)
+        height[j], slope[j] = sines_at(s[j], waves.amplitude, waves.wavenumber, waves.phase, waves.window)
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})

@@ -120,7 +120,7 @@ class SineProfile:
 
     def height_slope_at(self, s: float) -> tuple[float, float]:
         """Height (m, positive down) and slope at one arc length ``s`` (m)."""
-        return kernels.sines_at(float(s), self.waves)
+        return kernels.sines_at(float(s), self.amplitude, self.wavenumber, self.phase, self.window_length)
 
 
 @dataclass(frozen=True, eq=False)
