@@ -15,7 +15,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, result
 from models.core.strict import Strict, quantity, read
 from models.core.whole_files import write_whole
-from models.ensemble.runner import run_paths
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.workers import processes
 from models.systems.braking.plan import check_reference
 from models.systems.braking.run import run as drive
@@ -127,7 +127,7 @@ def _means(scene: BrakingScene, options: Options, runs: int, pool: Any, seed: in
         options.speed_spread,
         options.seed if seed is None else seed,
     )
-    stops = run_paths(job, runs, executor=pool, block=max(1, runs // (2 * options.workers)))
+    stops = run_paths(job, runs, executor=pool, blocks=Blocks(max(1, runs // (2 * options.workers))))
     return {key: scatter(stops[key]) for key in PAPER}
 
 

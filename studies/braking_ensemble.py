@@ -13,8 +13,8 @@ from models.core.errors import InputError
 from models.core.result import Channel, Result, result
 from models.core.strict import Strict, quantity, read
 from models.core.told import Results, gathered
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import run_paths
 from models.ensemble.workers import processes
 from models.systems.braking.of_scene import merged
 from models.systems.braking.plan import check_reference
@@ -69,7 +69,8 @@ def run(scene: BrakingScene, engines: tuple[str, ...], folder: Path, progress: P
             def tell(done: Done, i: int = i) -> None:
                 progress(f"{options.names[i]}: {done}", (i + done.done / done.paths) / len(tables))
 
-            ensembles.append(run_paths(job, options.runs, folder / BLOCKS / options.names[i], pool, BLOCK, tell))
+            store, blocks = folder / BLOCKS / options.names[i], Blocks(BLOCK)
+            ensembles.append(run_paths(job, options.runs, store, pool, blocks, tell))
     units = {"speed": "m/s", **{key: label.partition("[")[2][:-1] for key, label in KEPT.items()}}
     scatters = [{key: scatter(arrays[key]) for key in KEPT} for arrays in ensembles]
     for name, each, single, arrays, means in zip(options.names, scenes, singles, ensembles, scatters, strict=False):

@@ -26,8 +26,8 @@ from models.core.strict import Strict, quantity, read
 from models.core.told import Results
 from models.core.whole_files import write_whole
 from models.engines.catalogue import CATALOGUE
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import run_paths
 from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import cluster, processes
@@ -101,7 +101,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
             if engine == "mujoco":
                 repeated = run_paths(mujoco_threads(*asked, options.workers), options.engine_paths)
             else:
-                repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, block=1)
+                repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
             gaps[engine] = gap(found, repeated, times)
     write_measurement(measured, folder, period)
     true = measured.states[np.rint(times / scene.run.step).astype(int)]

@@ -28,6 +28,7 @@ from models.sensors.motion_assumptions import Record, assumptions
 from models.sensors.rate_filter import filter_rates
 from models.sensors.rigid_body_motion import (
     LIMIT,
+    CutOffs,
     Motion,
     Quality,
     Start,
@@ -50,8 +51,6 @@ CHANNELS = {"pitch": ("pitch", "rad"), "rate": ("pitch_rate", "rad/s"), "heave":
 TILT = 1e-3
 """Tilt error (rad) of the false displacement in the table."""
 SENSORS = "effects.accelerometers.sensors"
-CUT_OFFS = ("turning_cut_off", "position_cut_off")
-"""Options of the high-passed way."""
 
 
 class Options(Strict):
@@ -138,7 +137,7 @@ def check(scene: Scene, engines: tuple[str, ...]) -> tuple[Options, Parameters]:
             )
             raise InputError(scene.file, "options.zeroed", True, allowed)
         count, period = round(scene.run.duration * p.sampling_rate) + 1, 1 / p.sampling_rate
-    for name in CUT_OFFS:
+    for name in ("turning_cut_off", "position_cut_off"):
         check_cut_off(count, period, getattr(options, name), scene.file, f"options.{name}")
     return options, p
 
@@ -193,8 +192,8 @@ def _recover(source: Source, array: SensorArray, options: Options, p: Parameters
     if source.gyro is not None:
         turning = source.gyro[:, None] * [0.0, 1.0, 0.0]  # it reads the pitch rate; the vehicle does nothing else
         source.ways["rates from the gyro"] = moved(array, readings, rates=turning)
-    cut_offs = {name: getattr(options, name) for name in CUT_OFFS}
-    source.ways["high-passed"] = moved(array, readings, **cut_offs)
+    cut_offs = CutOffs(options.turning_cut_off, options.position_cut_off)
+    source.ways["high-passed"] = moved(array, readings, cut_offs=cut_offs)
 
 
 def _values(found: Motion) -> dict[str, np.ndarray]:

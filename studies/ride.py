@@ -27,7 +27,7 @@ from models.systems.ride.of_scene import (
 )
 from models.systems.ride.plan import doubts, met
 from models.systems.ride.readings import isotropic_change, largest_gap, static_loads
-from models.systems.ride.run import AS_WRITTEN
+from models.systems.ride.run import AS_WRITTEN, SweepPoints
 from models.systems.ride.scene import RideScene
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import PartOutput, PointOutput, SpatialVehicle
@@ -80,7 +80,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     results = {}
     for i, engine in enumerate(engines):
         progress(f"linear vehicle of {engine}", 0.6 * i / len(engines))
-        results[engine] = run_scene(scene, engine, speeds=[*speeds, speed], correlations=roads, error=scene.error)
+        results[engine] = run_scene(scene, engine, points=SweepPoints([*speeds, speed], roads), error=scene.error)
     sweeps = {engine: result.detail for engine, result in results.items()}
     first, linear = sweeps[engines[0]], linear_vehicle(vehicle, engines[0])(speed)
     progress("figures", 0.7)
@@ -89,7 +89,7 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     _save_system(scene, linear, speed, folder)
     if along := _along(vehicle):
         plain = scene.model_copy(update={"weighting": {}})
-        at = run_scene(plain, "reference", vehicle=along, speeds=[speed], correlations=roads).detail
+        at = run_scene(plain, "reference", vehicle=along, points=SweepPoints([speed], roads)).detail
         places = [output.point[0] for output in along.outputs if isinstance(output, PointOutput)]
         along_figure(places, at, first, vehicle, speed, top, folder / "body_acceleration.png")
     kinds = [output.kind for output in vehicle.outputs] + ["acceleration"] * len(scene.weighting)

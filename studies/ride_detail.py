@@ -19,6 +19,7 @@ from models.ride.excited import excited
 from models.systems import run as run_scene
 from models.systems.ride.of_scene import check_linear, excitation_of, linear_vehicle, vehicle_of
 from models.systems.ride.readings import largest_errors
+from models.systems.ride.run import SweepPoints
 from models.systems.ride.scene import RideScene
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import wheels
@@ -71,7 +72,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     for i, (name, vehicle) in enumerate(models.items()):
         progress(name, i / len(models))
         roads = {road: ROADS[road] for road in _roads(vehicle)}
-        results[name] = run_scene(plain, "reference", vehicle=vehicle, correlations=roads, error=scene.error)
+        points = SweepPoints(correlations=roads)
+        results[name] = run_scene(plain, "reference", vehicle=vehicle, points=points, error=scene.error)
     sweeps = {name: run.detail for name, run in results.items()}
     names = [output.name for output in full.outputs]
     truth = list(sweeps.values())[-1].deviation[-1]

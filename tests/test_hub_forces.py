@@ -15,7 +15,7 @@ from models.systems.hub_forces.comparison import compare
 from models.systems.hub_forces.measurement import Angles, HubForces, recorded, truth, two_tracks
 from models.systems.hub_forces.run import run, with_angles
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import estimate, pulled
+from models.systems.hub_forces.tilt_filter import Deviations, estimate, pulled
 from models.vehicles.cut_vehicle import PITCH, ROLL, cut, rigid
 from models.vehicles.spatial_linear import linearise
 from studies.hub_forces import save
@@ -77,8 +77,8 @@ def test_enforced_angles_are_met_and_the_moment_is_what_was_left_out(measured):
 
 def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     car, true, forces, angles = measured
-    deviation = np.tile([8.0] * 3 + [1.0] * 3, 4)
-    tilt = estimate(car, forces, angles.noisy((1.75e-3, 5e-3), 3), deviation, (1.75e-3, 5e-3), 1.0)
+    deviations = Deviations(np.tile([8.0] * 3 + [1.0] * 3, 4), (1.75e-3, 5e-3), 1.0)
+    tilt = estimate(car, forces, angles.noisy((1.75e-3, 5e-3), 3), deviations)
     assert np.abs(tilt.states[50:, :2] - angles.samples[50:, :2]).max() < 3e-3
     shifted = replace(forces, samples=forces.samples + np.eye(24)[3] * 400.0)  # 1.4 rad/s^2 of roll that was not
     free, drawn = (
@@ -88,7 +88,7 @@ def test_the_filter_holds_both_angles_and_refuses_what_contradicts(measured):
     off = [np.abs(run.states[-1, ROLL] - true.states[-1, ROLL]) for run in (free, drawn)]
     assert off[0] > 0.3 and off[1] < 0.02
     with pytest.raises(InputError, match="contradicts the hub forces"):
-        estimate(car, replace(forces, samples=-forces.samples), angles, deviation, (1.75e-3, 5e-3), 1.0)
+        estimate(car, replace(forces, samples=-forces.samples), angles, deviations)
 
 
 def test_the_laws_of_the_rigid_vehicle():

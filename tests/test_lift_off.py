@@ -175,8 +175,8 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
         dy = np.empty(8)
 
         def wrong(y, u, p, law=law, dy=dy):
-            f3, f4 = pitch_plane_equations.suspension(y, p, np.sin(y[3]), np.cos(y[3]))
-            pitch_plane_equations.newton_euler(y, *law(y, u, p), f3, f4, np.cos(y[3]), p, dy)
+            struts = pitch_plane_equations.suspension(y, p, np.sin(y[3]), np.cos(y[3]))
+            pitch_plane_equations.newton_euler(y, law(y, u, p), struts, np.cos(y[3]), p, dy)
             return dy
 
         monkeypatch.setattr(reference, "derivative_of", lambda *key, wrong=wrong: wrong)

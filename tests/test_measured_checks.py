@@ -17,7 +17,7 @@ from models.measured.faults_of_measurement import Faults
 from models.measured.ratios import wrong
 from models.measured.recording import Recording
 from models.measured.signal import Place, Quantity, Signal
-from models.systems.hub_forces.tilt_filter import TiltFilter
+from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.consequences import CORRECTIONS, Consequence, told
 from models.systems.measured.inputs import Inputs
 from models.systems.measured.section_run import Outcome
@@ -371,6 +371,6 @@ def test_a_filter_names_a_biased_gyro_and_no_right_one(bias, named, ridden, tmp_
     own = recording(ridden, samples, tmp_path / "a.columns")
     inputs = Inputs(own, ridden.vehicle)
     forces = np.tile(np.repeat([bench.NOISE["force"], bench.NOISE["moment"]], 3), 4)
-    followed = TiltFilter(ridden.vehicle, "hub", own.period, forces, (1.75e-3, 5e-3), 10.0)
+    followed = TiltFilter(ridden.vehicle, "hub", own.period, Deviations(forces, (1.75e-3, 5e-3), 10.0))
     followed.advance(inputs.wrenches(0, own.count), inputs.tilt(0, own.count))
     assert [named in text for text in followed.doubts()] == [True] * bool(bias)

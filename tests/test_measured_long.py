@@ -16,7 +16,7 @@ from models.fatigue.damage import turning_points
 from models.fatigue.rainflow_cycles import cycles
 from models.measured.columns import Columns
 from models.measured.recording import Recording
-from models.systems.hub_forces.tilt_filter import TiltFilter
+from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 from models.systems.measured.hand_on import hand_on
 from models.systems.measured.inputs import Grid, Inputs
 from models.systems.measured.section_run import Checkpoint, Hold, SectionRun, run
@@ -175,9 +175,10 @@ def test_rows_are_linear_between_samples_and_gyros_become_rates_of_angles(whole)
 def test_the_filter_is_filterpys_and_leaves_gaps_to_the_prediction():
     car, rng, dt = r19(), np.random.default_rng(2), 1e-3
     wrenches, angles = rng.normal(0, 20, (300, 24)), rng.normal(0, 1e-3, (300, 4))
-    own = TiltFilter(car, "hub", dt, np.full(24, 8.0), (1e-3, 1e-3), 1.0)
+    own = TiltFilter(car, "hub", dt, Deviations(np.full(24, 8.0), (1e-3, 1e-3), 1.0))
     kalman = KalmanFilter(dim_x=4, dim_z=4, dim_u=2)
-    kalman.F, kalman.H, kalman.Q, kalman.R = np.eye(4) + dt * np.eye(4, k=2), np.eye(4), own.noise, 1e-6 * np.eye(4)
+    kalman.F, kalman.H, kalman.Q = np.eye(4) + dt * np.eye(4, k=2), np.eye(4), own.noise.process
+    kalman.R = 1e-6 * np.eye(4)
     kalman.B, kalman.x, kalman.P = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt]), angles[:1].T.copy(), kalman.R
     turning = own.rigid.moments(wrenches) @ own.inverse.T
     expected = [kalman.x[:, 0].copy()]

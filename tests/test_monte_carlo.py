@@ -6,7 +6,7 @@ from scipy.linalg import block_diag, expm
 
 from models.core.errors import InputError
 from models.ride.covariance import stationary
-from models.ride.monte_carlo import ACCURACY, MODES, _Cells, along, at_constant_speed, path_cell
+from models.ride.monte_carlo import MODES, _Cells, along, at_constant_speed, path_cell
 from models.ride.road_in_path import at_speed
 from models.ride.speed_profile import SpeedProfile
 from models.ride.varying_speed import varying_speed
@@ -17,7 +17,7 @@ SEED = 3
 
 def test_both_axles_answer_to_a_cell_with_their_joint_covariance():
     vehicle, road = ride("half_car")
-    cells = _Cells(vehicle, road, None, 6.0, ACCURACY)
+    cells = _Cells(vehicle, road, None, 6.0)
     front, rear = cells.length / 6.0, cells.length / 9.0  # the rear axle comes by faster
     first, second = (cells._crossed(duration)[1] for duration in (front, rear))
     modes = np.vstack([first[:, : 2 * MODES], second[:, 2 * MODES :]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.tyre.magic_formula import PACEJKA, SURFACES, Curve, filled, surface
+from models.tyre.magic_formula import PACEJKA, SURFACES, by_similarity, surface
 from models.tyre.tyre_table import TyreTable, across, along, place, stacked
 
 
@@ -51,7 +51,8 @@ def test_exact_at_nodes_linear_between_constant_beyond():
 
 
 def test_the_union_of_nodes_loses_nothing():
-    one, other = small(), filled(*SURFACES["ice"], angles=np.array([0, 0.03, 0.25]), slips=np.array([0, 0.15, 1.0]))
+    ice, nodes = SURFACES["ice"], (np.array([1e4]), np.array([0, 0.03, 0.25]), np.array([0, 0.15, 1.0]))
+    one, other = small(), by_similarity(lambda k, _: ice[0](k), lambda k, _: ice[1](k), *nodes)
     both = stacked([one, other])
     rng = np.random.default_rng(5)
     for angle, load, slip in rng.uniform((0, 5e3, 0), (0.5, 4e4, 1), (60, 3)):
@@ -139,4 +140,4 @@ def test_a_surface_that_is_none_is_told():
     with pytest.raises(InputError, match="did you mean 'snow'"):
         surface("snw")
     with pytest.raises(InputError, match="fall = 1"):
-        filled(Curve(1, 10, 1.6, 0), Curve(1, 10, 1.6, 0), fall=1.0)
+        surface("dry", fall=1.0)

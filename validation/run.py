@@ -25,7 +25,7 @@ import numpy as np
 
 from models.core.result import provenance
 from models.core.whole_files import whole_file, write_whole
-from models.ensemble.runner import AHEAD, run_paths
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.store import Arrays, code, locked
 from models.ensemble.workers import processes
 from validation.cases import CASES
@@ -117,8 +117,8 @@ def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone:
     def lost(cases: range, reason: str) -> Arrays:
         return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
 
-    store, ahead = job.folder / KEPT / ("alone" if alone else "together"), 1 if alone else AHEAD
-    found = run_paths(job, len(job.names), store, pool, 1, lambda done: progress(done.done), lost, ahead)["record"]
+    store, blocks = job.folder / KEPT / ("alone" if alone else "together"), Blocks(1, 1) if alone else Blocks(1)
+    found = run_paths(job, len(job.names), store, pool, blocks, lambda done: progress(done.done), lost)["record"]
     records = (json.loads(str(one)) for one in found)
     return {
         name: ([Row(**row) for row in record["rows"]], record["seconds"])

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -115,10 +116,11 @@ def rows_at(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 class Series(NamedTuple):
-    """Channels (n, ...) of a run by name, at its times (n,) in s."""
+    """Channels (n, ...) of a run by name, at its times (n,) in s; units of those that its result does not have."""
 
     times: np.ndarray
     channels: Mapping[str, np.ndarray]
+    units: Mapping[str, str] = MappingProxyType({})
 
 
 Again = Callable[[float, float], Series]
@@ -132,19 +134,18 @@ def estimated(
     again: Again,
     order: float,
     step: float,
-    units: Mapping[str, str] | None = None,
     growth: Mapping[str, float] | None = None,
     sizes: Mapping[str, float] | None = None,
 ) -> Result:
     """The result with the errors of the channels of ``fine``, its own rows at steps of ``step`` (s).
 
-    units : of these channels, where the result has no channels of their names; growth : by channel, least factor on
+    growth : by channel, least factor on
     what a part tells, where errors grow faster than by a power of time; sizes : what shares are of, by channel, where
     that is not its own deviation. Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
     told, how = by_steps(fine, again, order, step, growth, sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
-    known |= units or {}
+    known |= fine.units
     return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
 
 

@@ -106,7 +106,6 @@ def result(
     channels: Mapping[str, Channel],
     axes: Mapping[str, Channel],
     *,
-    engine: str = "",
     counts: Mapping[str, int] | None = None,
     seconds: float = 0.0,
     doubts: Sequence[str] = (),
@@ -116,7 +115,7 @@ def result(
     """The result of a scene's run.
 
     axes : coordinates by their names; counts : of steps, calls and the like, which repeat; seconds : of the march;
-    doubts : sentences on what contradicts the scene; attributes : more of them, numbers or text.
+    doubts : sentences on what contradicts the scene; attributes : the ``engine`` and more, numbers or text.
     """
     import xarray as xr
 
@@ -128,7 +127,7 @@ def result(
         "title": scene.title,
         "scene": scene.file,
         "system": scene.system,
-        "engine": engine,
+        "engine": "",
         **attributes,
         "status": "complete, in doubt" if doubts else "complete",
         "doubts": json.dumps(list(doubts)),

@@ -107,8 +107,8 @@ def _pitch_spring(built: Build, spring: PitchSpring) -> None:
     Exudyn has limit stops, but asks once per step whether one is touched: not what a stage would find.
     """
 
-    def moment(mbs: Any, t: float, item: int, angle: float, rate: float, k: float, d: float, offset: float) -> float:
-        beyond = abs(angle) - spring.dead_band
+    def moment(mbs: Any, t: float, item: int, angle: float, rate: float, *law: float) -> float:
+        (k, d, _), beyond = law, abs(angle) - spring.dead_band
         return k * math.copysign(beyond, angle) + d * rate if beyond >= 0 else 0.0
 
     _to_ground(built, (spring.body, "pitch"), spring, moment if spring.dead_band else None)
@@ -118,7 +118,8 @@ def _pushing_tyre(built: Build, tyre: Strut, height: Reader, rate: Reader) -> No
     """A tyre that can lift, on a road of this height (m, down) and rate: Exudyn has no item for it that switches
     within a step."""
 
-    def force(mbs: Any, t: float, item: int, place: float, speed: float, k: float, d: float, offset: float) -> float:
+    def force(mbs: Any, t: float, item: int, place: float, speed: float, *law: float) -> float:
+        k, d, _ = law
         pressed = k * (place - height(mbs, t, 0.0))
         return max(min(pressed + d * (speed - rate(mbs, t, 0.0)), 2.0 * pressed), 0.0)
 

@@ -14,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -30,6 +30,21 @@ TOLD = 5
 """Failed blocks that a message names."""
 LIVES = 3
 """Times that a block may lose its worker: among others, again among others, and alone, where it is to blame."""
+
+
+class Blocks(NamedTuple):
+    """How paths are cut: ``size`` paths per block, of which at most ``ahead`` are under way at once."""
+
+    size: int = BLOCK
+    ahead: int = AHEAD
+
+    def cut(self, paths: int) -> list[range]:
+        """Path numbers of each block."""
+        return [range(first, min(first + self.size, paths)) for first in range(0, paths, self.size)]
+
+
+BLOCKS = Blocks()
+"""As paths are cut where nothing else is asked for."""
 
 
 class Job(Protocol):
@@ -97,10 +112,9 @@ def run_paths(
     paths: int,
     folder: Path | None = None,
     executor: Executor | None = None,
-    block: int = BLOCK,
+    blocks: Blocks = BLOCKS,
     progress: Callable[[Progress], None] = lambda state: None,
     lost: Callable[[range, str], Arrays] | None = None,
-    ahead: int = AHEAD,
 ) -> Arrays:
     """Arrays of all paths 0 to ``paths`` - 1, the same bits on any executor, in any order and after any interruption.
 
@@ -109,21 +123,20 @@ def run_paths(
     (``processes``), a Dask cluster (``cluster``), a thread pool; None computes here. A block that fails does
     not stop the others, and one that loses its worker is computed again: RunFailed then names the blocks and paths
     that are left, and what is finished is kept. A full disk ends it at once, with RunFailed. lost : (paths, reason)
-    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again. ahead :
-    blocks under way at once.
+    -> what stands for a block that failed, in place of RunFailed; it is not kept, so that resuming tries again.
     """
-    facts = {"paths": paths, "paths per block": block, **job.facts()}
-    cut = [range(first, min(first + block, paths)) for first in range(0, paths, block)]
+    facts = {"paths": paths, "paths per block": blocks.size, **job.facts()}
+    cut = blocks.cut(paths)
     store = _Memory() if folder is None else Store(folder)
     with nullcontext() if isinstance(store, _Memory) else store.claimed(facts):
-        failed = _compute(job, cut, store, executor, progress, ahead)
+        failed = _compute(job, cut, store, executor, progress, blocks.ahead)
         if failed and lost is None:
             told = [f"block {i} (paths {cut[i][0]} to {cut[i][-1]}): {reason}" for i, reason in failed.items()]
             kept = "" if folder is None else f"; the finished blocks are kept in {folder}: resume there"
             more = f"; {len(failed) - TOLD} more blocks" if len(failed) > TOLD else ""
             raise RunFailed("ensemble", "; ".join(told[:TOLD]) + more + kept)
-        blocks = [lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))]
-        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+        arrays = [lost(cut[i], failed[i]) if lost and i in failed else store.load(i) for i in range(len(cut))]
+        return {name: np.concatenate([block[name] for block in arrays]) for name in arrays[0]}
 
 
 def _compute(

@@ -9,12 +9,31 @@ import numpy as np
 
 from models.machine.compiled import lean, njit
 
-TRAVEL, RATE = 0, 1
-"""What a curve is over: the first index of its hinges."""
 POWERS = 4
 """Of the outputs, from the first on, that are summed."""
 TOGETHER = 64
 """Copies that are stepped side by side, in vector registers: one after the other they take four times as long."""
+
+
+class Curves(NamedTuple):
+    """Forces (N) of s springs over travel (m) or over rate (m/s): offset and first slope (s,), and what their slopes
+    change by, bends (s, k), at k corners (s, k); a bend is 0 where a spring has fewer."""
+
+    offset: np.ndarray
+    slope: np.ndarray
+    corners: np.ndarray
+    bends: np.ndarray
+
+
+class PushingTyres(NamedTuple):
+    """Tyres that only push: wheel (u,) of each among those on the road, load at rest (u,) in N, stiffness (u,) in N/m,
+    damping (u,) in N s/m, heights (u, n): rise of each by the coordinates."""
+
+    wheel: np.ndarray
+    load: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    heights: np.ndarray
 
 
 class Laws(NamedTuple):
@@ -22,21 +41,18 @@ class Laws(NamedTuple):
 
     rows (s, n): travel of each spring; motion (n, 2 n + 2 w + s + u): accelerations by positions, rates, road, bent
     forces and what tyres that only push have beside linear ones; read (p, 3 n + 2 w + s + u): outputs by positions,
-    rates, road, accelerations and the same forces; lines (2, s, 2): offset and first slope of the curves over travel
-    and over rate; corners, bends (2, s, k): what they have at k corners, a bend of 0 where they have fewer; friction
-    (s, 2): N, and the rate (m/s) over which it turns; heights (u, n): rise of each tyre; tyres (u, 4): its wheel among
-    w, load at rest (N), stiffness (N/m), damping (N s/m).
+    rates, road, accelerations and the same forces; by_travel, by_rate: curves of the springs; friction (s,): N;
+    turning (s,): rate (m/s) over which friction turns; tyres: the u that only push.
     """
 
     rows: np.ndarray
     motion: np.ndarray
     read: np.ndarray
-    lines: np.ndarray
-    corners: np.ndarray
-    bends: np.ndarray
+    by_travel: Curves
+    by_rate: Curves
     friction: np.ndarray
-    heights: np.ndarray
-    tyres: np.ndarray
+    turning: np.ndarray
+    tyres: PushingTyres
 
 
 @lean
@@ -48,32 +64,32 @@ def add(total, factor, values):
 
 
 @lean
-def on_curve(kind, spring, argument, laws, force):
+def on_curve(curves, spring, argument, force):
     """Add what a spring's curve over travel or rate (copies,) gives to its force (copies,) in N."""
-    offset, slope = laws.lines[kind, spring, 0], laws.lines[kind, spring, 1]
+    offset, slope = curves.offset[spring], curves.slope[spring]
     for c in range(force.size):
         force[c] += offset + slope * argument[c]
-    for k in range(laws.corners.shape[2]):
-        corner, bend = laws.corners[kind, spring, k], laws.bends[kind, spring, k]
+    for k in range(curves.corners.shape[1]):
+        corner, bend = curves.corners[spring, k], curves.bends[spring, k]
         if bend != 0.0:
             for c in range(force.size):
                 force[c] += bend * max(argument[c] - corner, 0.0)
 
 
 @lean
-def off_road(u, x, road, laws, pressed, rate, lost):
+def off_road(u, x, road, tyres, pressed, rate, lost):
     """Fill what a tyre that only pushes has beside a linear one (copies,) in N: 0 on the road, its pull off it.
 
     pressed, rate (copies,) are written over.
     """
-    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, int(laws.tyres[u, 0])
-    load, stiffness, damping = laws.tyres[u, 1], laws.tyres[u, 2], laws.tyres[u, 3]
+    n, wheels, wheel = x.shape[0] // 2, road.shape[0] // 2, tyres.wheel[u]
+    load, stiffness, damping = tyres.load[u], tyres.stiffness[u], tyres.damping[u]
     pressed[:], rate[:] = 0.0, 0.0
     add(pressed, 1.0, road[wheel])
     add(rate, 1.0, road[wheels + wheel])
     for j in range(n):
-        add(pressed, -laws.heights[u, j], x[j])
-        add(rate, -laws.heights[u, j], x[n + j])
+        add(pressed, -tyres.heights[u, j], x[j])
+        add(rate, -tyres.heights[u, j], x[n + j])
     for c in range(lost.size):
         elastic = load + stiffness * pressed[c]
         whole = elastic + damping * rate[c]
@@ -86,18 +102,18 @@ def rates(x, road, laws, force, out, room):
     (s + u, copies) in N that are not linear; room (2, copies) is written over."""
     n, w, springs = x.shape[0] // 2, road.shape[0], laws.rows.shape[0]
     for s in range(springs):
-        travel, slip, bent = room[TRAVEL], room[RATE], force[s]
+        travel, slip, bent = room[0], room[1], force[s]
         travel[:], slip[:], bent[:] = 0.0, 0.0, 0.0
         for j in range(n):
             add(travel, laws.rows[s, j], x[j])
             add(slip, laws.rows[s, j], x[n + j])
-        on_curve(TRAVEL, s, travel, laws, bent)
-        on_curve(RATE, s, slip, laws, bent)
-        if laws.friction[s, 0] != 0.0:
+        on_curve(laws.by_travel, s, travel, bent)
+        on_curve(laws.by_rate, s, slip, bent)
+        if laws.friction[s] != 0.0:
             for c in range(bent.size):
-                bent[c] += laws.friction[s, 0] * math.tanh(slip[c] / laws.friction[s, 1])
-    for u in range(laws.heights.shape[0]):
-        off_road(u, x, road, laws, room[TRAVEL], room[RATE], force[springs + u])
+                bent[c] += laws.friction[s] * math.tanh(slip[c] / laws.turning[s])
+    for u in range(laws.tyres.wheel.size):
+        off_road(u, x, road, laws.tyres, room[0], room[1], force[springs + u])
     for i in range(n):
         out[i], out[n + i] = 0.0, 0.0
         add(out[i], 1.0, x[n + i])
@@ -154,7 +170,7 @@ def march(states, roads, step, first, every, laws, sums):
         own = slice(copy, min(copy + TOGETHER, states.shape[1]))
         x, road = states[:, own].copy(), roads[:, :, own].copy()
         k1, k2, k3, k4, moved = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
-        forces = laws.rows.shape[0] + laws.heights.shape[0]
+        forces = laws.rows.shape[0] + laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
         for i in range(road.shape[0] // 2):
             rates(x, road[2 * i], laws, force, k1, room)

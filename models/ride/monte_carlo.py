@@ -20,7 +20,6 @@ from models.core.errors import InputError
 from models.core.noise import BLOCK, ROAD, normal
 from models.ride.covariance import FINITE, stationary
 from models.ride.excited import DelayedSystem
-from models.ride.marginal import ACCURACY
 from models.ride.road_in_path import at_speed, powers
 from models.ride.speed_profile import SpeedProfile
 from models.road.excitation import Excitation
@@ -69,17 +68,16 @@ def along(
     copies: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
-    accuracy: float = ACCURACY,
 ) -> Estimate:
     """Variances along a drive, over the copies, where a cell ends next to each of the instants (s).
 
-    The drive begins in the stationary state of its first speed; ``accuracy`` of the matrices as in ``stationary``.
-    Raises InputError for a standstill: a cell would take for ever.
+    The drive begins in the stationary state of its first speed. weightings : weighted outputs to add, as in
+    ``weighting.weighted``. Raises InputError for a standstill: a cell would take for ever.
     """
     slowest = float(profile.speeds.min())
     if slowest == 0.0:
         raise InputError("", "drive.speed", 0.0, "must be above 0 for Monte Carlo, which steps along the road")
-    cells = _Cells(vehicle, excitation, weightings, slowest, accuracy)
+    cells = _Cells(vehicle, excitation, weightings, slowest)
     ends = profile.time(cells.length * np.arange(1, int(profile.paths[-1] / cells.length) + 1))
     wanted = np.unique(np.abs(ends[:, None] - np.asarray(instants)).argmin(axis=0))
     first = float(profile.speeds[0])
@@ -102,10 +100,9 @@ def at_constant_speed(
     copies: int = 4000,
     seed: int = 0,
     weightings: Mapping[str, str] | None = None,
-    accuracy: float = ACCURACY,
 ) -> Estimate:
     """Stationary variances (1, p) over the copies and, in each of them, over ``duration`` (s)."""
-    cells = _Cells(vehicle, excitation, weightings, speed, accuracy)
+    cells = _Cells(vehicle, excitation, weightings, speed)
     skipped, counted = cells.to_forget(speed), max(1, round(duration * speed / cells.length))
     total = np.zeros(())
     for number, x in enumerate(cells.states(np.full(skipped + counted, cells.length / speed), copies, seed)):
@@ -136,18 +133,13 @@ class _Cells:
     """A system cut into cells of path that suit its axles and its slowest speed (m/s)."""
 
     def __init__(
-        self,
-        vehicle: LinearVehicle,
-        excitation: Excitation,
-        weightings: Mapping[str, str] | None,
-        slowest: float,
-        accuracy: float,
+        self, vehicle: LinearVehicle, excitation: Excitation, weightings: Mapping[str, str] | None, slowest: float
     ) -> None:
         def system(speed: float) -> DelayedSystem:
             return at_speed(vehicle, excitation, speed, weightings)
 
         self.one, self.two = system(1.0), system(2.0)
-        self.finite = np.array([status == FINITE for status in stationary(system(slowest), accuracy).status])
+        self.finite = np.array([status == FINITE for status in stationary(system(slowest)).status])
         fastest = np.abs(np.linalg.eigvals(system(slowest).A)).max() / slowest
         self.length, self.shifts = path_cell(excitation.lengths, REACH / fastest)
         self.at_rest, self.per_speed = 2.0 * self.one.A - self.two.A, self.two.A - self.one.A

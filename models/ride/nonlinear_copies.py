@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.ride.copies_kernel import POWERS, Laws, march
+from models.ride.copies_kernel import POWERS, Curves, Laws, PushingTyres, march
 from models.ride.road_path import RoadPath, check_rates, road_path
 from models.ride.statistical_linearisation import bent, statistically_linear
 from models.road.excitation import Excitation
@@ -218,15 +218,15 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
             read.reshape(len(plain.outputs), -1),
         ]
     )
-    friction = np.array([(s.friction, s.friction_rate) for s in springs]).reshape(-1, 2)
     return Laws(
         rows,
         motion,
         read,
-        *_hinges([[s.travel_force, s.rate_force] for s in springs]),
-        friction,
-        heights,
-        _of_tyres(vehicle, pushing),
+        _curves([s.travel_force for s in springs]),
+        _curves([s.rate_force for s in springs]),
+        np.array([s.friction for s in springs], dtype=float),
+        np.array([s.friction_rate for s in springs], dtype=float),
+        _pushing(vehicle, pushing, heights),
     )
 
 
@@ -235,21 +235,24 @@ def _part(output: SpatialOutput) -> str:
     return output.part if isinstance(output, PartOutput) else output.tyre if isinstance(output, TyreOutput) else ""
 
 
-def _of_tyres(vehicle: SpatialVehicle, pushing: Sequence[Tyre]) -> np.ndarray:
-    """``Laws.tyres`` of tyres that only push."""
-    if not pushing:
-        return np.empty((0, 4))
-    loads = preloads(vehicle).tyres
-    return np.array([(vehicle.tyres.index(t), loads[t.name], t.stiffness, t.damping) for t in pushing])
+def _pushing(vehicle: SpatialVehicle, tyres: Sequence[Tyre], heights: np.ndarray) -> PushingTyres:
+    """Tyres that only push, whose rises by the coordinates are ``heights`` (u, n)."""
+    loads = preloads(vehicle).tyres if tyres else {}
+    load, stiffness, damping = (
+        np.array([(loads[tyre.name], tyre.stiffness, tyre.damping) for tyre in tyres], dtype=float)
+        .reshape(-1, 3)
+        .T.copy()
+    )
+    wheel = np.array([vehicle.tyres.index(tyre) for tyre in tyres], dtype=np.int64)
+    return PushingTyres(wheel, load, stiffness, damping, heights)
 
 
-def _hinges(curves: Sequence[Sequence[Curve | None]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """lines, corners and bends of ``Laws`` for the two curves of every spring, filled up with bends of 0."""
-    known = [[curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in both] for both in curves]
-    most = max((len(corners) for both in known for _, _, corners, _ in both), default=0)
-    lines, corners, bends = (np.zeros((2, len(known), size)) for size in (2, most, most))
-    for i, both in enumerate(known):
-        for kind, (offset, slope, at, bent_by) in enumerate(both):
-            lines[kind, i] = offset, slope
-            corners[kind, i, : len(at)], bends[kind, i, : len(at)] = at, bent_by
-    return lines, corners, bends
+def _curves(curves: Sequence[Curve | None]) -> Curves:
+    """The curves of springs, filled up with bends of 0; a spring without one has a curve of 0."""
+    known = [curve.hinges() if curve else (0.0, 0.0, (), ()) for curve in curves]
+    most = max((len(corners) for _, _, corners, _ in known), default=0)
+    offset, slope = np.array([line for *line, _, _ in known], dtype=float).reshape(-1, 2).T.copy()
+    corners, bends = np.zeros((len(known), most)), np.zeros((len(known), most))
+    for i, (_, _, at, bent_by) in enumerate(known):
+        corners[i, : len(at)], bends[i, : len(at)] = at, bent_by
+    return Curves(offset, slope, corners, bends)

@@ -85,6 +85,11 @@ class SineProfile:
         object.__setattr__(self, "window_length", _window(self.window_length))
 
     @property
+    def waves(self) -> kernels.Waves:
+        """As compiled functions take them."""
+        return kernels.Waves(self.amplitude, self.wavenumber, self.phase, self.window_length)
+
+    @property
     def extent(self) -> tuple[float, float]:
         """Without end on both sides."""
         return -math.inf, math.inf
@@ -98,7 +103,7 @@ class SineProfile:
         """Heights (m, positive down) and slopes at the arc lengths ``s`` (m), in the shape of ``s``."""
         flat, shape = _flat(s)
         height, slope = np.empty_like(flat), np.empty_like(flat)
-        kernels.sines(flat, self.amplitude, self.wavenumber, self.phase, self.window_length, height, slope)
+        kernels.sines(flat, self.waves, height, slope)
         return height.reshape(shape), slope.reshape(shape)
 
     def sample_uniform(self, start: float, step: float, count: int) -> Samples:
@@ -110,8 +115,7 @@ class SineProfile:
         """
         start, step = _finite(start, "start"), _finite(step, "step")
         height, slope = np.empty(count), np.empty(count)
-        waves = (self.amplitude, self.wavenumber, self.phase, self.window_length)
-        kernels.sines_uniform(start, step, *waves, height, slope)
+        kernels.sines_uniform(start, step, self.waves, height, slope)
         return height, slope
 
     def height_slope_at(self, s: float) -> tuple[float, float]:

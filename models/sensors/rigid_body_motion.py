@@ -17,6 +17,8 @@ from models.sensors.sensor_array import SensorArray, sensor_array
 LIMIT = 0.05
 """Share of the relative accelerations that a rigid body may leave unexplained: a mount at 10 times the frequency of
 the motion moves by 1 % of it, one at twice by a third."""
+GRAVITY = 9.81
+"""m/s^2, down."""
 NOISE_FACTOR = 1.5
 """Times the misfit that the readings' noise alone leaves, below which nothing is held against the body."""
 
@@ -73,6 +75,18 @@ class Start:
         """Of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
         level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
         return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
+
+
+@dataclass(frozen=True)
+class CutOffs:
+    """High-pass filters (Hz) against drift; None is no filter.
+
+    turning : of the rates and again of the angles, which takes true grades away, too; position : of velocity and of
+    position.
+    """
+
+    turning: float | None = None
+    position: float | None = None
 
 
 @dataclass(frozen=True)
@@ -250,33 +264,29 @@ def motion(
     readings: np.ndarray,
     period: float,
     start: Start | None = None,
-    gravity: float = 9.81,
     zeroed: bool = False,
     rates: np.ndarray | None = None,
-    turning_cut_off: float | None = None,
-    position_cut_off: float | None = None,
+    cut_offs: CutOffs | None = None,
 ) -> Motion:
     """Motion of the body's reference point and axes, steps 1 to 6 of the paper.
 
     readings : (n, sensors, 3) in m/s^2, local; specific force, or with ``zeroed`` set to zero at rest on level
     ground, as sensors with a correction for gravity give it (17); period : s
     rates : (n, 3) in rad/s, local, from a gyro or a filter, in the place of the integrated ones
-    turning_cut_off : high-pass (Hz) on the rates and again on the angles, which takes true grades away, too
-    position_cut_off : high-pass (Hz) on velocity and on position
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
-    start = start or Start()
+    start, cut_offs = start or Start(), cut_offs or CutOffs()
     found = spin(array, readings)
     w = integrate_rates(found, period, np.array(start.rates)) if rates is None else rates
-    w = w if turning_cut_off is None else high_pass(w, period, turning_cut_off)
+    w = _filtered(w, period, cut_offs.turning)
     orientation = integrate(w, period, np.array(start.orientation))
-    if turning_cut_off is not None:
-        orientation = from_cardan(*high_pass(np.unwrap(cardan(orientation), axis=0), period, turning_cut_off).T)
+    if cut_offs.turning is not None:
+        orientation = from_cardan(*high_pass(np.unwrap(cardan(orientation), axis=0), period, cut_offs.turning).T)
     alpha = angular_acceleration(found, w)
-    down = np.array([0.0, 0.0, gravity])
+    down = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
-    velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, position_cut_off)
-    position = _filtered(integrated(velocity, period, np.array(start.position)), period, position_cut_off)
+    velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, cut_offs.position)
+    position = _filtered(integrated(velocity, period, np.array(start.position)), period, cut_offs.position)
     return Motion(alpha, w, orientation, acceleration, velocity, position)
 
 
@@ -297,7 +307,7 @@ def _filtered(values: np.ndarray, period: float, cut_off: float | None) -> np.nd
     return values if cut_off is None else high_pass(values, period, cut_off)
 
 
-def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = 9.81) -> np.ndarray:
+def tilt_displacement(tilt: float, times: np.ndarray, gravity: float = GRAVITY) -> np.ndarray:
     """False horizontal displacement (n,) in m of a constant tilt error (rad), by gravity: g sin(tilt) t^2 / 2."""
     return 0.5 * gravity * np.sin(tilt) * times**2
 

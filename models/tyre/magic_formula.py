@@ -145,21 +145,7 @@ def surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0)
     """
     if name not in SURFACES:
         raise InputError("", "surface", name, "no such surface", tuple(SURFACES))
-    return filled(*SURFACES[name], scale=scale, load=load, fall=fall, name=name)
-
-
-def filled(
-    along: Pure,
-    across: Pure,
-    *,
-    scale: float = 1.0,
-    load: float = 1e4,
-    fall: float = 0.0,
-    angles: np.ndarray = ANGLES,
-    slips: np.ndarray = SLIPS,
-    name: str = "",
-) -> TyreTable:
-    """Table of two curves of pure slip at given nodes; see ``surface`` for its friction under other loads."""
+    along, across = SURFACES[name]
     if not 0.0 <= fall < 1.0:
         raise InputError(name, "fall", fall, "must be from 0 to below 1")
     loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])
@@ -167,6 +153,4 @@ def filled(
     def times(own: float) -> float:
         return scale * (1.0 - fall * (own / load - 1.0))
 
-    return by_similarity(
-        lambda k, own: times(own) * along(k), lambda k, own: times(own) * across(k), loads, angles, slips, name
-    )
+    return by_similarity(lambda k, own: times(own) * along(k), lambda k, own: times(own) * across(k), loads, name=name)

@@ -65,8 +65,9 @@ def pushing_tyres(y, u, p):
 
 
 @register_jitable
-def newton_euler(y, f1, f2, f3, f4, cosine, p, dy):
-    """Balance of forces and moments, eq. (36)."""
+def newton_euler(y, wheels, struts, cosine, p, dy):
+    """Balance of forces and moments, eq. (36): wheel forces f1, f2 (N, up on the wheel), suspension forces f3, f4."""
+    (f1, f2), (f3, f4) = wheels, struts
     for i in range(4):
         dy[i] = y[4 + i]
     dy[4] = p[14] + (f3 - f1) / p[2]
@@ -79,49 +80,39 @@ def newton_euler(y, f1, f2, f3, f4, cosine, p, dy):
 def road_exact(y, u, p, dy):
     """Road-excited vehicle, nonlinear in pitch (38)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    f3, f4 = suspension(y, p, sine, cosine)
-    f1, f2 = tyres(y, u, p)
-    newton_euler(y, f1, f2, f3, f4, cosine, p, dy)
+    newton_euler(y, tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def road_linear(y, u, p, dy):
     """Road-excited vehicle, linearised about zero pitch (38 with A(0))."""
-    f3, f4 = suspension(y, p, y[3], 1.0)
-    f1, f2 = tyres(y, u, p)
-    newton_euler(y, f1, f2, f3, f4, 1.0, p, dy)
+    newton_euler(y, tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def lift_off_exact(y, u, p, dy):
     """Vehicle on tyres that only push, nonlinear in pitch."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    f3, f4 = suspension(y, p, sine, cosine)
-    f1, f2 = pushing_tyres(y, u, p)
-    newton_euler(y, f1, f2, f3, f4, cosine, p, dy)
+    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def lift_off_linear(y, u, p, dy):
     """The same, linearised about zero pitch."""
-    f3, f4 = suspension(y, p, y[3], 1.0)
-    f1, f2 = pushing_tyres(y, u, p)
-    newton_euler(y, f1, f2, f3, f4, 1.0, p, dy)
+    newton_euler(y, pushing_tyres(y, u, p), suspension(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
 def force_exact(y, u, p, dy):
     """Force-excited vehicle, wheel forces vertical in the inertial frame (37)."""
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    f3, f4 = suspension(y, p, sine, cosine)
-    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
 
 
 @register_jitable
 def force_linear(y, u, p, dy):
     """Force-excited vehicle, linearised about zero pitch (37 with A(0))."""
-    f3, f4 = suspension(y, p, y[3], 1.0)
-    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, y[3], 1.0), 1.0, p, dy)
 
 
 @register_jitable
@@ -133,8 +124,7 @@ def force_body(y, u, p, dy):
     Without wheel mass the moment is b f1 - a f2 at every pitch: no cosine, hence no instability.
     """
     sine, cosine = math.sin(y[3]), math.cos(y[3])
-    f3, f4 = suspension(y, p, sine, cosine)
-    newton_euler(y, u[0] * cosine, u[1] * cosine, f3, f4, cosine, p, dy)
+    newton_euler(y, (u[0] * cosine, u[1] * cosine), suspension(y, p, sine, cosine), cosine, p, dy)
     dy[7] += sine * sine * (p[1] * u[0] - p[0] * u[1]) / p[5]
 
 
@@ -143,8 +133,7 @@ def pitch_exact(y, u, p, dy):
     """Force-excited vehicle guided by a prescribed pitch (39); pitch and its rate are read from u."""
     sine, cosine = math.sin(u[2]), math.cos(u[2])
     y[3], y[7] = u[2], u[3]
-    f3, f4 = suspension(y, p, sine, cosine)
-    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
     dy[7] = u[4]
 
 
@@ -152,8 +141,7 @@ def pitch_exact(y, u, p, dy):
 def pitch_linear(y, u, p, dy):
     """The same, linearised about zero pitch."""
     y[3], y[7] = u[2], u[3]
-    f3, f4 = suspension(y, p, u[2], 1.0)
-    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, u[2], 1.0), 1.0, p, dy)
     dy[7] = u[4]
 
 
@@ -162,8 +150,7 @@ def heave_pitch_exact(y, u, p, dy):
     """Two wheels under a chassis whose heave and pitch are prescribed, read from u."""
     sine, cosine = math.sin(u[3]), math.cos(u[3])
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    f3, f4 = suspension(y, p, sine, cosine)
-    newton_euler(y, u[0], u[1], f3, f4, cosine, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, sine, cosine), cosine, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 
@@ -171,8 +158,7 @@ def heave_pitch_exact(y, u, p, dy):
 def heave_pitch_linear(y, u, p, dy):
     """The same, linearised about zero pitch."""
     y[2], y[3], y[6], y[7] = u[2], u[3], u[4], u[5]
-    f3, f4 = suspension(y, p, u[3], 1.0)
-    newton_euler(y, u[0], u[1], f3, f4, 1.0, p, dy)
+    newton_euler(y, (u[0], u[1]), suspension(y, p, u[3], 1.0), 1.0, p, dy)
     dy[6], dy[7] = u[6], u[7]
 
 

@@ -26,8 +26,8 @@ from models.core.discretisation import worst_of
 from models.core.errors import InputError, RunFailed
 from models.core.scene_file import changed
 from models.core.whole_files import write_whole
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.runner import Progress as Done
-from models.ensemble.runner import run_paths
 from models.ensemble.store import Arrays, code, locked, named_files
 from models.ensemble.workers import processes
 from studies.command.asked import STUDIES, engines_of, load_scene, ready, scene_path
@@ -242,7 +242,7 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
         return _array(_failed(reason) for _ in points)
 
     with processes(min(WORKERS, os.cpu_count() or 1, len(job.values))) as pool:
-        found = run_paths(job, len(job.values), job.folder / RECORDS, pool, 1, tell, lost)["record"]
+        found = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
     records = [json.loads(str(one)) for one in found]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")

@@ -45,28 +45,15 @@ def law(numbers, q, v, f):
     z = s_pitch, -s_roll * c_pitch, c_roll * c_pitch
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, ahead, aside = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
+    passing = ahead, aside, head[0]
     contacts, found = doubles(4 * TOUCH), stacked(4, FORCES)
     places, pushes = doubles(12), doubles(12)
+    left = places, pushes, contacts
     moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
     for i in range(4):
-        moment = plus(
-            moment,
-            _wheel(
-                row(wheels, WHEEL, i),
-                frame,
-                ahead,
-                aside,
-                head[0],
-                q,
-                v,
-                9 + 3 * i,
-                row(places, 3, i),
-                row(pushes, 3, i),
-                row(contacts, TOUCH, i),
-            ),
-        )
-    _bar(head[6], head[7], head[8], 0, places, pushes, q, f)
-    _bar(head[9], head[10], head[11], 2, places, pushes, q, f)
+        moment = plus(moment, _wheel(row(wheels, WHEEL, i), frame, passing, q, v, i, left))
+    _bar((head[6], head[7], head[8]), 0, left, q, f)
+    _bar((head[9], head[10], head[11]), 2, left, q, f)
     forces_within(
         records(contacts, 4, CONTACT),
         strips_in(array(beyond(cells, 5 * CELLS), (4, int(head[12])))),
@@ -100,17 +87,22 @@ def law(numbers, q, v, f):
 
 
 @lean
-def _wheel(w, frame, ahead, aside, s_x, q, v, k, place, push, contact):
-    """Springs and load of a wheel of coordinates from ``k`` on, and its creepages; moment on the chassis about S."""
-    x, y, z, turning = frame
+def _wheel(w, frame, passing, q, v, i, left):
+    """Springs and load of wheel i, and its creepages; moment on the chassis about S.
+
+    passing : speeds of S ahead and aside, its place ahead of the origin. left : where places, pushes and contacts of
+    all wheels are left.
+    """
+    (x, y, z, turning), (ahead, aside, s_x), k = frame, passing, 9 + 3 * i
+    place, push, contact = row(left[0], 3, i), row(left[1], 3, i), row(left[2], TOUCH, i)
     arm = plus(plus(times(x, w[0]), times(y, w[1])), times(z, w[2]))
-    moved, passing = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
-    rate = plus(passing, cross(turning, moved))
+    moved, sliding = plus(times(x, q[k]), times(z, q[k + 1])), plus(times(x, v[k]), times(z, v[k + 1]))
+    rate = plus(sliding, cross(turning, moved))
     strut = w[7] + w[5] * (w[3] * moved[0] + w[4] * moved[2]) + w[6] * (w[3] * rate[0] + w[4] * rate[2])
     bush = w[10] + w[8] * (w[4] * moved[0] - w[3] * moved[2]) + w[9] * (w[4] * rate[0] - w[3] * rate[2])
     along, up = -strut * w[3] - bush * w[4], bush * w[3] - strut * w[4]
     place[0], place[1], place[2] = plus(arm, moved)
-    u, radius = plus(passing, cross(turning, three(place, 0))), q[3] + place[2]
+    u, radius = plus(sliding, cross(turning, three(place, 0))), q[3] + place[2]
     load, tread = max(w[11] - w[12] * (radius - w[13]), 0.0), radius * v[k + 2]
     push[0], push[1], push[2] = along, 0.0, up + load
     contact[0], contact[1], contact[2], contact[3] = math.sqrt(w[14] * load / w[12]), w[15], load, w[17]
@@ -122,10 +114,10 @@ def _wheel(w, frame, ahead, aside, s_x, q, v, k, place, push, contact):
 
 
 @lean
-def _bar(stiffness, held, by, i, places, pushes, q, f):
-    """A bar between the wheels i and i + 1 and the chassis' roll."""
-    left, right = row(places, 3, i), row(places, 3, i + 1)
-    twist = held + stiffness * (q[4] - (left[2] - right[2]) * by)
+def _bar(bar, i, left, q, f):
+    """A bar (stiffness, moment at rest, 1 / track) between the wheels i and i + 1 and the chassis' roll."""
+    (stiffness, held, by), (places, pushes, _) = bar, left
+    twist = held + stiffness * (q[4] - (row(places, 3, i)[2] - row(places, 3, i + 1)[2]) * by)
     f[4] -= twist
     row(pushes, 3, i)[2] += twist * by
     row(pushes, 3, i + 1)[2] -= twist * by

@@ -1,7 +1,6 @@
 """A braked vehicle on its suspension in both engines: loads, pitch and stops by closed forms, and the plane vehicle."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -12,7 +11,7 @@ from models.brake.controller import Command, Controller, Sample
 from models.brake.controllers.slip import SlipBangBang
 from models.brake.plane_step import LOAD
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.sprung import PITCH, Sprung
+from models.brake.sprung import PITCH
 from models.systems.braking.march import Path as Run
 from models.systems.braking.stop_report import Stop
 from models.tyre.magic_formula import surface
@@ -31,7 +30,7 @@ TURNING, HARDER = (200.0, 200.0, 100.0, 100.0), (600.0, 600.0, 200.0, 200.0)
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Locked wheels, a J-turn and its mirror image; both engines, the stiff limit and ice in the full share."""
     wet = surface("wet")
-    turns = [drive(car(), wet, steer, HARDER, 6.0) for steer in (0.1, -0.1)]
+    turns = [braked(car(), wet, steer=steer).run(steady(*HARDER), 6.0) for steer in (0.1, -0.1)]
     rows = [*_locked_rows(GENTLE), *_mirror_rows(*turns)]
     data: dict[str, Any] = {"limit": []}
     if not quick:
@@ -39,20 +38,6 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         data["limit"] = limit(wet)
         rows += _limit_rows(data["limit"])
     return rows, data
-
-
-def drive(
-    own: Sprung,
-    tyre: TyreTable,
-    steer: float,
-    torques: Sequence[float],
-    speed: float,
-    engine: str | None = "mujoco",
-    step: float = 5.5e-3,
-    substeps: int = 1,
-) -> Run:
-    """A stop under torques that stay, from a speed (m/s)."""
-    return braked(own, tyre, engine, steer, step, substeps).run(steady(*torques), speed)
 
 
 def _locked_rows(mu: float) -> list[Row]:
@@ -125,7 +110,10 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
 
 def _engine_rows(wet: TyreTable) -> list[Row]:
     """At 1 ms."""
-    ends = [drive(car(), wet, 0.05, HARDER, 15.0, engine, 1e-3).states[-1, 0, :2] for engine in ("mujoco", "exudyn")]
+    ends = [
+        braked(car(), wet, engine, 0.05, 1e-3).run(steady(*HARDER), 15.0).states[-1, 0, :2]
+        for engine in ("mujoco", "exudyn")
+    ]
     return [
         Observed(
             "braking_suspension.engines",
@@ -138,7 +126,7 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
 
 
 def _order_rows(wet: TyreTable) -> list[Row]:
-    ways = [drive(car(), wet, 0.05, HARDER, 10.0, substeps=n).states[-1, 0, 0] for n in (1, 4, 16)]
+    ways = [braked(car(), wet, steer=0.05, substeps=n).run(steady(*HARDER), 10.0).states[-1, 0, 0] for n in (1, 4, 16)]
     return [
         Observed(
             "braking_suspension.step",
@@ -217,7 +205,8 @@ def limit(tyre: TyreTable) -> list[list[float]]:
     for stiffer in (1.0, 10.0, 100.0):
         own = box(stiffer, 0.01)
         ends = [
-            drive(own, tyre, 0.015, TURNING, 10.0, engine, substeps=4).states[-1, 0, :2] for engine in ("mujoco", None)
+            braked(own, tyre, engine, 0.015, substeps=4).run(steady(*TURNING), 10.0).states[-1, 0, :2]
+            for engine in ("mujoco", None)
         ]
         found.append([stiffer, float(np.hypot(*(ends[1] - ends[0])))])
     return found

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from models.ensemble.runner import run_paths
+from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.statistics import deviation, percentiles, quantile
 from models.ensemble.store import Arrays
 from models.ensemble.workers import processes
@@ -72,7 +72,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
     """The same rows on a few paths of a second, in threads, which start at once."""
     found = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
-        two = run_paths(job, 12, executor=pool, block=3)
+        two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
     engines, _ = _engines(scene, job.truth, times, found, 2, None)
     return [
         _path_row(forces, 1.0, found),
@@ -116,9 +116,9 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
             raise KeyboardInterrupt
 
     try:
-        run_paths(job, 12, blocks, block=3, progress=stop)
+        run_paths(job, 12, blocks, blocks=Blocks(3), progress=stop)
     except KeyboardInterrupt:
-        again = run_paths(job, 12, blocks, block=3)
+        again = run_paths(job, 12, blocks, blocks=Blocks(3))
         return _same_row("resumed", "12 paths, interrupted half-way and resumed", found, again)
     raise AssertionError("the interrupt was lost")
 
@@ -132,7 +132,7 @@ def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     child.kill()
     child.join()
     kept = {path: path.stat().st_mtime_ns for path in blocks.glob("block*.npz")}
-    again = run_paths(job, SOME, blocks, block=20)
+    again = run_paths(job, SOME, blocks, blocks=Blocks(20))
     if not kept or len(kept) == SOME // 20 or any(path.stat().st_mtime_ns != when for path, when in kept.items()):
         raise AssertionError(f"not killed half-way, or computed again: {len(kept)} blocks were kept")
     return _same_row(
@@ -145,7 +145,7 @@ def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
 
 
 def _slowly(job: NoisePaths, blocks: Path) -> None:
-    run_paths(job, SOME, blocks, block=20, progress=lambda state: time.sleep(0.1))
+    run_paths(job, SOME, blocks, blocks=Blocks(20), progress=lambda state: time.sleep(0.1))
 
 
 def _alone(function: Callable[..., Any], *args: Any) -> Any:
@@ -238,7 +238,7 @@ def _engines(
     ways: dict[str, Callable[[], Arrays]] = {
         "mujoco, 1 thread": lambda: run_paths(one, count),
         "mujoco, 2 threads": lambda: run_paths(two, count),
-        "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(exudyn, count, executor=pool, block=1),
+        "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(exudyn, count, executor=pool, blocks=Blocks(1)),
     }
     rows, prices = [], {}
     for way, job in ways.items():

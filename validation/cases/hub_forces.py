@@ -19,7 +19,7 @@ from models.systems.hub_forces.measurement import HubForces, model, recorded, tr
 from models.systems.hub_forces.run import with_angles
 from models.systems.hub_forces.scene import HubScene
 from models.systems.hub_forces.scene import build as scene_of
-from models.systems.hub_forces.tilt_filter import estimate
+from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.vehicles.cut_vehicle import GRAVITY, HEADING, PITCH, ROLL, CutVehicle, Y, Z, cut, rigid
 from models.vehicles.spatial import SpringDamper
 from validation.common.grounds import allowing
@@ -327,7 +327,7 @@ def _faults(scene: HubScene) -> list[Row]:
     for i, (name, samples) in enumerate(planted.items()):
         faulty, said = replace(clean, samples=samples.reshape(len(samples), -1)), "accepted"
         try:
-            estimate(vehicle, faulty, angles, scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0)
+            estimate(vehicle, faulty, angles, Deviations(scene.deviations(vehicle), (1.75e-3, 5e-3), 1.0))
         except InputError:
             said = "refused"
         expected, quantity = "accepted" if name == "nothing" else "refused", f"measurement with {name} planted"

@@ -119,9 +119,9 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
     return read_files(load(folder / "scene.toml"), folder)
 
 
-def held(recording: Recording, vehicle: CutVehicle, hold: Hold, folder: Path, engine: str = "mujoco") -> Outcome:
-    """The run of a recording."""
-    return march(SectionRun(vehicle, recording, Sections(vehicle), engine, hold), folder)
+def held(recording: Recording, vehicle: CutVehicle, hold: Hold, engine: str = "mujoco") -> SectionRun:
+    """The run of a recording, to be made."""
+    return SectionRun(vehicle, recording, Sections(vehicle), engine, hold)
 
 
 def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, float]]]:
@@ -140,7 +140,7 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
             values = recording.columns.block(recording.columns.names, 0, recording.count)
             damage = next((own for other, own in known if _same(values, other)), None)
             if damage is None:
-                damage = errors(held(recording, true.vehicle, proof.hold, place / "run"), true).damage
+                damage = errors(march(held(recording, true.vehicle, proof.hold), place / "run"), true).damage
                 known.append((values, damage))
             ratios[form].append(damage)
     means = {
@@ -200,12 +200,13 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
 
 def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
     """The same recording free, and held by both engines; what the verdicts say."""
-    free = Hold("none")
-    runs = {engine: held(first, true.vehicle, proof.hold, folder / engine, engine) for engine in ENGINES[1:]}
+    free = held(first, true.vehicle, Hold("none"))
+    jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
+    runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
     one, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
     apart = float((np.abs(one - two).max(axis=0) / np.maximum(np.abs(one).max(axis=0), 1e-6)).max())
     held_run = runs[ENGINES[-1]]
-    blind = judge(held_run, true.vehicle, proof.hold, first.period)
+    blind = judge(jobs[ENGINES[-1]], held_run)
     rows = [
         Observed(
             f"measured_virtual.engines_{proof.name}",
@@ -227,11 +228,11 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
     level = Level(NOISE["force"], NOISE["moment"])
     until = drift(true.vehicle, level, first.period, first.duration, proof.frame).trusted
     try:
-        run = held(first, true.vehicle, free, folder / "free")
+        run = march(free, folder / "free")
     except RunFailed as error:
         assert isinstance(error.partial, Outcome)
         run = error.partial
-    said = judge(run, true.vehicle, free, first.period, trusted=until)
+    said = judge(free, run, trusted=until)
     rows.append(
         Observed(
             f"measured_virtual.free_{proof.name}",
@@ -321,7 +322,7 @@ def _quick(folder: Path) -> list[Row]:
     true = measured(proof, folder, 0.6)
     samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)
     recording = recorded(true, samples, proof.vehicle, "csv", folder / "quick")
-    run = held(recording, true.vehicle, proof.hold, folder / "quick" / "run")
+    run = march(held(recording, true.vehicle, proof.hold), folder / "quick" / "run")
     found = errors(run, true)
     level = Level(8.0, 1.0)
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))

@@ -16,6 +16,8 @@ from models.vehicles import pitch_plane_equations as equations
 
 Context = Callable[[], AbstractContextManager[Any]]
 Patch = Callable[[], Context]
+Pair = tuple[float, float]
+"""Forces (N) at the front and the rear."""
 
 
 def nothing() -> Context:
@@ -166,8 +168,8 @@ def moment_without_cosine() -> Any:
     """b f3 - a f4 in the place of cos(beta) (b f3 - a f4)."""
     original = equations.newton_euler
 
-    def newton_euler(y: Any, f1: float, f2: float, f3: float, f4: float, cosine: float, p: Any, dy: Any) -> None:
-        original(y, f1, f2, f3, f4, 1.0, p, dy)
+    def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
+        original(y, wheels, struts, 1.0, p, dy)
 
     return newton_euler
 
@@ -176,9 +178,9 @@ def no_reaction() -> Any:
     """The suspension pushes the chassis but not the front wheel."""
     original = equations.newton_euler
 
-    def newton_euler(y: Any, f1: float, f2: float, f3: float, f4: float, cosine: float, p: Any, dy: Any) -> None:
-        original(y, f1, f2, f3, f4, cosine, p, dy)
-        dy[4] -= f3 / p[2]
+    def newton_euler(y: Any, wheels: Pair, struts: Pair, cosine: float, p: Any, dy: Any) -> None:
+        original(y, wheels, struts, cosine, p, dy)
+        dy[4] -= struts[0] / p[2]
 
     return newton_euler
 

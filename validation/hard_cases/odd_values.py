@@ -27,7 +27,7 @@ from models.ride.measures import dynamic_load_factor, share_beyond
 from models.ride.nonlinear_copies import copies_in_time
 from models.road.excitation import Excitation
 from models.systems.hub_forces.measurement import Angles, HubForces
-from models.systems.hub_forces.tilt_filter import estimate
+from models.systems.hub_forces.tilt_filter import Deviations, estimate
 from models.systems.ride.of_scene import excitation_of, vehicle_of
 from models.systems.ride.scene import build
 from models.vehicles.cut_vehicle import cut
@@ -97,7 +97,7 @@ def sure(implementation: str, folder: Path) -> float:
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
     found = [
-        estimate(vehicle, forces, angles, np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0)
+        estimate(vehicle, forces, angles, Deviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0))
         for noise in (1.0, 8.0)
     ]
     return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in found)

@@ -1,9 +1,12 @@
 """One random scene whose stated error is held against a much finer run."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from models.core.discretisation import Estimate
+from models.core.errors import InputError, RunFailed
 
 
 @dataclass(frozen=True)
@@ -30,3 +33,18 @@ class Sample:
     def ratio(self) -> float:
         """True error by the stated one, of the printed channel."""
         return self.true[self.printed] / self.told[self.printed].error
+
+
+def drawn(
+    count: int, seed: int | Sequence[int], draw: Callable[[np.random.Generator], Sample | None]
+) -> Iterator[Sample]:
+    """So many samples; ``draw`` is asked anew where a scene is refused, a run fails, or nothing comes of it."""
+    random, made = np.random.default_rng(seed), 0
+    while made < count:
+        try:
+            sample = draw(random)
+        except (InputError, RunFailed):
+            continue
+        if sample is not None:
+            made += 1
+            yield sample

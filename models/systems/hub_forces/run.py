@@ -60,11 +60,11 @@ class Measurement:
     @cached_property
     def tilt(self) -> "Tilt":
         """The Kalman filter's estimate; InputError where the measurement contradicts itself."""
-        from models.systems.hub_forces.tilt_filter import estimate
+        from models.systems.hub_forces.tilt_filter import Deviations, estimate
 
         scene = self.scene
-        deviations = scene.deviations(self.vehicle), scene.angles.deviations
-        return estimate(self.vehicle, self.forces, self.angles, *deviations, scene.stabilise.model, scene.file)
+        deviations = Deviations(scene.deviations(self.vehicle), scene.angles.deviations, scene.stabilise.model)
+        return estimate(self.vehicle, self.forces, self.angles, deviations, scene.file)
 
     def drive(self, method: Method, step: float, steps: int) -> Drive:
         """Inputs of so many steps (s), roll and pitch held by a method; raises InputError."""

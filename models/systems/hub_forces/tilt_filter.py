@@ -17,7 +17,7 @@ from models.drift.score import SURPRISED
 from models.multibody.cut_table import Drive
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.systems.hub_forces.scene import Frame
-from models.systems.hub_forces.tilt_march import march
+from models.systems.hub_forces.tilt_march import Noise, march
 from models.vehicles.cut_vehicle import CutVehicle, rigid
 
 SURPRISE = 4.0
@@ -62,28 +62,26 @@ class FilterState:
     sums: np.ndarray = field(default_factory=lambda: np.zeros((5, 4)))
 
 
+@dataclass(frozen=True)
+class Deviations:
+    """Stated standard deviations: forces (6 h,), N and N m, of each sample; angles, rad, and rad/s of their rates;
+    model, rad/s^2, of the acceleration of a rigid vehicle."""
+
+    forces: np.ndarray
+    angles: tuple[float, float]
+    model: float
+
+
 class TiltFilter:
-    """Filters angles sampled with the forces, block by block.
+    """Filters angles sampled with the forces, every ``period`` (s), block by block."""
 
-    force_deviation : (6 h,), N and N m, of each sample; angle_deviations : rad and rad/s; model : rad/s^2.
-    """
-
-    def __init__(
-        self,
-        vehicle: CutVehicle,
-        frame: str,
-        period: float,
-        force_deviation: np.ndarray,
-        angle_deviations: tuple[float, float],
-        model: float,
-        file: str = "",
-    ) -> None:
-        _check(frame, period, angle_deviations, model)
+    def __init__(self, vehicle: CutVehicle, frame: str, period: float, deviations: Deviations, file: str = "") -> None:
+        _check(frame, period, deviations)
         self.rigid, self.frame, self.period, self.file = rigid(vehicle), frame, period, file
-        self.forces_noise = self.rigid.turning(force_deviation)[:2, :2]
+        self.forces_noise = self.rigid.turning(deviations.forces)[:2, :2]
         push = np.vstack([np.eye(2) * period**2 / 2, np.eye(2) * period])
-        self.noise = push @ (self.forces_noise + model**2 * np.eye(2)) @ push.T
-        self.variances = np.repeat(angle_deviations, 2) ** 2
+        process = push @ (self.forces_noise + deviations.model**2 * np.eye(2)) @ push.T
+        self.noise = Noise(period, process, np.repeat(deviations.angles, 2) ** 2)
         self.inverse = np.linalg.inv(self.rigid.inertia)[:2]
         self.state = FilterState()
 
@@ -96,12 +94,14 @@ class TiltFilter:
         _check_numbers(wrenches, angles, self.file)
         state, count = self.state, len(angles)
         if np.isnan(state.x[0]):
-            state.x, state.p = np.nan_to_num(angles[0]), np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.variances))
+            state.x, state.p = (
+                np.nan_to_num(angles[0]),
+                np.diag(np.where(np.isnan(angles[0]), UNKNOWN, self.noise.variances)),
+            )
         level = _level(wrenches, np.nan_to_num(angles)) if self.frame == "inertial" else wrenches
-        turning, (states, spread) = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
+        turning, kept = self.rigid.moments(level) @ self.inverse.T, np.empty((2, count, 4))
         self._check_balance(turning, angles[:, 2:])
-        measured = turning, angles, self.period, self.noise, self.variances
-        state.surprise += march(state.x, state.p, *measured, state.sums, states, spread)
+        state.surprise += march(state.x, state.p, turning, angles, self.noise, state.sums, kept)
         if not self.surprise <= SURPRISE:
             raise InputError(
                 self.file,
@@ -110,7 +110,7 @@ class TiltFilter:
                 "contradict the hub forces: the squares of the innovations are "
                 f"{self.surprise:.3g} times what the deviations allow (at most {SURPRISE:g}): {REMEDY}",
             )
-        return states, spread
+        return kept[0], kept[1]
 
     @property
     def surprise(self) -> float:
@@ -159,7 +159,7 @@ class TiltFilter:
             if not np.isfinite(measured).all():
                 continue
             integral = np.vstack((np.zeros(2), np.cumsum(part[1:] + part[:-1], axis=0) * dt / 2))
-            allowed = self.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
+            allowed = self.noise.variances[2:] + np.diag(self.forces_noise) * dt * dt * len(measured) / 6
             left = np.var(_level_line(measured - integral), axis=0)
             self.state.rates += np.maximum(left - 9 * allowed, 0.0), np.var(measured, axis=0)
         unexplained, whole = self.state.rates
@@ -170,11 +170,11 @@ class TiltFilter:
                 raise InputError(self.file, f"angles.{name}_rate", None, f"contradicts the hub forces: {said}")
 
 
-def _check(frame: str, period: float, angle_deviations: tuple[float, float], model: float) -> None:
+def _check(frame: str, period: float, deviations: Deviations) -> None:
     """Refuse what is no frame, no period and no deviation; a value without any error is none, either."""
     if frame not in get_args(Frame):
         raise InputError("", "frame", frame, "is none", get_args(Frame))
-    told = {"period": (period,), "angle_deviations": angle_deviations, "model": (model,)}
+    told = {"period": (period,), "angle_deviations": deviations.angles, "model": (deviations.model,)}
     for name, value in ((name, value) for name, values in told.items() for value in sorted(values)):
         if not 0.0 < value < math.inf:
             raise InputError("", name, value, "must be above 0, and finite")
@@ -194,15 +194,7 @@ def _level_line(values: np.ndarray) -> np.ndarray:
     return values - np.outer(line, line @ values / (line @ line))
 
 
-def estimate(
-    vehicle: CutVehicle,
-    forces: HubForces,
-    angles: Angles,
-    force_deviation: np.ndarray,
-    angle_deviations: tuple[float, float],
-    model: float,
-    file: str = "",
-) -> Tilt:
+def estimate(vehicle: CutVehicle, forces: HubForces, angles: Angles, deviations: Deviations, file: str = "") -> Tilt:
     """Filter angles sampled with the forces, see ``TiltFilter``; raises InputError also where nothing was measured."""
     if len(forces.samples) != len(angles.samples):
         raise InputError(
@@ -210,7 +202,7 @@ def estimate(
         )
     if np.isnan(angles.samples).all():
         raise InputError(file, "angles", None, "hold no number: there is nothing to follow")
-    tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, force_deviation, angle_deviations, model, file)
+    tilt_filter = TiltFilter(vehicle, forces.frame, forces.period, deviations, file)
     states, spread = tilt_filter.advance(forces.samples, angles.samples)
     return Tilt(states, spread, forces.period, tilt_filter.surprise, tilt_filter.doubts())
 

@@ -1,24 +1,34 @@
 """Compiled recursion of the Kalman filter of roll and pitch, one measured value after another."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from models.machine.compiled import njit
 
 
+class Noise(NamedTuple):
+    """What the filter is told of errors: dt (s), a step; process (4, 4), what the covariance gains in it; variances
+    (4,) of measured values."""
+
+    dt: float
+    process: np.ndarray
+    variances: np.ndarray
+
+
 @njit(cache=True, error_model="numpy")
-def march(x, p, turning, measured, dt, noise, variances, sums, states, spread):
+def march(x, p, turning, measured, noise, sums, kept):
     """Filter samples 1, 2, ... from state ``x`` (4,) and covariance ``p`` (4, 4) at sample 0, both left at the last.
 
-    turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was; noise (4, 4) : what
-    the covariance gains in a step of dt (s); variances (4,) of measured values. Adds to sums (5, 4), of every value's
-    normalised innovations: how many, their sum, that of their squares, that of their products with the one before, and
-    the last one. Writes the states (n, 4) and their deviations. Returns the sum of the normalised innovations squared
-    and how many there were.
+    turning (n, 2) : rad/s^2, held from each sample on; measured (n, 4), NaN where nothing was. Adds to sums (5, 4), of
+    every value's normalised innovations: how many, their sum, that of their squares, that of their products with the
+    one before, and the last one. Writes the states (n, 4) and their deviations into ``kept`` (2, n, 4). Returns the sum
+    of the normalised innovations squared and how many there were.
     """
-    gain, surprise, used = np.empty(4), 0.0, 0
+    gain, surprise, used, variances = np.empty(4), 0.0, 0, noise.variances
     for i in range(len(measured)):
         if i:
-            _predict(x, p, turning[i - 1], dt, noise)
+            _predict(x, p, turning[i - 1], noise)
             for j in range(4):
                 if np.isnan(measured[i, j]):
                     continue
@@ -37,7 +47,7 @@ def march(x, p, turning, measured, dt, noise, variances, sums, states, spread):
                     x[k] += gain[k] * off
                 _learn(p, gain, j, variances[j], variances[j] / s)
         for k in range(4):
-            states[i, k], spread[i, k] = x[k], np.sqrt(p[k, k])
+            kept[0, i, k], kept[1, i, k] = x[k], np.sqrt(p[k, k])
     return surprise, used
 
 
@@ -67,8 +77,9 @@ def _learn(p, gain, j, variance, kept):
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(x, p, turning, dt, noise):
+def _predict(x, p, turning, noise):
     """One step of angles by their rates and of rates by an acceleration."""
+    dt = noise.dt
     for k in range(2):
         x[k] += dt * (x[2 + k] + 0.5 * dt * turning[k])
         x[2 + k] += dt * turning[k]
@@ -79,4 +90,4 @@ def _predict(x, p, turning, dt, noise):
             p[k, m] += dt * p[k, 2 + m]
     for k in range(4):
         for m in range(4):
-            p[k, m] += noise[k, m]
+            p[k, m] += noise.process[k, m]

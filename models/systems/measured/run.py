@@ -270,7 +270,7 @@ def _examined(exam: Examination, folder: Path, progress: Progress, error: bool) 
         _predicted(exam, exam.rig.vehicle)
     _run(exam, folder / WORK, progress, error)
     if exam.rig.vehicle is not None:
-        _judged(exam, exam.rig.vehicle)
+        _judged(exam)
     lap("runs")
     if exam.outcome is not None:
         named = {(finding.check, finding.signals, finding.place) for finding in exam.findings}
@@ -346,7 +346,7 @@ def _left(name: str, progress: Progress, begin: float, share: float) -> Callable
     return told
 
 
-def _judged(exam: Examination, vehicle: CutVehicle) -> None:
+def _judged(exam: Examination) -> None:
     """Check channels beside the run that is handed on, and the verdict on every run."""
     assert exam.drift is not None
     recording, slopes = exam.recording, tuple(exam.scene.hand_on.slopes)
@@ -355,10 +355,8 @@ def _judged(exam: Examination, vehicle: CutVehicle) -> None:
         assert isinstance(job, SectionRun)
         beside = tuple(compare(recording, outcome, *pair, slopes) for pair in checks(job))
         exam.verdicts[name] = judge(
+            job,
             outcome,
-            vehicle,
-            exam.holds[name],
-            recording.period,
             exam.scene.limits,
             exam.drift.passes(exam.drift.angle) or recording.duration,
             [compared for compared in beside if compared.signal.check],

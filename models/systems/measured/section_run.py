@@ -285,11 +285,12 @@ class _March:
         return state
 
     def _filter(self) -> "TiltFilter":
-        from models.systems.hub_forces.tilt_filter import TiltFilter
+        from models.systems.hub_forces.tilt_filter import Deviations, TiltFilter
 
         vehicle, hold, period = self.job.vehicle, self.job.hold, self.job.recording.period
-        deviations, angles = np.tile([hold.force] * 3 + [hold.moment] * 3, len(vehicle.hubs)), (hold.angle, hold.rate)
-        return TiltFilter(vehicle, self.inputs.frame, period, deviations, angles, hold.model, self.job.file)
+        forces = np.tile([hold.force] * 3 + [hold.moment] * 3, len(vehicle.hubs))
+        deviations = Deviations(forces, (hold.angle, hold.rate), hold.model)
+        return TiltFilter(vehicle, self.inputs.frame, period, deviations, self.job.file)
 
     def _save(self) -> None:
         known = vars(self.filter.state) if self.filter else {}

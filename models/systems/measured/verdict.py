@@ -157,18 +157,16 @@ def _trusted(error: np.ndarray, size: float, period: float) -> float:
 
 
 def judge(
+    job: SectionRun,
     run: Outcome,
-    vehicle: CutVehicle,
-    hold: Hold,
-    sampled: float,
     limits: Limits = LIMITS,
     trusted: float | None = None,
     compared: Sequence[Compared] = (),
     noise: Mapping[str, float] | None = None,
 ) -> Verdict:
-    """The verdict of an engineer, who has no true run.
+    """The verdict of an engineer, who has no true run, on the run of a job.
 
-    sampled : s, sampling period of the recording. trusted : s, predicted for a free run (``trust``), None if not known.
+    trusted : s, predicted for a free run (``trust``), None if not known.
     compared : check channels beside the run; noise : name -> standard deviation of the white noise of each, in SI.
     """
     shares = {own.signal.name: disagreement(own, (noise or {}).get(own.signal.name, 0.0)) for own in compared}
@@ -177,12 +175,12 @@ def judge(
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
         return Verdict("rejected", f"channels that were not put in disagree (at most {DISAGREES:.0%}): {told}")
     verdict = score.blind_verdict(
-        own_figures(run, vehicle),
-        EFFECTS[hold.method],
+        own_figures(run, job.vehicle),
+        EFFECTS[job.hold.method],
         run.period * (run.done - 1),
         limits,
         trusted,
-        uncertainty=uncertainty(vehicle, hold, sampled),
+        uncertainty=uncertainty(job.vehicle, job.hold, job.recording.period),
     )
     return _in_space(verdict)
 

@@ -15,7 +15,7 @@ wrong from T = 0.05 s on).
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
@@ -33,6 +33,21 @@ STEP = 1e-3
 SMALL = 1e-6
 """Part of a wrong model's difference that its derivative is taken over: errors of two parameters must not multiply,
 or a stiffness that is wrong together with the inertia would leave a moment that no run has."""
+
+
+class StageForces(NamedTuple):
+    """What pushes the path and its error columns at the start, the middle and the end of each step.
+
+    step : s. forces : (rows, 2) in N, of the wheels. errors : (rows, m, 2) in N, their errors by column. to_middle,
+    to_end, to_next : rows of ``forces`` from a step's start to its middle, its end and the next step.
+    """
+
+    step: float
+    forces: np.ndarray
+    errors: np.ndarray
+    to_middle: int
+    to_end: int
+    to_next: int
 
 
 @register_jitable
@@ -65,19 +80,20 @@ def pushed(y, p, body, du, dx):
 
 
 def _step_of(rhs, body, flat):
-    def step_of(y, x, step, inputs, errors, at, p, other):
-        """One Runge-Kutta step of the path y (8,) and the error columns x (m, 8), in place.
+    def step_of(y, x, given, count, row, p, other):
+        """Runge-Kutta step number ``count`` of the path y (8,) and the error columns x (m, 8), in place.
 
-        inputs (rows, 2) and errors (rows, m, 2) are read at the rows ``at``: start, middle and end of the step.
+        given : ``StageForces``, whose errors are read from ``row`` on; p, other : parameters (15,), true and wrong.
         """
-        columns = x.shape[0]
+        step, first, columns = given.step, count * given.to_next, x.shape[0]
+        at = (first, first + given.to_middle, first + given.to_end)
         wrong = (other != p).any()
         k, kx = np.zeros((4, 8)), np.zeros((4, columns, 8))
         stage, stage_x, off = np.empty(8), np.empty(8), np.zeros(8)
         for s in range(4):
             now = (s + 1) // 2
             part = 0.5 * step * now
-            u, e = inputs[at[0][now]], errors[at[1][now]]
+            u, e = given.forces[at[now]], given.errors[row + now]
             for q in range(8):
                 stage[q] = y[q] + part * k[s - 1, q]
             rhs(stage, u, p, k[s])
@@ -103,13 +119,10 @@ def _step_of(rhs, body, flat):
 def compile_carry(one_step, key):
     """March that keeps the path and its error columns at every step."""
 
-    def carry(y, x, step, count, inputs, errors, rows, p, other, states, kept):
-        to_middle, to_end, to_next = rows
+    def carry(y, x, given, p, other, states, kept):
         states[0], kept[0] = y, x
-        for i in range(count):
-            row = i * to_next
-            at = (row, row + to_middle, row + to_end)
-            one_step(y, x, step, inputs, errors, (at, (3 * i, 3 * i + 1, 3 * i + 2)), p, other)
+        for i in range(len(states) - 1):
+            one_step(y, x, given, i, 3 * i, p, other)
             states[i + 1], kept[i + 1] = y, x
 
     return compiled(carry, key)
@@ -140,11 +153,6 @@ class Path:
         return self.forces.period / self.per_sample
 
     @property
-    def rows(self) -> tuple[int, int, int]:
-        """Rows of the input table from a step's start to its middle, its end and the next step."""
-        return (0, 0, 1) if self.forces.held else (1, 2, 2)
-
-    @property
     def steps(self) -> int:
         """Number of steps of the march."""
         return self.per_sample * self.samples
@@ -155,6 +163,10 @@ class Path:
         if self.forces.held:
             return self.forces.sample(0.0, self.step, self.steps)
         return self.forces.sample(0.0, self.step / 2, 2 * self.steps + 1)
+
+    def given(self, errors: np.ndarray) -> StageForces:
+        """The wheel forces at the stages of all steps, with these errors (rows, m, 2) in N."""
+        return StageForces(self.step, self.inputs, errors, *((0, 0, 1) if self.forces.held else (1, 2, 2)))
 
     def march(self, compile_march: Any):
         """A compiled march that fits the assembly."""
@@ -173,17 +185,7 @@ class Path:
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         self.march(compile_carry)(
-            self.assembly.initial.copy(),
-            np.array(columns, dtype=float),
-            self.step,
-            count,
-            self.inputs,
-            pushes,
-            self.rows,
-            p,
-            wrong,
-            states,
-            kept,
+            self.assembly.initial.copy(), np.array(columns, dtype=float), self.given(pushes), p, wrong, states, kept
         )
         return states, kept
 
@@ -276,11 +278,8 @@ def carried(path: Path, deviation: float) -> np.ndarray:
         weights[:, 10 + wheel, wheel] = 0.0 if path.forces.held else stages
     path.march(_compile_covariance)(
         path.assembly.initial.copy(),
-        path.step,
         path.per_sample,
-        path.inputs,
-        weights,
-        path.rows,
+        path.given(weights),
         path.assembly.parameters.array(),
         deviation**2,
         matrices,
@@ -289,18 +288,15 @@ def carried(path: Path, deviation: float) -> np.ndarray:
 
 
 def _compile_covariance(one_step, key):
-    def covariance_march(y, step, per_sample, inputs, weights, rows, p, intensity, matrices):
+    def covariance_march(y, per_sample, given, p, intensity, matrices):
         """The recursion of this file; x holds the columns of Phi, G0 and G1."""
-        to_middle, to_end, to_next = rows
         x, before = np.empty((12, 8)), np.zeros((2, 8))
         for i in range(len(matrices) - 1):
             x[:] = 0.0
             for j in range(8):
                 x[j, j] = 1.0
             for j in range(per_sample):
-                row = (i * per_sample + j) * to_next
-                at = (row, row + to_middle, row + to_end)
-                one_step(y, x, step, inputs, weights, (at, (2 * j, 2 * j + 1, 2 * j + 2)), p, p)
+                one_step(y, x, given, i * per_sample + j, 2 * j, p, p)
             moved, begun, ended = x[:8], x[8:10], x[10:]
             cross = intensity * moved.T @ before.T @ begun
             matrices[i + 1] = moved.T @ matrices[i] @ moved + intensity * (begun.T @ begun + ended.T @ ended)

@@ -53,8 +53,8 @@ def with_error_of_drive(run: Result, scene: RideScene, linear: LinearVehicle, ro
 
     units = dict(zip(run["output"].tolist(), run["unit"].tolist(), strict=True))
     units |= {f"{name}{APART}": unit for name, unit in units.items()}
-    fine = series(drive.time, drive.deviation, run["quasi_stationary"])
-    return estimated(run, fine, again, ORDER, step, units)
+    fine = series(drive.time, drive.deviation, run["quasi_stationary"])._replace(units=units)
+    return estimated(run, fine, again, ORDER, step)
 
 
 def _until(profile: SpeedProfile, end: float) -> SpeedProfile:

@@ -222,8 +222,8 @@ def _with_error_of_steps(
         return series(ride, begin)
 
     own = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
-    fine = series(own, first * path.step)
-    return estimated(run, fine, again, ORDER, path.step, dict(zip(names, units, strict=True)))
+    fine = series(own, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
+    return estimated(run, fine, again, ORDER, path.step)
 
 
 def _halved(table: np.ndarray) -> np.ndarray:
@@ -276,7 +276,6 @@ def ridden(
     duration: float,
     *,
     seed: int = 0,
-    path: int = 0,
     skipped: float = 0.0,
     every: int = 1,
 ) -> Ride:
@@ -284,7 +283,7 @@ def ridden(
 
     Raises InputError for damped tyres on a road whose heights have no rates.
     """
-    table = road.table(int(np.ceil(duration / road.step)), seed, path)
+    table = road.table(int(np.ceil(duration / road.step)), seed)
     return driven(engine, vehicle, road, table, skipped=skipped, every=every)
 
 

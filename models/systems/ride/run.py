@@ -6,6 +6,7 @@ the road at once; along a drive it has them at every instant; vehicles that noth
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,24 +31,34 @@ QUASI_STATIONARY = 90
 """Speeds at which each is taken by itself beside a drive, from standstill on; straight between them."""
 
 
+@dataclass(frozen=True)
+class SweepPoints:
+    """What a linear vehicle is asked for at constant speeds, in place of what the scene says.
+
+    speeds : m/s, those of the scene if None. correlations : of the road, left to right and front to rear, by name; None
+    is the scene's own.
+    """
+
+    speeds: Sequence[float] | None = None
+    correlations: Mapping[str, tuple[str, str] | None] = field(default_factory=lambda: {AS_WRITTEN: None})
+
+
 def run(
     scene: RideScene,
     engine: str = "",
     *,
     vehicle: SpatialVehicle | None = None,
-    speeds: Sequence[float] | None = None,
-    correlations: Mapping[str, tuple[str, str] | None] | None = None,
+    points: SweepPoints | None = None,
     sampling: "Sampling | None" = None,
     progress: "Progress" = lambda text, share: None,
     error: bool = False,
 ) -> Result:
     """Run a scene by the linear vehicle of an engine, or in time; raises InputError, Refused or RunFailed.
 
-    vehicle, speeds (m/s) : in place of the scene's own.
-    correlations : of the road, left to right and front to rear, by name; None is the scene's own, the only one if none
-    are named. sampling : asks for a run in time, as springs do that are bent and tyres that may lift; the reference
-    then answers by statistical linearisation with copies beside, an engine by one path of the road. progress : of it.
-    error : whether errors are estimated, by further solutions or runs. What a run assumes is judged always.
+    vehicle, points : in place of the scene's own. sampling : asks for a run in time, as springs do that are bent and
+    tyres that may lift; the reference then answers by statistical linearisation with copies beside, an engine by one
+    path of the road. progress : of it. error : whether errors are estimated, by further solutions or runs. What a run
+    assumes is judged always.
 
     The result's detail is a ``Sweep``, a ``VaryingSpeed``, a ``Nonlinear`` or, of an engine in time, a ``Ride``.
     """
@@ -56,8 +67,7 @@ def run(
         if scene.drive is not None:
             return _driven(scene, engine, vehicle or vehicle_of(scene), error)
         if vehicle is not None or not (sampling or goes_in_time(scene)):
-            roads = correlations or {AS_WRITTEN: None}
-            return _swept(scene, engine, vehicle or vehicle_of(scene), speeds, roads, error)
+            return _swept(scene, engine, vehicle or vehicle_of(scene), points or SweepPoints(), error)
         from models.systems.ride import nonlinear
 
         vehicle, sampling = vehicle_of(scene), sampling or nonlinear.Sampling()
@@ -66,21 +76,14 @@ def run(
         return nonlinear.in_engine(scene, engine, vehicle, sampling, error)
 
 
-def _swept(
-    scene: RideScene,
-    engine: str,
-    vehicle: SpatialVehicle,
-    speeds: Sequence[float] | None,
-    correlations: Mapping[str, tuple[str, str] | None],
-    error: bool,
-) -> Result:
+def _swept(scene: RideScene, engine: str, vehicle: SpatialVehicle, points: SweepPoints, error: bool) -> Result:
     """Standard deviations (correlation, speed, output); judged on the scene's own road, or the last one."""
     from models.ride.sweep import sweep
 
     assert scene.speeds is not None
-    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in correlations.items()}
+    roads = {name: excitation_of(scene, wheels(vehicle), case) for name, case in points.correlations.items()}
     begun, linear = time.process_time(), linear_vehicle(vehicle, engine)
-    swept = sweep(linear, roads, speeds or scene.speeds.all(), scene.weighting)
+    swept = sweep(linear, roads, points.speeds or scene.speeds.all(), scene.weighting)
     labelled = result(
         scene,
         {"deviation": Channel(("correlation", "speed", "output"), swept.deviation)},

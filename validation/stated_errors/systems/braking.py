@@ -9,14 +9,14 @@ from unittest import mock
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
+from models.core.errors import RunFailed
 from models.systems.braking import ENGINES
 from models.systems.braking.errors import whole
 from models.systems.braking.march import Braked, Path
 from models.systems.braking.procedures import check_engine
 from models.systems.braking.run import run
 from models.systems.braking.scene import BrakingScene, build
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 FINER = 100
 """Times as many steps in the truth."""
@@ -38,17 +38,14 @@ TRAILER = {
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many stops that end, those among them that say why there is no number."""
-    random, made = np.random.default_rng(seed), 0
-    while made < count:
-        engine = str(random.choice(ENGINES))
-        try:
-            scene = build(_table(random), "drawn.toml")
-            check_engine(scene, engine)
-            sample = _sample(scene, engine)
-        except (InputError, RunFailed):  # a circle that tyres do not hold, a vehicle that rolls over
-            continue
-        made += 1
-        yield sample
+    return drawn(count, seed, _drawn)
+
+
+def _drawn(random: np.random.Generator) -> Sample:
+    """One stop; raises where tyres do not hold a circle, or a vehicle rolls over."""
+    engine, scene = str(random.choice(ENGINES)), build(_table(random), "drawn.toml")
+    check_engine(scene, engine)
+    return _sample(scene, engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:

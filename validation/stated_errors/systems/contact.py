@@ -11,11 +11,10 @@ import numpy as np
 from models.contact.accuracy import halved
 from models.contact.theories import Contact
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
 from models.systems.contact.run import POWERS, run
 from models.systems.contact.scene import ContactScene, build
 from models.systems.contact.stated_error import rms
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 MORE, MOST, OF_EXACT = 10, 400, 60
 """Cells of the truths by those of the run; cells at most, along each axis, and those of the exact theory."""
@@ -26,14 +25,7 @@ LEAST, LARGEST = 5, {"fastsim": 50, "simplified": 40, "exact": 14}
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that are refused are drawn anew."""
-    rng, made = np.random.default_rng(seed), 0
-    while made < count:
-        try:
-            sample = _sample(_drawn(rng))
-        except (InputError, RunFailed):
-            continue
-        made += 1
-        yield sample
+    return drawn(count, seed, lambda random: _sample(_drawn(random)))
 
 
 def _drawn(rng: np.random.Generator) -> ContactScene:

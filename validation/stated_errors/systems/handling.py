@@ -9,14 +9,14 @@ from unittest import mock
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
+from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.trajectory import Trajectory
 from models.engines.free_vehicle import ENGINES, FreeModel
 from models.multibody.forces import CELLS
 from models.systems.handling.run import Drive, driven, principal, run
 from models.systems.handling.scene import HandlingScene, build
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 CELL, STEP = 10, 8
 """Times that the truth is finer in cells along the patch, and in steps."""
@@ -24,15 +24,13 @@ CELL, STEP = 10, 8
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many manoeuvres whose runs end."""
-    random, made = np.random.default_rng(seed), 0
-    while made < count:
-        engine = str(random.choice(ENGINES))
-        try:
-            sample = _sample(build(_table(random), "drawn.toml"), engine)
-        except (InputError, RunFailed):  # a step that the tyres cannot follow is refused before any error is told
-            continue
-        made += 1
-        yield sample
+    return drawn(count, seed, _drawn)
+
+
+def _drawn(random: np.random.Generator) -> Sample:
+    """One manoeuvre; raises where the tyres cannot follow a step, before any error is told."""
+    engine = str(random.choice(ENGINES))
+    return _sample(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:

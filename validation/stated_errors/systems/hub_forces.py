@@ -12,12 +12,12 @@ from unittest import mock
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
+from models.core.errors import RunFailed
 from models.core.result import Result
 from models.engines.cut_vehicle import ENGINES, HubModel
 from models.systems.hub_forces.run import principal, run
 from models.systems.hub_forces.scene import HubScene, build
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 FINER = 12
 """Times that the truth's steps are shorter."""
@@ -25,15 +25,13 @@ FINER = 12
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many scenes whose runs end."""
-    random, made = np.random.default_rng(seed), 0
-    while made < count:
-        engine = str(random.choice(ENGINES))
-        try:
-            sample = _sample(build(_table(random), "drawn.toml"), engine)
-        except (InputError, RunFailed):  # steps in which a mode would grow are refused before any run
-            continue
-        made += 1
-        yield sample
+    return drawn(count, seed, _drawn)
+
+
+def _drawn(random: np.random.Generator) -> Sample:
+    """One scene; raises for steps in which a mode would grow, before any run."""
+    engine = str(random.choice(ENGINES))
+    return _sample(build(_table(random), "drawn.toml"), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
+from models.core.errors import RunFailed
 from models.core.result import Result
 from models.engines.cut_vehicle import ENGINES
 from models.systems.measured.run import run
 from models.systems.measured.scene import build
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 from validation.stated_errors.systems.hub_forces import counted
 
 FINER = 12
@@ -23,15 +23,13 @@ FINER = 12
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many recordings whose runs end."""
-    random, made = np.random.default_rng(seed), 0
-    while made < count:
-        engine, table = str(random.choice(ENGINES)), _table(random)
-        try:
-            sample = _sample(table, engine)
-        except (InputError, RunFailed):  # steps in which a mode would grow are refused before any run
-            continue
-        made += 1
-        yield sample
+    return drawn(count, seed, _drawn)
+
+
+def _drawn(random: np.random.Generator) -> Sample:
+    """One recording; raises for steps in which a mode would grow, before any run."""
+    engine = str(random.choice(ENGINES))
+    return _sample(_table(random), engine)
 
 
 def _table(random: np.random.Generator) -> dict[str, Any]:

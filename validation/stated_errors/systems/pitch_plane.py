@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
+from models.core.errors import RunFailed
 from models.core.result import Result
 from models.core.steps import divides
 from models.core.time_series import write_time_series
@@ -22,7 +22,7 @@ from models.engines.catalogue import CATALOGUE, MISSING
 from models.systems.pitch_plane import run as single
 from models.systems.pitch_plane.scene import Scene, build, parameter_set, settings_of
 from models.systems.pitch_plane.virtual_measurement import measure, write_measurement
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 FINER, FINEST = 100, 2e-6
 """Ratio of the run's step to the truth's, and the shortest step (s) of a truth, which that of adaptive methods has."""
@@ -32,26 +32,19 @@ PERIODS = (1e-3, 2e-3, 5e-3)
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """``count`` runs that were made; scenes that an engine refuses are drawn anew."""
-    drawn = np.random.default_rng([seed, 1])
     with TemporaryDirectory() as folder:
-        while count:
-            sample = _sample(drawn, Path(folder))
-            if sample is not None:
-                count -= 1
-                yield sample
+        yield from drawn(count, [seed, 1], lambda random: _sample(random, Path(folder)))
 
 
-def _sample(drawn: np.random.Generator, folder: Path) -> Sample | None:
-    engine = str(drawn.choice(["reference", "exudyn", "mujoco"]))
+def _sample(random: np.random.Generator, folder: Path) -> Sample:
+    """One run; raises for an unstable step, and for a rule between samples that the method cannot read."""
+    engine = str(random.choice(["reference", "exudyn", "mujoco"]))
     known = [name for name in CATALOGUE[engine] if (engine, name) not in MISSING]
-    integrator = str(drawn.choice(known))
-    try:
-        scene = _scene(drawn, folder, engine, integrator)
-        with _counted() as calls:
-            run = _run(scene, engine)
-        truth = _truth(scene, engine)
-    except (InputError, RunFailed):  # a step that is unstable, a rule between samples that the method cannot read
-        return None
+    integrator = str(random.choice(known))
+    scene = _scene(random, folder, engine, integrator)
+    with _counted() as calls:
+        run = _run(scene, engine)
+    truth = _truth(scene, engine)
     told = errors_of(run)
     true = {name: float(np.sqrt(np.mean((run[name] - _at(truth, name, run.times)) ** 2))) for name in told}
     own = settings_of(scene, engine)

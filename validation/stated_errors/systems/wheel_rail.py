@@ -10,26 +10,17 @@ from dataclasses import replace
 import numpy as np
 
 from models.core.discretisation import errors_of
-from models.core.errors import InputError, RunFailed
 from models.systems.contact.stated_error import rms
 from models.systems.wheel_rail.run import EVERY, SUMS, run, sums
 from models.systems.wheel_rail.scene import WheelRailScene, build
-from validation.stated_errors.sample import Sample
+from validation.stated_errors.sample import Sample, drawn
 
 FINER, POSITIONS = 4.0, 4
 
 
 def samples(count: int, seed: int) -> Iterator[Sample]:
     """So many random scenes; those that fail or are refused are drawn anew."""
-    rng, made = np.random.default_rng(seed), 0
-    while made < count:
-        try:
-            sample = _sample(_drawn(rng))
-        except (InputError, RunFailed):
-            continue
-        if sample is not None:
-            made += 1
-            yield sample
+    return drawn(count, seed, lambda random: _sample(_drawn(random)))
 
 
 def _drawn(rng: np.random.Generator) -> WheelRailScene:
