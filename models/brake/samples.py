@@ -13,7 +13,7 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
-from models.brake.plane_step import REPORTED
+from models.brake.plane_records import REPORTED, Motion, report_of
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
 from models.machine.compiled import named, njit
 
@@ -21,8 +21,8 @@ from models.machine.compiled import named, njit
 class Row(NamedTuple):
     """The row and its parts, which are views of it.
 
-    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (W, 7):
-    see ``plane_step``.
+    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report: of the
+    last step, (7, W).
     """
 
     whole: np.ndarray
@@ -33,23 +33,32 @@ class Row(NamedTuple):
     torque: np.ndarray
     report: np.ndarray
 
+    def motion(self, accelerations: np.ndarray) -> Motion:
+        """Of the vehicle that has these ones (2 + U,)."""
+        return Motion(self.state, self.turning, accelerations, report_of(self.report))
+
 
 def row(coordinates: int, wheels: int) -> Row:
     """A row of zeros of so many coordinates and wheels."""
-    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (wheels, REPORTED))
+    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORTED, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     whole = np.zeros(ends[-1])
     columns = np.split(whole, ends[:-1])
     return Row(whole, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
 
 
-def parts(rows: list[np.ndarray], like: Row) -> list[np.ndarray]:
+def parts(rows: list[np.ndarray], like: Row) -> Row:
     """Of blocks of rows that are like one, each part with an axis for the rows before its own."""
     ends = np.cumsum([part.size for part in like[1:]])
-    columns = np.split(np.concatenate(rows), ends[:-1], axis=1)
-    return [
-        np.ascontiguousarray(column).reshape(-1, *part.shape) for column, part in zip(columns, like[1:], strict=True)
-    ]
+    whole = np.concatenate(rows)
+    columns = np.split(whole, ends[:-1], axis=1)
+    return Row(
+        whole,
+        *(
+            np.ascontiguousarray(column).reshape(-1, *part.shape)
+            for column, part in zip(columns, like[1:], strict=True)
+        ),
+    )
 
 
 class Told(NamedTuple):
@@ -85,7 +94,7 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def samples(told, kept, sample, braking, state, turning, *others):
+def samples(told, kept, sample, braking, motion, *others):
     """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by as many samples at a
     time as it is told for, less only where it does not move any further.
 
@@ -93,7 +102,7 @@ def samples(told, kept, sample, braking, state, turning, *others):
     (m/s) and the supply (bar).
     """
     air, chambers, brakes, torques = braking
-    status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
+    state, status, time, step = motion.state, FINE, 0.0, sample / (torques.shape[0] - 1)
     while True:
         yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
         for _ in range(told.samples[0]):
@@ -101,7 +110,7 @@ def samples(told, kept, sample, braking, state, turning, *others):
                 by_valves(told.valves, sample, air, chambers, brakes, torques)
             else:
                 by_pressures(told.pressures, air, brakes, torques)
-            status, used = go(state, turning, torques, step, told.steer, *others)
+            status, used = go(motion, torques, step, told.steer, *others)
             time += used
             if status not in (FINE, AT_REST):
                 break

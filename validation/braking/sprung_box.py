@@ -7,6 +7,7 @@ import numpy as np
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Pressures
+from models.brake.plane_records import Motion, report, workspace
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
@@ -117,23 +118,10 @@ def braked(
 
 def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
     """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
-    state, turning, found = path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3)
-    report, largest = np.zeros((4, path.reports.shape[2])), 0.0
-    torques = np.tile(path.torques[-1], (2, 1))
+    motion = Motion(path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3), report(4))
+    torques, work, largest = np.tile(path.torques[-1], (2, 1)), workspace(vehicle.plane), 0.0
     for _ in range(round(duration / vehicle.sample)):
-        vehicle.engine.advance(
-            state,
-            turning,
-            torques,
-            vehicle.sample,
-            vehicle.steer,
-            vehicle.slope,
-            vehicle.plane,
-            vehicle.kind,
-            vehicle.road,
-            vehicle.tables.packed,
-            found,
-            report,
-        )
-        largest = max(largest, float(np.hypot(*state[1, :2])), float(np.abs(turning * vehicle.plane.radius).max()))
+        vehicle.engine.advance(motion, torques, vehicle.sample, vehicle.steer, vehicle.on_road, work)
+        rims = np.abs(motion.turning * vehicle.plane.radius)
+        largest = max(largest, float(np.hypot(*motion.state[1, :2])), float(rims.max()))
     return largest
