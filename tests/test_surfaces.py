@@ -17,8 +17,7 @@ FRONT, REAR = PAPER.front.x, PAPER.rear.x
 
 def under(x, y=0.0, vx=0.0, vy=0.0, step=0.1, own=ROAD):
     """Of each wheel its first and its second table and the share of the second."""
-    none = np.zeros(4, dtype=int)
-    surfaces = Surfaces(none, none.copy(), np.zeros(4), np.zeros(4))
+    surfaces = Surfaces(*np.zeros((4, 4)))
     vehicle = OnRoad(PLANE, KINDS, 0.0, stacked([ICE]), own)
     under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, vehicle, surfaces)
     return np.column_stack((surfaces.first, surfaces.second, surfaces.share))

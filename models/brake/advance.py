@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from models.brake.plane_chain import Direction, Point, rows
-from models.brake.plane_records import Motion
+from models.brake.plane_records import Motion, Report, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
-from models.brake.surfaces import even, under_wheels
+from models.brake.surfaces import even, surfaces_of, under_wheels
 from models.machine.compiled import inlined, lean
+from models.machine.stack import array, doubles
 
 FINE, AT_REST, NOT_FOUND, PITCHED, ROLLED, FOLDED = range(6)
 """How a sample ended: still moving; standing; loads not found; an axle without load; both wheels of a side without
@@ -25,7 +26,7 @@ def ended(motion, plane):
 
     One wheel may lift; what balance takes is that the two of a side, or of an axle, do.
     """
-    status, load, headings = FINE, motion.report.load, motion.state[0, 2:]
+    status, load, headings = FINE, report_of(motion.report).load, motion.state[0, 2:]
     for first in range(0, load.size - 3, 4):
         a, b = load[first] > 0.0, load[first + 1] > 0.0
         c, d = load[first + 2] > 0.0, load[first + 3] > 0.0
@@ -48,48 +49,50 @@ def parts_of(state, regular):
 
 
 @lean
-def in_parts(parts, motion, torques, step, steer, vehicle, work):
+def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
     """``step_on`` in equal parts of a step; the report is their mean, and of times locked the sum."""
-    report, sums, piece, time = motion.report, work.sums, step / parts, 0.0
-    regular = vehicle.slope * 9.81 * step / parts
-    sums.whole[:] = 0.0
+    rows, piece, time, regular = motion.report, step / parts, 0.0, vehicle.slope * 9.81 * step / parts
+    ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
+    sums[:] = 0.0
     for k in range(parts):
-        for i in range(motion.turning.size):
+        for i in range(torques.shape[1]):
             for side in range(2):
-                work.ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
-        used = step_on(motion, work.ends, piece, steer, regular, vehicle, work)
+                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
+        used = step_on(motion, ends, piece, steer, regular, vehicle, surfaces)
         if used < 0.0:
             return used
         time += used
-        for c in range(report.whole.shape[0]):
-            for i in range(report.whole.shape[1]):
-                sums.whole[c, i] += report.whole[c, i]
+        for c in range(rows.shape[0]):
+            for i in range(rows.shape[1]):
+                sums[c, i] += rows[c, i]
         if used < piece:
             return time
-    for c in range(report.whole.shape[0]):
-        for i in range(report.whole.shape[1]):
-            report.whole[c, i] = sums.whole[c, i] / parts
-    for i in range(motion.turning.size):
-        report.locked[i], report.turning[i] = sums.locked[i], motion.turning[i]
+    report, locked = report_of(rows), report_of(sums).locked
+    for c in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            rows[c, i] = sums[c, i] / parts
+    for i in range(locked.size):
+        report.locked[i], report.turning[i] = locked[i], motion.turning[i]
     return step
 
 
 @lean
-def advance(motion, torques, step, steer, vehicle, work):
+def advance(motion, torques, step, steer, vehicle):
     """Move a ``Motion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
 
-    steer (W,): rad; vehicle: ``OnRoad``; work: ``Workspace``. Returns how it ended and the time (s) that passed.
+    steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
-    time = 0.0
+    wheels, time = motion.turning.size, 0.0
+    surfaces = surfaces_of(array(doubles(4 * wheels), (4, wheels)))
     for n in range(torques.shape[0] - 1):
         if n == 0 or not even(vehicle.road):
-            under_wheels(motion.state, step, vehicle, work.surfaces)
+            under_wheels(motion.state, step, vehicle, surfaces)
         regular = vehicle.slope * 9.81 * step
         parts = parts_of(motion.state, regular)
         if parts <= 1:
-            used = step_on(motion, torques[n : n + 2], step, steer, regular, vehicle, work)
+            used = step_on(motion, torques[n : n + 2], step, steer, regular, vehicle, surfaces)
         else:
-            used = in_parts(parts, motion, torques[n : n + 2], step, steer, vehicle, work)
+            used = in_parts(parts, motion, torques[n : n + 2], step, steer, vehicle, surfaces)
         if used < 0.0:
             return NOT_FOUND, time
         time += used
@@ -113,7 +116,7 @@ def ending(status: int, plane: Plane, motion: Motion) -> str:
         return _folded(plane, motion.state[0, 2:])
     if status == NOT_FOUND:
         return "no loads were found"
-    loads = motion.report.load
+    loads = Report(*motion.report).load
     first = next(i for i in range(0, plane.wheels, 4) if _lifted(loads[i : i + 4]))
     return _tipped(status, plane, slice(first, first + 4), _acceleration(plane, first, motion), loads)
 

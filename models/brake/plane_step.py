@@ -9,8 +9,10 @@ those of that speed.
 import math
 
 from models.brake.plane_chain import Direction, Point, coordinates, factor, headings, inertia, prescribed, rows, solve
+from models.brake.plane_records import KNOWN, Frame, report_of, wheels_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean
+from models.machine.stack import array, doubles
 from models.tyre.tyre_table import Cells, across, place
 
 CLOSE = 1e-7
@@ -43,21 +45,21 @@ def moved_to(row, place):
 
 
 @inlined
-def settle(motion, steer, regular, starts, vehicle, work):
+def settle(motion, steer, regular, starts, vehicle, frame):
     """Fill what is known of the wheels and the equations at the state; ``starts`` at the start of the step, whose
     speeds along the wheels are kept."""
-    plane, wheels, units = vehicle.plane, work.wheels, work.units
-    positions, rates = motion.state[0], motion.state[1]
+    plane, angles, wheels, units = vehicle.plane, vehicle.tables.angles, frame.wheels, frame.units
+    positions, rates, still = motion.state[0], motion.state[1], frame.wheels.still
     headings(positions, units)
     for i in range(plane.unit.size):
-        along, aside, g, k = work.along[i], work.across[i], plane.group[i], plane.unit[i]
-        wheels.still[i] = plane.static[i]
+        along, aside, g, k = frame.along[i], frame.across[i], plane.group[i], plane.unit[i]
+        still[i] = plane.static[i]
         if plane.by_x[i] != 0.0 or plane.by_y[i] != 0.0:
             heading = Direction(units[g, 0], units[g, 1])
             ahead, left = rows(Point(g, 0.0, 0.0), heading, units, rates, plane, along, aside)
             for a in range(coordinates(plane)):
-                work.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
-            wheels.still[i] += plane.by_x[i] * ahead + plane.by_y[i] * left
+                frame.press[i, a] = plane.by_x[i] * along[a] + plane.by_y[i] * aside[a]
+            still[i] += plane.by_x[i] * ahead + plane.by_y[i] * left
         if starts:
             same = i > 0 and steer[i] == steer[i - 1]
             wheels.cosine[i] = wheels.cosine[i - 1] if same else math.cos(steer[i])
@@ -70,38 +72,36 @@ def settle(motion, steer, regular, starts, vehicle, work):
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = ahead + v * rates[2 + k]
-        slide(i, u, v, regular, work, vehicle.tables.angles)
-    inertia(units, rates, plane, work.mass, work.right, work.out, work.out_before)
+        if not math.isnan(frame.surfaces.lag[i]):
+            v = frame.surfaces.lag[i] * max(u if wheels.start[i] >= 0.0 else -u, regular)
+        slide(i, u, v, regular, angles, wheels)
+    inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
     for a in range(prescribed(plane), coordinates(plane)):
         for b in range(prescribed(plane)):
-            work.right[a] -= work.mass[a, b] * motion.accelerations[b]
-    factor(work.mass, plane)
+            frame.right[a] -= frame.mass[a, b] * motion.accelerations[b]
+    factor(frame.mass, plane)
 
 
 @inlined
-def slide(i, u, v, regular, work, angles):
-    """Take the slip angle of wheel i, whose centre has the speeds u along and v across it (m/s)."""
-    wheels, lag = work.wheels, work.surfaces.lag[i]
+def slide(i, u, v, regular, angles, wheels):
+    """Take the slip angle of wheel i by the speeds (m/s) u of its centre along it and v of its tyre across it."""
     forwards = u if wheels.start[i] >= 0.0 else -u
-    if not math.isnan(lag):
-        v = lag * max(forwards, regular)
-    wheels.along[i], wheels.aside[i] = max(forwards, 0.0), v
-    wheels.angle[i] = math.atan2(abs(v), max(forwards, regular))
-    wheels.cell[i], wheels.share[i] = place(angles, wheels.angle[i])
+    angle = math.atan2(abs(v), max(forwards, regular))
+    wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), v, angle
+    wheels.cell[i], wheels.share[i] = place(angles, angle)
 
 
 @inlined
-def tyre(i, given, motion, vehicle, work):
+def tyre(i, given, wheel, tables, wheels, surfaces, report):
     """Fill the report of wheel i, of known slip angle and load, by a ``StepInput`` of speeds along it."""
-    wheels, surfaces, tables, report = work.wheels, work.surfaces, vehicle.tables, motion.report
-    v, load, share, sign = wheels.aside[i], wheels.load[i], surfaces.share[i], 1.0 if wheels.start[i] >= 0.0 else -1.0
-    first, second = surfaces.first[i], surfaces.second[i]
+    v, along, load, angle = wheels.aside[i], wheels.along[i], wheels.load[i], wheels.angle[i]
+    first, second, share = int(surfaces.first[i]), int(surfaces.second[i]), surfaces.share[i]
+    sign = 1.0 if wheels.start[i] >= 0.0 else -1.0
     j, q = place(tables.loads, load)
-    cells = Cells(wheels.cell[i], wheels.share[i], j, q)
+    cells = Cells(int(wheels.cell[i]), wheels.share[i], j, q)
     w, force, slip, locked = wheel_step(
-        sign * motion.turning[i],
         StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
-        Wheel(vehicle.plane.radius[i], vehicle.plane.spin[i]),
+        Wheel(wheel.radius, wheel.inertia, sign * wheel.turning),
         Grip(first, second, share, cells, load, tables.slips, tables.mu_x),
     )
     k, part = place(tables.slips, abs(slip))
@@ -109,13 +109,13 @@ def tyre(i, given, motion, vehicle, work):
     if share > 0.0:
         side += share * (across(second, cells, k, part, tables.g, tables.h) - side)
     side *= load
-    if slip > NEARLY and (wheels.along[i] > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
-        total, speed = math.hypot(force, side), math.hypot(wheels.along[i], v)
+    if slip > NEARLY and (along > 0.0 or v != 0.0):  # a locked tyre's force is against the way it slides
+        total, speed = math.hypot(force, side), math.hypot(along, v)
         part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
-        force += part * (total * wheels.along[i] / speed - force)
+        force += part * (total * along / speed - force)
         side += part * (total * abs(v) / speed - side)
     report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
-    report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(wheels.angle[i], v)
+    report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(angle, v)
     report.locked[i], report.turning[i] = locked, sign * w
 
 
@@ -140,39 +140,42 @@ def share_out(loads, places):
 
 
 @inlined
-def respond(motion, before, after, step, vehicle, work):
-    """Fill ``work.out`` with the accelerations by the tyres' forces if they were those of the ``motion``: the map
+def respond(motion, before, after, step, vehicle, frame):
+    """Fill ``frame.out`` with the accelerations by the tyres' forces if they were those of the ``motion``: the map
     whose fixed point is wanted. before, after (W,) : torques at the ends of the step."""
-    plane, wheels, out = vehicle.plane, work.wheels, work.out
+    plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
+    found, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
+    load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start
     size, free, lifts = coordinates(plane), prescribed(plane), False
     for a in range(size):
-        out[a] = motion.accelerations[a] if a < free else work.right[a]
-    for i in range(plane.unit.size):
-        wheels.load[i] = wheels.still[i] + times(work.press[i], motion.accelerations)
-        lifts = lifts or wheels.load[i] < 0.0
+        out[a] = found[a] if a < free else right[a]
+    for i in range(load.size):
+        load[i] = still[i] + times(frame.press[i], found)
+        lifts = lifts or load[i] < 0.0
     if lifts:
-        share_out(wheels.load, plane.place)
-    for i in range(plane.unit.size):
-        rate = wheels.rate[i] + times(work.along[i], motion.accelerations)
-        given = StepInput(wheels.start[i], wheels.start[i] + step * rate, before[i], after[i], step)
-        tyre(i, given, motion, vehicle, work)
+        share_out(load, plane.place)
+    for i in range(load.size):
+        speed1 = start[i] + step * (rate[i] + times(along[i], found))
+        given = StepInput(start[i], speed1, before[i], after[i], step)
+        wheel = Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
+        tyre(i, given, wheel, tables, wheels, surfaces, report)
         for a in range(free, size):
-            out[a] += work.along[i, a] * motion.report.force_x[i] + work.across[i, a] * motion.report.force_y[i]
-    solve(work.mass, plane, out)
+            out[a] += along[i, a] * report.force_x[i] + across[i, a] * report.force_y[i]
+    solve(frame.mass, plane, out)
 
 
 @inlined
-def stage(motion, before, after, step, most, vehicle, work):
+def stage(motion, before, after, step, most, vehicle, frame):
     """Mean accelerations over a step, into those of the ``motion``: what stands there is where the search begins.
 
     Anderson's method of depth one for at most so many rounds, of which ``PATIENCE`` that do not settle give way to
     means. Returns what is left of the error: the last change, which the round has made smaller as it did the change
     before.
     """
-    found, out, out0, off0, size = motion.accelerations, work.out, work.out_before, work.off, coordinates(vehicle.plane)
-    left, last = math.inf, 0.0
+    found, out, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
+    size, left, last = coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(most):
-        respond(motion, before, after, step, vehicle, work)
+        respond(motion, before, after, step, vehicle, frame)
         change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
             off = out[a] - found[a]
@@ -188,11 +191,11 @@ def stage(motion, before, after, step, most, vehicle, work):
             out0[a] = out[a]
         if done:
             break
-    return left if left <= CLOSE or most < PATIENCE else by_means(motion, before, after, step, vehicle, work)
+    return left if left <= CLOSE or most < PATIENCE else by_means(motion, before, after, step, vehicle, frame)
 
 
 @lean
-def by_means(motion, before, after, step, vehicle, work):
+def by_means(motion, before, after, step, vehicle, frame):
     """As ``stage``, where loads jump between two answers and have one only as a mean of them.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
@@ -203,17 +206,19 @@ def by_means(motion, before, after, step, vehicle, work):
     Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
     (1953) 506-510; recalled, not checked.
     """
-    found, out, report = motion.accelerations, work.out, motion.report.whole
+    found, out, report = motion.accelerations, frame.out, motion.report
     size, share, last = coordinates(vehicle.plane), 0.5, math.inf
-    respond(motion, before, after, step, vehicle, work)
+    means = array(doubles(report.size), report.shape)
+    begun = array(doubles(found.size), found.shape)
+    respond(motion, before, after, step, vehicle, frame)
     moved_to(out, found)
     for c in range(report.shape[0]):
-        moved_to(report[c], work.means[c])
+        moved_to(report[c], means[c])
     for _ in range(MOST_WINDOWS):
         way, net, most, change = 0.0, 0.0, 0.0, 0.0
-        moved_to(found, work.begun)
+        moved_to(found, begun)
         for _ in range(WINDOW):
-            respond(motion, before, after, step, vehicle, work)
+            respond(motion, before, after, step, vehicle, frame)
             change = 0.0
             for a in range(size):
                 change = max(change, abs(out[a] - found[a]))
@@ -226,13 +231,13 @@ def by_means(motion, before, after, step, vehicle, work):
                 found[a] += share * (out[a] - found[a])
             for c in range(report.shape[0]):
                 for i in range(report.shape[1]):
-                    work.means[c, i] += share * (report[c, i] - work.means[c, i])
+                    means[c, i] += share * (report[c, i] - means[c, i])
         for a in range(size):
-            net += abs(found[a] - work.begun[a])
+            net += abs(found[a] - begun[a])
         turns, thrown = net < 0.5 * way, change > last
         if (turns and share * change <= SPREAD) or (thrown and share * most <= SPREAD):
             for c in range(report.shape[0]):
-                moved_to(work.means[c], report[c])
+                moved_to(means[c], report[c])
             return 0.0
         share, last = 0.5 * share if turns or thrown else share, change
     return math.inf
@@ -261,34 +266,52 @@ def comes_to_rest(rates, turning, found, step, plane):
 
 
 @lean
-def step_on(motion, torques, step, steer, regular, vehicle, work):
-    """One step of a ``Motion``; ``work.surfaces`` : what the wheels are on.
+def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
+    """One step of a ``Motion`` whose wheels are on ``Surfaces``.
 
     torques (2, W) : of the brakes at the step's ends; steer (W,) : angles of the wheels in their units (rad); regular :
     m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does not, -1 if the loads
     were not found.
     """
     plane, state, turning, found = vehicle.plane, motion.state, motion.turning, motion.accelerations
-    size, before = coordinates(plane), work.before
+    count, size = turning.size, coordinates(plane)
+    ways = array(doubles(3 * count * size), (3, count, size))
+    some, middle = array(doubles(6 * size), (6, size)), array(doubles(count), (count,))
+    frame = Frame(
+        wheels_of(array(doubles(KNOWN * count), (KNOWN, count))),
+        surfaces,
+        report_of(motion.report),
+        ways[0],
+        ways[1],
+        ways[2],
+        array(doubles(2 * size), (size - 2, 2)),
+        array(doubles(size * size), (size, size)),
+        some[0],
+        some[1],
+        some[2],
+        some[3],
+    )
+    frame.press[:] = 0.0
+    place0, rate0 = some[4], some[5]
     for a in range(size):
-        before[0, a], before[1, a] = state[0, a], state[1, a]
-    for i in range(turning.size):
-        work.middle[i] = 0.5 * (torques[0, i] + torques[1, i])
+        place0[a], rate0[a] = state[0, a], state[1, a]
+    for i in range(count):
+        middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     for half in (True, False):
-        settle(motion, steer, regular, half, vehicle, work)
-        time, last = (0.5 * step, work.middle) if half else (step, torques[1])
+        settle(motion, steer, regular, half, vehicle, frame)
+        time, last = (0.5 * step, middle) if half else (step, torques[1])
         most = HALF_ROUNDS if half else PATIENCE
-        if not stage(motion, torques[0], last, time, most, vehicle, work) <= (math.inf if half else CLOSE):
+        if not stage(motion, torques[0], last, time, most, vehicle, frame) <= (math.inf if half else CLOSE):
             return -1.0
-        rest = comes_to_rest(before[1], turning, found, step, plane) if half and not plane.hooked else -1.0
+        rest = comes_to_rest(rate0, turning, found, step, plane) if half and not plane.hooked else -1.0
         if rest >= 0.0:
             time = rest
         for a in range(size):
-            state[1, a] = before[1, a] + time * found[a]
-            state[0, a] = before[0, a] + 0.5 * time * (before[1, a] + state[1, a])
+            state[1, a] = rate0[a] + time * found[a]
+            state[0, a] = place0[a] + 0.5 * time * (rate0[a] + state[1, a])
         if rest >= 0.0:
             state[1], turning[:] = 0.0, 0.0
             return rest
-    for i in range(turning.size):
-        turning[i] = motion.report.turning[i]
+    for i in range(count):
+        turning[i] = frame.report.turning[i]
     return step

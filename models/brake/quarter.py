@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import model_validator
 
-from models.brake.plane_records import Motion, report, workspace
+from models.brake.plane_records import motion_of, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY, Plane
-from models.brake.surfaces import OnRoad, Road, under_wheels
+from models.brake.surfaces import OnRoad, Road, surfaces_of, under_wheels
 from models.core.errors import InputError, RunFailed
 from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
@@ -95,23 +95,23 @@ class Stop:
 
 
 @njit(cache=True, error_model="numpy")
-def march(motion, torques, step, vehicle, work, path):
+def march(motion, torques, step, vehicle, path):
     """Steps (s) of a ``Motion`` on one wheel under torques (n + 1, 1) at their ends, see ``advance``.
 
     path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
     loads were not found; a vehicle that rests is left to its torques like one that moves.
     """
-    rest, straight = -1, np.zeros(motion.turning.size)
+    rest, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
     for n in range(torques.shape[0] - 1):
-        under_wheels(motion.state, step, vehicle, work.surfaces)
-        used = step_on(motion, torques[n : n + 2], step, straight, REGULAR, vehicle, work)
+        under_wheels(motion.state, step, vehicle, surfaces)
+        used = step_on(motion, torques[n : n + 2], step, straight, REGULAR, vehicle, surfaces)
         if used < 0.0:
             return -2
         if used < step and rest < 0:
             rest = n + 1
         path.time[n + 1], path.place[n + 1] = path.time[n] + step, motion.state[0, 0]
         path.speed[n + 1], path.turning[n + 1] = motion.state[1, 0], motion.turning[0]
-        path.locked[n + 1] = motion.report.locked[0] if used == step else 0.0
+        path.locked[n + 1] = report_of(motion.report).locked[0] if used == step else 0.0
     return rest
 
 
@@ -130,13 +130,13 @@ def braked(
     """
     if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
         raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
-    plane, state, path = quarter.plane, np.zeros((2, 3)), Path(*np.zeros((5, torques.size)))
+    state, path = np.zeros((2, 3)), Path(*np.zeros((5, torques.size)))
     state[1, 0] = speed
     spin = np.array([speed / quarter.radius if turning is None else turning])
     path.speed[0], path.turning[0] = speed, spin[0]
-    vehicle = OnRoad(plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
+    vehicle = OnRoad(quarter.plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
     ends = np.ascontiguousarray(torques, dtype=float)[:, None]
-    rest = march(Motion(state, spin, np.zeros(3), report(1)), ends, step, vehicle, workspace(plane), path)
+    rest = march(motion_of(state, spin), ends, step, vehicle, path)
     if rest == -2 or not all(np.isfinite(part).all() for part in path):
         raise RunFailed("braking", "no loads were found", float(path.time.max()))
     return Stop(path, rest)

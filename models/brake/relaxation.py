@@ -20,7 +20,7 @@ from models.brake.advance import AT_REST, FINE, NOT_FOUND, ended
 from models.brake.plane_chain import Point, velocity
 from models.brake.plane_step import step_on
 from models.brake.samples import compiled
-from models.brake.surfaces import under_wheels
+from models.brake.surfaces import surfaces_of, under_wheels
 from models.brake.wheel_step import SLOWEST, phi_1
 from models.machine.compiled import njit
 
@@ -64,19 +64,19 @@ def lag_on(state, time, steer, vehicle, lag, lagging):
 
 
 @njit(cache=True, error_model="numpy")
-def advance_lagging(motion, torques, step, steer, vehicle, work, lag):
+def advance_lagging(motion, torques, step, steer, vehicle, lag):
     """``advance`` with tyres of a ``Lag``, which is moved in place."""
-    time = 0.0
+    surfaces, time = surfaces_of(np.empty((4, motion.turning.size))), 0.0
     for n in range(torques.shape[0] - 1):
-        under_wheels(motion.state, step, vehicle, work.surfaces)
-        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, work.surfaces.lag)
-        used = step_on(motion, torques[n : n + 2], step, steer, vehicle.slope * 9.81 * step, vehicle, work)
+        under_wheels(motion.state, step, vehicle, surfaces)
+        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, surfaces.lag)
+        used = step_on(motion, torques[n : n + 2], step, steer, vehicle.slope * 9.81 * step, vehicle, surfaces)
         if used < 0.0:
             return NOT_FOUND, time
         time += used
         if used < step:
             return AT_REST, time
-        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, work.surfaces.lag)
+        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, surfaces.lag)
         status = ended(motion, vehicle.plane)
         if status != FINE:
             return status, time

@@ -13,16 +13,17 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
-from models.brake.plane_records import REPORTED, Motion, report_of
+from models.brake.plane_records import REPORTED, Motion
+from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
-from models.machine.compiled import named, njit
+from models.machine.compiled import lean, named, njit
 
 
 class Row(NamedTuple):
     """The row and its parts, which are views of it.
 
-    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report: of the
-    last step, (7, W).
+    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
+    see ``Motion``.
     """
 
     whole: np.ndarray
@@ -35,7 +36,7 @@ class Row(NamedTuple):
 
     def motion(self, accelerations: np.ndarray) -> Motion:
         """Of the vehicle that has these ones (2 + U,)."""
-        return Motion(self.state, self.turning, accelerations, report_of(self.report))
+        return Motion(self.state, self.turning, accelerations, self.report)
 
 
 def row(coordinates: int, wheels: int) -> Row:
@@ -94,42 +95,59 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
+def some_samples(told, kept, sample, braking, motion, time, *others):
+    """Move a vehicle that is at a time (s) on by as many samples as it is told for, less only where it does not move
+    any further, by ``go``, which is ``advance`` or stands in for it. How the last sample ended, and the time (s)."""
+    air, chambers, brakes, torques = braking
+    status, step = FINE, sample / (torques.shape[0] - 1)
+    for _ in range(told.samples[0]):
+        if math.isnan(told.pressures[0]):
+            by_valves(told.valves, sample, air, chambers, brakes, torques)
+        else:
+            by_pressures(told.pressures, air, brakes, torques)
+        status, used = go(motion, torques, step, told.steer, *others)
+        time += used
+        if status not in (FINE, AT_REST):
+            break
+        kept.now[0] = time
+        moved_to(kept.now, kept.rows[kept.left[0]])
+        kept.left[0] += 1
+        if status == AT_REST or time >= kept.until:
+            break
+    return status, time
+
+
+some: Callable[..., Any] = some_samples
+"""Stands here for what ``moved`` puts in its place."""
+
+
 def samples(told, kept, sample, braking, motion, *others):
-    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by as many samples at a
-    time as it is told for, less only where it does not move any further.
+    """Generator of a vehicle that ``some_samples`` moves on.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
     (m/s) and the supply (bar).
     """
-    air, chambers, brakes, torques = braking
-    state, status, time, step = motion.state, FINE, 0.0, sample / (torques.shape[0] - 1)
+    status, time = FINE, 0.0
     while True:
-        yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
-        for _ in range(told.samples[0]):
-            if math.isnan(told.pressures[0]):
-                by_valves(told.valves, sample, air, chambers, brakes, torques)
-            else:
-                by_pressures(told.pressures, air, brakes, torques)
-            status, used = go(motion, torques, step, told.steer, *others)
-            time += used
-            if status not in (FINE, AT_REST):
-                break
-            kept.now[0] = time
-            kept.rows[kept.left[0]] = kept.now
-            kept.left[0] += 1
-            if status == AT_REST or time >= kept.until:
-                break
+        yield status, time, math.hypot(motion.state[1, 0], motion.state[1, 1]), braking.air.supply[0]
+        status, time = some(told, kept, sample, braking, motion, time, *others)
+
+
+def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
+    """The function with other globals, and no cells of a closure, by whose contents numba would know it, and which are
+    others in every process if they are compiled."""
+    return FunctionType(function.__code__, globals() | given, function.__name__)
 
 
 def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
-    """``samples`` by one ``go``: a global of the function and no cell of a closure, by whose contents numba would know
-    it, and which are others in every process if they are compiled."""
-    return FunctionType(samples.__code__, globals() | {"go": go}, "samples")
+    """``samples`` by one ``go``."""
+    return _with(samples, some=_with(some_samples, go=go))
 
 
 def compiled(go: Callable[..., Any], name: str) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
     """``moved`` by a compiled function, compiled."""
-    return njit(cache=True, error_model="numpy")(named(moved(go), name))
+    some = lean(named(_with(some_samples, go=go), name))
+    return njit(cache=True, error_model="numpy")(named(_with(samples, some=some), name))
 
 
 by_steps = compiled(advance, "by_steps")

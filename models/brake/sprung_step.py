@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE
+from models.brake.plane_records import Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.sprung import PITCH, ROLL
-from models.brake.surfaces import under_wheels
-from models.brake.wheel_step import StepInput
+from models.brake.surfaces import Surfaces, under_wheels
+from models.brake.wheel_step import StepInput, Wheel
 from models.machine.compiled import lean, named, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
@@ -69,6 +70,17 @@ class Contacts(NamedTuple):
     along: np.ndarray
     across: np.ndarray
     load: np.ndarray
+
+
+class AtWheels(NamedTuple):
+    """What is at the wheels: what they hold, what is known of them, and what they are on.
+
+    The wheels' rates are the changes of the speeds along them, kept from step to step.
+    """
+
+    held: Held
+    wheels: Wheels
+    surfaces: Surfaces
 
 
 @lean
@@ -144,25 +156,27 @@ def fill(block, n, numbers):
 
 
 @lean
-def meet(contacts, regular, vehicle, work):
-    """Take slip angles and loads of the wheels from their ``Contacts``; regular (m/s) : see ``plane_step``."""
+def meet(contacts, regular, angles, wheels):
+    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; angles
+    of the tyres' tables."""
     for i in range(contacts.load.size):
-        slide(i, contacts.along[i], contacts.across[i], regular, work, vehicle.tables.angles)
-        work.wheels.load[i] = contacts.load[i]
+        slide(i, contacts.along[i], contacts.across[i], regular, angles, wheels)
+        wheels.load[i] = contacts.load[i]
 
 
 @lean
-def hold(held, before, after, step, motion, vehicle, work):
+def hold(known, before, after, step, motion, vehicle):
     """Let the wheels hold the tyres' mean forces over a step (s) between torques (W,) of the brakes, and report them.
 
-    ``work.wheels`` : speeds at the start and their rates, and what ``meet`` takes.
+    known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
-    wheels = work.wheels
+    held, wheels, plane, report = known.held, known.wheels, vehicle.plane, report_of(motion.report)
     for i in range(before.size):
-        speed = wheels.start[i]
-        tyre(i, StepInput(speed, speed + step * wheels.rate[i], before[i], after[i], step), motion, vehicle, work)
-        held.force_x[i], held.force_y[i] = motion.report.force_x[i], motion.report.force_y[i]
-        held.moment[i] = vehicle.plane.spin[i] * (motion.report.turning[i] - motion.turning[i]) / step
+        speed, wheel = wheels.start[i], Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
+        given = StepInput(speed, speed + step * wheels.rate[i], before[i], after[i], step)
+        tyre(i, given, wheel, vehicle.tables, wheels, known.surfaces, report)
+        held.force_x[i], held.force_y[i] = report.force_x[i], report.force_y[i]
+        held.moment[i] = wheel.inertia * (report.turning[i] - wheel.turning) / step
 
 
 OVER, GAVE_UP = 6, 7
@@ -174,13 +188,13 @@ UPRIGHT = 0.5
 class OnEngine(NamedTuple):
     """What steps need besides what those in the plane need.
 
-    numbers : the table, at whose end is what the wheels hold; contacts : where ``forces`` (n,) are taken; middle
-    (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine : its
-    model.
+    numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
+    middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
+    its model.
     """
 
     numbers: np.ndarray
-    held: Held
+    known: AtWheels
     contacts: Contacts
     forces: np.ndarray
     middle: np.ndarray
@@ -200,30 +214,31 @@ def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
     return True
 
 
-def advance(motion, torques, step, steer, vehicle, work, own):
+def advance(motion, torques, step, steer, vehicle, own):
     """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
-    A run begins with accelerations of zero. The engine's step is ``step``. The wheels' rates in ``work`` are the
-    changes of the speeds along them, taken at the start of a step as they were in the last one.
+    A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
+    taken to change as they did in the last one.
     """
-    plane, wheels, contacts, middle = vehicle.plane, work.wheels, own.contacts, own.middle
+    angles, known, contacts, middle = vehicle.tables.angles, own.known, own.contacts, own.middle
+    wheels = known.wheels
     q, v, turning, found = motion.state[0], motion.state[1], motion.turning, motion.accelerations
     rates, size = own.rates, found.size
     regular, half, time = vehicle.slope * own.liveliness * step, 0.5 * step, 0.0
     if not found.any():
         wheels.rate[:] = 0.0
-    own.held.steer[:] = steer
+    known.held.steer[:] = steer
     for n in range(torques.shape[0] - 1):
         before, after = torques[n], torques[n + 1]
-        under_wheels(motion.state, step, vehicle, work.surfaces)
+        under_wheels(motion.state, step, vehicle, known.surfaces)
         own.forces[:] = 0.0
         held_forces(own.numbers, q, v, own.forces, contacts)
         wheels.start[:] = contacts.along
-        meet(contacts, regular, vehicle, work)
-        hold(own.held, before, 0.5 * (before + after), half, motion, vehicle, work)
+        meet(contacts, regular, angles, wheels)
+        hold(known, before, 0.5 * (before + after), half, motion, vehicle)
         accelerate(own.engine, q, v, rates)
         found[:] = rates[:size]
-        rest = comes_to_rest(v[:size], turning, found, step, plane)
+        rest = comes_to_rest(v[:size], turning, found, step, vehicle.plane)
         if rest >= 0.0:
             q += rest * v + 0.5 * rest**2 * rates
             v[:size], turning[:] = 0.0, 0.0
@@ -234,11 +249,11 @@ def advance(motion, torques, step, steer, vehicle, work, own):
             own.forces[:] = 0.0
             held_forces(own.numbers, middle[0], middle[1], own.forces, contacts)
             wheels.rate[:] = (contacts.along - wheels.start) / half
-            meet(contacts, regular, vehicle, work)
-            hold(own.held, before, after, step, motion, vehicle, work)
+            meet(contacts, regular, angles, wheels)
+            hold(known, before, after, step, motion, vehicle)
             if not march(own.engine, q, v):
                 return GAVE_UP, time
-            turning[:] = motion.report.turning
+            turning[:] = report_of(motion.report).turning
         time += step
         if not max(abs(q[ROLL]), abs(q[PITCH])) <= UPRIGHT:
             return OVER, time

@@ -1,5 +1,6 @@
 """Which tyre table holds where on the road: stretches along x, each with its own surface left and right of a line."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -48,6 +49,18 @@ class Surfaces(NamedTuple):
     second: np.ndarray
     share: np.ndarray
     lag: np.ndarray
+
+
+def surfaces(wheels: int) -> Surfaces:
+    """Of so many wheels, the first table under all of them, whose tyres do not lag as long as nobody says so."""
+    return Surfaces(*np.zeros((3, wheels)), np.full(wheels, math.nan))
+
+
+@inlined
+def surfaces_of(rows):
+    """The same in rows (4, W) of a compiled function, and never of Python, which would let go of them twice."""
+    rows[3, :] = math.nan
+    return Surfaces(rows[0], rows[1], rows[2], rows[3])
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ import numpy as np
 from pydantic import Field
 
 from models.brake.plane_chain import headings, inertia
-from models.brake.plane_records import Motion, report, workspace
+from models.brake.plane_records import motion_of, report_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
-from models.brake.surfaces import EVEN, OnRoad
+from models.brake.surfaces import EVEN, OnRoad, surfaces_of, under_wheels
 from models.core.errors import InputError
 from models.core.strict import quantity
 from models.machine.compiled import njit
@@ -90,23 +90,24 @@ def follow(
         raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
     pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
     turning = np.hypot(*state[1, :2]) / plane.radius
-    motion = Motion(state.copy(), turning, np.zeros(state.shape[1]), report(plane.wheels))
+    motion = motion_of(state.copy(), turning)
     vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, EVEN)
     constant = np.tile(np.asarray(torques, float), (2, 1))
-    if not _follow(motion, np.ascontiguousarray(hook), step, constant, vehicle, workspace(plane), pull):
+    if not _follow(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
     return pull
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(motion, hook, step, torques, vehicle, work, pull):
-    plane, state, report, found = vehicle.plane, motion.state, motion.report, motion.accelerations
+def _follow(motion, hook, step, torques, vehicle, pull):
+    plane, state, report, found = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
     size, straight, states, forces = found.size, np.zeros(motion.turning.size), pull.states, pull.forces
     mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
-    states[0] = state
+    states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
+    under_wheels(state, step, vehicle, surfaces)
     for n in range(hook.shape[0] - 1):
         found[:2] = (hook[n + 1] - hook[n]) / step
-        if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, work) < 0.0:
+        if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, surfaces) < 0.0:
             return False
         states[n + 1] = state
         headings(0.5 * (states[n, 0] + state[0]), units)

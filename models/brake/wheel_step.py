@@ -27,10 +27,12 @@ MOST_PIECES = 100_000
 
 
 class Wheel(NamedTuple):
-    """A wheel that turns about its axle: radius (m), inertia (kg m^2)."""
+    """A wheel that turns: radius (m), inertia about its axle (kg m^2), and at the start of a step the speed of turning
+    (rad/s), negative if against the direction of the wheel's centre."""
 
     radius: float
     inertia: float
+    turning: float
 
 
 class Grip(NamedTuple):
@@ -153,13 +155,10 @@ def _way(decay, rate, way):
 
 
 @lean
-def wheel_step(turning, given, wheel, grip):
-    """What becomes of a ``Wheel`` by a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``.
-
-    turning : speed of turning at the start (rad/s), negative if against the direction of the wheel's centre.
-    """
-    w0, torque0, torque1, step = turning, given.torque0, given.torque1, given.step
-    radius, inertia = wheel.radius, wheel.inertia
+def wheel_step(given, wheel, grip):
+    """What becomes of a ``Wheel`` by a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
+    torque0, torque1, step = given.torque0, given.torque1, given.step
+    radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
     u0, u1 = max(given.speed0, SLOWEST), max(given.speed1, 0.0)
     mean = max(0.5 * (u0 + u1), SLOWEST)
     kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import FINE, advance
-from models.brake.plane_records import Motion, Workspace
+from models.brake.plane_records import Motion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.samples import moved
 from models.brake.surfaces import OnRoad
@@ -105,18 +105,18 @@ class Carried:
         self._model: FreeModel = free_model(engine, driven)
 
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, work: Workspace
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
     ) -> tuple[int, float]:
         """As ``models.brake.advance.advance``, a step at a time, each moved by the engine."""
-        time = 0.0
+        time, report = 0.0, Report(*motion.report)
         for n in range(len(torques) - 1):
             before = motion.state.copy()
-            status, used = advance(motion, torques[n : n + 2], step, steer, vehicle, work)
+            status, used = advance(motion, torques[n : n + 2], step, steer, vehicle)
             time += used
             if status != FINE:
                 return status, time
             self._held.steer[:] = steer
-            self._held.force_x[:], self._held.force_y[:] = motion.report.force_x, motion.report.force_y
+            self._held.force_x[:], self._held.force_y[:] = report.force_x, report.force_y
             motion.state[:] = self._moved(before, step)
         return FINE, time
 

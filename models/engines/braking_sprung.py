@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.plane_records import Motion, Workspace, report, workspace
+from models.brake.plane_records import KNOWN, Motion, Wheels, motion_of
 from models.brake.samples import moved
 from models.brake.sprung import Sprung
 from models.brake.sprung_step import (
@@ -17,6 +17,7 @@ from models.brake.sprung_step import (
     HELD,
     OVER,
     UPRIGHT,
+    AtWheels,
     Contacts,
     Held,
     OnEngine,
@@ -27,7 +28,7 @@ from models.brake.sprung_step import (
     hold,
     meet,
 )
-from models.brake.surfaces import OnRoad, under_wheels
+from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
@@ -81,7 +82,7 @@ class OnSprings:
         table = self._model.numbers
         own = OnEngine(
             table,
-            Held(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)),
+            self._at_wheels(table),
             Contacts(*np.zeros((3, self.wheels))),
             np.zeros(size),
             np.zeros((2, size)),
@@ -91,8 +92,13 @@ class OnSprings:
         )
         return own, go, by_steps
 
+    def _at_wheels(self, table: np.ndarray) -> AtWheels:
+        """Of the wheels that hold what is at the end of a table."""
+        wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
+        return AtWheels(Held(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels))
+
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, work: Workspace
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
     ) -> tuple[int, float]:
         """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
@@ -100,7 +106,7 @@ class OnSprings:
         """
         own, go, _ = self._parts
         with self._model.at_step(step):
-            status, time = go(motion, torques, step, steer, vehicle, work, own)
+            status, time = go(motion, torques, step, steer, vehicle, own)
         return self._sound(status, time), time
 
     def moving(
@@ -136,14 +142,15 @@ class OnSprings:
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
-        own, work, none = self._parts[0], workspace(vehicle.plane), np.zeros(steer.size)
-        for part in own.held:
+        own, none = self._parts[0], np.zeros(steer.size)
+        known = self._at_wheels(own.numbers)
+        for part in known.held:
             part[:] = 0.0
-        own.held.steer[:] = steer
+        known.held.steer[:] = steer
         held_forces(own.numbers, *state, np.zeros(self.size), own.contacts)
         turning = own.contacts.along / vehicle.plane.radius
-        under_wheels(state, 0.0, vehicle, work.surfaces)
-        work.wheels.start[:] = own.contacts.along
-        meet(own.contacts, 0.0, vehicle, work)
-        hold(own.held, none, none, BLINK, Motion(state, turning, np.zeros(3), report(steer.size)), vehicle, work)
+        under_wheels(state, 0.0, vehicle, known.surfaces)
+        known.wheels.start[:] = own.contacts.along
+        meet(own.contacts, 0.0, vehicle.tables.angles, known.wheels)
+        hold(known, none, none, BLINK, motion_of(state, turning), vehicle)
         return self._model.acceleration(0.0, *state), turning

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.plane_records import REPORTED, Report, report, report_of
+from models.brake.plane_records import REPORTED, Report, report_of
 from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
@@ -52,13 +52,13 @@ class Step(NamedTuple):
 
 class Now(NamedTuple):
     """The truck as it moves: x, y, heading and their rates (6,), accelerations (3,), turning of its wheels (4,), and
-    the reports of a step and of its parts."""
+    the reports (7, 4) of a step and of its parts."""
 
     state: np.ndarray
     accelerations: np.ndarray
     turning: np.ndarray
-    report: Report
-    sums: Report
+    report: np.ndarray
+    sums: np.ndarray
 
 
 class Stop(NamedTuple):
@@ -126,12 +126,11 @@ def settle(now, regular, starts, truck, known):
 @inlined
 def tyre(i, given, now, truck, known):
     """Fill the report of a wheel by what is done to it in a step."""
-    report, tables, load, u0, v = now.report, truck.tables, truck.load[i], known.start[i], known.aside[i]
+    report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
     sign, cells = 1.0 if u0 >= 0.0 else -1.0, Cells(known.cell[i], known.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
-        sign * now.turning[i],
         StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
-        Wheel(truck.radius[i], truck.spin[i]),
+        Wheel(truck.radius[i], truck.spin[i], sign * now.turning[i]),
         Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
     k, part = place(tables.slips, abs(slip))
@@ -149,7 +148,7 @@ def tyre(i, given, now, truck, known):
 @inlined
 def respond(now, before, after, step, truck, known):
     """Accelerations by the tyres' forces over a step (s) between torques before and after, if they were those now."""
-    found, report = now.accelerations, now.report
+    found, report = now.accelerations, report_of(now.report)
     ax, ay, turn = 0.0, 0.0, 0.0
     for i in range(4):
         rate = known.rate[i] + known.east[i] * found[0] + known.north[i] * found[1] + known.arm[i] * found[2]
@@ -230,16 +229,17 @@ def go(now, torques, step, truck, known):
     if not rounds(now, torques, step.time, truck, known):
         return -1.0
     moved(now, step.time, known)
+    turning = report_of(now.report).turning
     for i in range(4):
-        now.turning[i] = now.report.turning[i]
+        now.turning[i] = turning[i]
     return step.time
 
 
 @lean
 def in_parts(parts, now, torques, step, truck, known):
     """``go`` in equal parts of a ``Step``; the report is their mean, and of times locked the sum."""
-    report, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
-    sums.whole[:] = 0.0
+    rows, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
+    sums[:] = 0.0
     for k in range(parts):
         for i in range(4):
             for side in range(2):
@@ -250,14 +250,15 @@ def in_parts(parts, now, torques, step, truck, known):
         time += used
         for c in range(REPORTED):
             for i in range(4):
-                sums.whole[c, i] += report.whole[c, i]
+                sums[c, i] += rows[c, i]
         if used < part.time:
             return time
+    report, locked = report_of(rows), report_of(sums).locked
     for c in range(REPORTED):
         for i in range(4):
-            report.whole[c, i] = sums.whole[c, i] / parts
+            rows[c, i] = sums[c, i] / parts
     for i in range(4):
-        report.locked[i], report.turning[i] = sums.locked[i], now.turning[i]
+        report.locked[i], report.turning[i] = locked[i], now.turning[i]
     return step.time
 
 
@@ -281,7 +282,7 @@ def march(now, torque, steps, step, truck, known, stop):
             if part < step.time:
                 break
         stop.times[n], stop.states[n], stop.turning[n] = stop.times[n - 1] + used, now.state, now.turning
-        stop.reports[n] = now.report.whole
+        stop.reports[n] = now.report
         if part < step.time:
             return n + 1 if part >= 0.0 else 0
     return stop.times.size
@@ -306,7 +307,7 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
     torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
     def marched() -> Path:
-        now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, report(4), report(4))
+        now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORTED, 4)))
         now.state[3] = speed
         stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORTED, 4))))
         n = march(now, torque, vehicle.substeps, grid, truck, room(), stop)
@@ -317,7 +318,7 @@ def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], 
             stop.turning[:n],
             pressure * applied * np.ones(4),
             torque * applied,
-            report_of(stop.reports[1:n]),
+            Report(*np.moveaxis(stop.reports[1:n], 1, 0)),
             True,
             ("x", "y", "heading_0"),
         )

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
-from models.brake.plane_records import Motion, Report, report, workspace
+from models.brake.plane_records import Report, motion_of
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
 from models.brake.surfaces import EVEN, OnRoad, Road
 from models.core.errors import RunFailed
@@ -27,12 +27,12 @@ class Moving:
     def __init__(
         self, vehicle: OnRoad, speed: float, *, steer: float = 0.0, go: Callable[..., tuple[int, float]] = advance
     ) -> None:
-        self.plane, self.time, size = vehicle.plane, 0.0, 2 + vehicle.plane.masses.size
-        state = np.zeros((2, size))
+        self.plane, self.time = vehicle.plane, 0.0
+        state = np.zeros((2, 2 + vehicle.plane.masses.size))
         state[1, 0] = speed
-        self.motion = Motion(state, speed / self.plane.radius, np.zeros(size), report(self.plane.wheels))
+        self.motion = motion_of(state, speed / self.plane.radius)
         steered = np.where(self.plane.place[:, 0] > 0.0, steer, 0.0)
-        self._go, self._others = go, (steered, vehicle, workspace(self.plane))
+        self._go, self._others = go, (steered, vehicle)
 
     @property
     def state(self) -> np.ndarray:
@@ -47,7 +47,7 @@ class Moving:
     @property
     def report(self) -> Report:
         """Of the last step."""
-        return self.motion.report
+        return Report(*self.motion.report)
 
     @property
     def speed(self) -> float:

@@ -39,10 +39,12 @@ class State(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """The wheel, its brake (of one wheel) and the tyre's grip at a speed (m/s) that stays, for compiled functions."""
+    """A wheel by its radius (m) and inertia (kg m^2), its brake (of one wheel) and the tyre's grip, at a speed (m/s)
+    that stays: for compiled functions."""
 
     speed: float
-    wheel: Wheel
+    radius: float
+    inertia: float
     brakes: Brakes
     grip: Grip
 
@@ -81,8 +83,7 @@ class Frozen:
         """As compiled functions take it."""
         tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
-        wheel = Wheel(float(self.radius), float(self.inertia))
-        return Driven(float(self.speed), wheel, of_wheels(self.brake), grip)
+        return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
 
     def rolling(self) -> State:
         """A wheel that rolls without torque, at time 0."""
@@ -92,7 +93,7 @@ class Frozen:
 @njit(cache=True, error_model="numpy")
 def rim(state, driven):
     """Acceleration (m/s^2) of the wheel's rim."""
-    radius, inertia = driven.wheel
+    radius, inertia = driven.radius, driven.inertia
     slip = min(max(1.0 - radius * state.turning / driven.speed, 0.0), 1.0)
     k, share = place(driven.grip.slips, slip)
     low, high = node_force(k, driven.grip), node_force(k + 1, driven.grip)
@@ -105,7 +106,7 @@ def go_on(state, rate, time, driven):
     pressure = max(state.pressure + rate * time, 0.0)
     after = torque(0, pressure, state.torque, driven.brakes)
     given = StepInput(driven.speed, driven.speed, state.torque, after, time)
-    rolled = wheel_step(state.turning, given, driven.wheel, driven.grip)
+    rolled = wheel_step(given, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
     return State(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 
 

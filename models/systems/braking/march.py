@@ -10,7 +10,7 @@ import numpy as np
 from models.brake.advance import AT_REST, ENDS, FINE, ending
 from models.brake.brake import Brakes
 from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
-from models.brake.plane_records import Motion, Report, report_of, workspace
+from models.brake.plane_records import Motion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.port.ask import STATES, WITH_SLOW, ask
 from models.brake.port.sensors import Sensed
@@ -141,7 +141,7 @@ class Braked:
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
-        given = (told, kept, self.sample, braking, motion, self.on_road, workspace(self.plane))
+        given = (told, kept, self.sample, braking, motion, self.on_road)
         if self.engine is not None:
             moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
             return moving
@@ -190,7 +190,7 @@ def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]
         all_of.turning,
         all_of.pressure,
         all_of.torque,
-        report_of(all_of.report[1:]),
+        Report(*np.moveaxis(all_of.report[1:], 1, 0)),
         stands,
         names,
     )

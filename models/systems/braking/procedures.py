@@ -9,12 +9,12 @@ import numpy as np
 from scipy.optimize import root
 
 from models.brake.controller import Pressures, Sample
-from models.brake.plane_records import Motion, report, workspace
+from models.brake.plane_records import motion_of
 from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
 from models.brake.steering import Response, Steering, response
-from models.brake.surfaces import check_way, under_wheels
+from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError, Refused
 from models.systems.braking.march import Braked, Path, Start
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
@@ -222,9 +222,8 @@ def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
 def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (2 + U,) of a plane vehicle whose wheels roll without brakes, and their speeds of turning (W,)."""
     plane, none, turning = vehicle.plane, np.zeros((2, vehicle.plane.wheels)), _rolling(vehicle.plane, state, steer)
-    rates, work = np.zeros(state.shape[1]), workspace(plane)
-    rates[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
-    under_wheels(state, 0.0, vehicle.on_road, work.surfaces)
-    motion = Motion(state.copy(), turning.copy(), rates, report(plane.wheels))
-    step_on(motion, none, BLINK, steer, vehicle.slope * 9.81 * BLINK, vehicle.on_road, work)
-    return rates, turning
+    motion, ground = motion_of(state.copy(), turning.copy()), surfaces(plane.wheels)
+    motion.accelerations[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
+    under_wheels(state, 0.0, vehicle.on_road, ground)
+    step_on(motion, none, BLINK, steer, vehicle.slope * 9.81 * BLINK, vehicle.on_road, ground)
+    return motion.accelerations, turning
