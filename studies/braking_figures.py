@@ -5,8 +5,7 @@ from pathlib import Path as File
 import matplotlib.pyplot as plt
 import numpy as np
 
-from models.brake.plane_chain import place_of
-from models.brake.plane_step import LOAD, SLIP
+from models.brake.plane_chain import Point, place_of
 from models.brake.plane_vehicle import Plane
 from models.core.told import Results
 from models.drawing.figures import heading, save
@@ -42,7 +41,7 @@ def stop_figure(
         results,
     )
     _speeds(axes[0, 0], stop, stop.path.turning * plane_of(scene).radius, measured)
-    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports[:, :, SLIP], np.nan)
+    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
     _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
     _wheels(axes[0, 2], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
     _motion(axes[1, 0], stop, scene.trailer is not None)
@@ -50,7 +49,7 @@ def stop_figure(
     road(axes[1, 2], scene, name, stop)
     if lean is not None:
         _lean(axes[0, 3], stop.times, lean)
-        _wheels(axes[1, 3], stop.times[1:], stop.path.reports[:, :, LOAD] / 1e3, "Load of each wheel", "load [kN]")
+        _wheels(axes[1, 3], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
     axes[0, 1].legend(ncols=2, fontsize=8)
     return save(figure, file)
 
@@ -107,7 +106,7 @@ def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
 
 def on_ground(unit: int, corners: np.ndarray, positions: np.ndarray, plane: Plane) -> np.ndarray:
     """Places (m, 2) of a unit's corners at positions (2 + U,) of the vehicle."""
-    return np.array([place_of(unit, x, y, positions, plane.reach) for x, y in corners])
+    return np.array([place_of(Point(unit, x, y), positions, plane.reach) for x, y in corners])
 
 
 def _box(front: float, rear: float) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.brake.controller import SLOW, Command, Sample
-from models.brake.plane_step import BORNE, KNOWN, SIDE, share_out
+from models.brake.plane_step import share_out
 from models.brake.plane_vehicle import PAPER, truck
 from models.brake.port.ask import WITH_SLOW, ControllerFailed, checked
 from models.brake.quarter import Quarter
@@ -25,20 +25,17 @@ def scene(**tables):
 
 @pytest.mark.parametrize("loads", [(9e3, 24e3, -4e3, 26e3), (-1.0, 30e3, 8e3, 17e3), (20e3, 25e3, -2e3, 12e3)])
 def test_three_wheels_that_stay_hold_weight_and_moments(loads):
-    plane, known = truck(PAPER), np.zeros((4, KNOWN))
-    known[:, SIDE], known[:, BORNE] = plane.place[:, 1], loads
-    share_out(known)
-    found, place = known[:, BORNE], plane.place
-    assert found.min() >= 0.0 and found.sum() == pytest.approx(sum(loads), rel=1e-12)
-    assert found @ place == pytest.approx(np.array(loads) @ place, rel=1e-9)
+    place, shared = truck(PAPER).place, np.array(loads)
+    share_out(shared, place)
+    assert shared.min() >= 0.0 and shared.sum() == pytest.approx(sum(loads), rel=1e-12)
+    assert shared @ place == pytest.approx(np.array(loads) @ place, rel=1e-9)
 
 
 @pytest.mark.parametrize(("loads", "side"), [((-3e3, 30e3, -4e3, 26e3), (0, 2)), ((30e3, 25e3, -4e3, -2e3), (2, 3))])
 def test_beyond_balance_two_wheels_bear_nothing(loads, side):
-    known = np.zeros((4, KNOWN))
-    known[:, SIDE], known[:, BORNE] = truck(PAPER).place[:, 1], loads
-    share_out(known)
-    assert (known[list(side), BORNE] == 0.0).all() and known[:, BORNE].sum() == pytest.approx(sum(loads))
+    shared = np.array(loads)
+    share_out(shared, truck(PAPER).place)
+    assert (shared[list(side)] == 0.0).all() and shared.sum() == pytest.approx(sum(loads))
 
 
 def test_a_stop_at_the_edge_of_locking_finishes():

@@ -445,7 +445,7 @@ def test_a_failed_run_keeps_what_it_recorded(vehicle):
     with pytest.raises(ControllerFailed, match="sample 5: crash") as told:
         vehicle.run(Says(dies), 11.0, SHORT)
     partial = told.value.partial
-    assert len(partial.times) == 6 and not partial.stands and partial.reports.shape[:2] == (5, 4)
+    assert len(partial.times) == 6 and not partial.stands and partial.reports.load.shape == (5, 4)
     assert np.array_equal(partial.states, vehicle.run(Says(held), 11.0, 5 * SAMPLE).states)
 
 

@@ -117,7 +117,7 @@ def test_a_controller_that_dies_leaves_the_path_until_then():
     vehicle, start = ready(scene(), "stop")
     with pytest.raises(ControllerFailed, match="dead") as error:
         vehicle.run(Applied(5), start)
-    assert len(error.value.partial.times) == 6 and error.value.partial.reports.shape[0] == 5
+    assert len(error.value.partial.times) == 6 and error.value.partial.reports.load.shape[0] == 5
 
 
 def test_split_friction_turns_to_the_better_side_and_equal_friction_not_at_all():

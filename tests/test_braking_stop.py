@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.brake.quarter import Quarter, Stop
+from models.brake.quarter import Path, Quarter, Stop
 from models.brake.relaxation import by_lagging_steps
 from models.brake.samples import by_steps
 from models.core.errors import InputError
@@ -32,21 +32,25 @@ def test_the_exact_way_of_a_wheel_that_locks_at_once_is_that_of_sliding():
 
 
 @pytest.mark.parametrize(
-    ("row", "column", "value", "said"),
+    ("row", "part", "value", "said"),
     [
-        (2, 3, -1e-9, "turns backwards"),
-        (1, 3, 20.1, "turns faster than it rolls"),
-        (3, 2, 1e-4, "creeps"),
-        (3, 1, 5.001, "creeps"),
-        (1, 2, np.nan, "no number"),
+        (2, "turning", -1e-9, "turns backwards"),
+        (1, "turning", 20.1, "turns faster than it rolls"),
+        (3, "speed", 1e-4, "creeps"),
+        (3, "place", 5.001, "creeps"),
+        (1, "speed", np.nan, "no number"),
     ],
 )
-def test_each_rule_of_a_stop_is_seen_to_break(row, column, value, said):
-    path = np.array(
-        [[0.0, 0.0, 10.0, 20.0, 0.0], [0.5, 4.0, 5.0, 9.0, 0.0], [1.0, 5.0, 0.0, 0.0, 0.0], [1.5, 5.0, 0.0, 0.0, 0.0]]
+def test_each_rule_of_a_stop_is_seen_to_break(row, part, value, said):
+    path = Path(
+        time=np.array([0.0, 0.5, 1.0, 1.5]),
+        place=np.array([0.0, 4.0, 5.0, 5.0]),
+        speed=np.array([10.0, 5.0, 0.0, 0.0]),
+        turning=np.array([20.0, 9.0, 0.0, 0.0]),
+        locked=np.zeros(4),
     )
     assert case.faults_of(Stop(path, 2), 0.5, True) == []
-    path[row, column] = value
+    getattr(path, part)[row] = value
     assert said in case.faults_of(Stop(path, 2), 0.5, True)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from models.brake.plane_step import LOAD
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.sprung import PITCH, ROLL, sprung
 from models.core.errors import InputError, Refused, RunFailed
@@ -42,7 +41,7 @@ def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
     pitch, transfer = pitch_and_transfer(mu * GRAVITY)
     late = -len(path.times) // 8
     assert path.states[late, 0, PITCH] == pytest.approx(pitch, rel=2e-3)  # to first order in 1.6 mrad
-    gained = path.reports[late, :2, LOAD].sum() - path.reports[0, :2, LOAD].sum()
+    gained = path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum()
     assert gained == pytest.approx(transfer, rel=2e-3)
     # wheels lock within v / r in J v / (r T) and less, the centre of mass leans ahead by 0.9 mm
     assert path.states[-1, 0, 0] == pytest.approx(speed**2 / (2.0 * mu * GRAVITY), rel=1e-3)
@@ -52,7 +51,7 @@ def test_locked_wheels_pitch_and_load_the_box_as_springs_in_series_do():
 def test_static_loads_are_those_of_levers():
     for own in (box(), car()):
         path = braked(own, constant(0.1)).run(steady(0.0, 0.0, 0.0, 0.0), 2.0, 0.05)
-        assert path.reports[-1, :, LOAD] == pytest.approx(truck(own.plane).static, rel=1e-9)  # no drag, no brakes
+        assert path.reports.load[-1] == pytest.approx(truck(own.plane).static, rel=1e-9)  # no drag, no brakes
 
 
 def test_mirrored_steering_gives_a_mirrored_stop_and_none_gives_no_yaw():

@@ -9,10 +9,12 @@ import pytest
 
 from models.brake.controller import AllApplied
 from models.brake.plane_vehicle import PAPER, truck
-from models.brake.relaxation import lag_on, taken_up
+from models.brake.relaxation import Lag, lag_on, taken_up
+from models.brake.surfaces import EVEN, OnRoad
 from models.systems.braking.procedures import ready
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import stacked
 
 
 def test_the_law_is_exact_whatever_the_step():
@@ -62,13 +64,13 @@ def test_the_step_is_of_second_order():
 def test_it_damps_at_rest():
     # a wheel's share of a mass on its tyre alone, at rest along it and pushed aside at 0.3 m/s
     plane, slope, step = truck(PAPER), surface("ice").cornering, 5.5e-3
-    lag, surfaces, state = np.zeros(4), np.zeros((4, 4)), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
-    way = 0.0
+    lag, lagging, state = Lag(np.full(4, 0.3), np.zeros(4)), np.zeros(4), np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]])
+    vehicle, way = OnRoad(plane, np.zeros(4, dtype=int), slope, stacked([surface("ice")]), EVEN), 0.0
     for _ in range(round(2.0 / step)):
         for half in (True, False):
-            lag_on(state, 0.5 * step, np.zeros(4), plane, slope, np.full(4, 0.3), lag, surfaces)
+            lag_on(state, 0.5 * step, np.zeros(4), vehicle, lag, lagging)
             if half:
-                state[1, 1] -= step * 9.81 * slope * surfaces[:, 3].mean()
+                state[1, 1] -= step * 9.81 * slope * lagging.mean()
                 way += step * state[1, 1]
     assert abs(state[1, 1]) < 1e-3 and abs(way) < 0.02  # without the damper it keeps rocking at 0.3 m/s
 

@@ -4,19 +4,23 @@ import numpy as np
 import pytest
 
 from models.brake.plane_vehicle import PAPER, truck
-from models.brake.surfaces import Stretch, check_way, road, under_wheels
+from models.brake.surfaces import OnRoad, Stretch, Surfaces, check_way, road, under_wheels
 from models.core.errors import InputError
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import stacked
 
-PLANE = truck(PAPER)
+PLANE, ICE = truck(PAPER), surface("ice")
 KINDS = np.array([0, 0, 1, 1])
 ROAD = road([Stretch(0.0, 0, 1), Stretch(10.0, 2, 3), Stretch(12.0, 0, 0)], line=0.5, kinds=2)
 FRONT, REAR = PAPER.front.x, PAPER.rear.x
 
 
 def under(x, y=0.0, vx=0.0, vy=0.0, step=0.1, own=ROAD):
-    surface = np.empty((4, 3))
-    under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, PLANE, KINDS, own, surface)
-    return surface
+    """Of each wheel its first and its second table and the share of the second."""
+    surfaces = Surfaces(*np.zeros((4, 4)))
+    vehicle = OnRoad(PLANE, KINDS, 0.0, stacked([ICE]), own)
+    under_wheels(np.array([[x, y, 0.0], [vx, vy, 0.0]]), step, vehicle, surfaces)
+    return np.column_stack((surfaces.first, surfaces.second, surfaces.share))
 
 
 def test_each_wheel_has_the_surface_under_it_and_its_own_tyre():

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
-from models.brake.plane_chain import rows
-from models.brake.plane_step import LOAD, LOCKED, REPORTED, TURNING, step_on
+from models.brake.plane_chain import Direction, Point, rows
+from models.brake.plane_records import Motion, Report, report_of
+from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
-from models.brake.surfaces import even, under_wheels
+from models.brake.surfaces import even, surfaces_of, under_wheels
 from models.machine.compiled import inlined, lean
 from models.machine.stack import array, doubles
 
@@ -20,21 +21,21 @@ MOST_PARTS = 64
 
 
 @inlined
-def ended(state, plane, report):
+def ended(motion, plane):
     """Whether a step leaves the vehicle FINE, or how it has ended: of units of two axles, loads and angles of hinges.
 
     One wheel may lift; what balance takes is that the two of a side, or of an axle, do.
     """
-    status = FINE
-    for first in range(0, report.shape[0] - 3, 4):
-        a, b = report[first, LOAD] > 0.0, report[first + 1, LOAD] > 0.0
-        c, d = report[first + 2, LOAD] > 0.0, report[first + 3, LOAD] > 0.0
+    status, load, headings = FINE, report_of(motion.report).load, motion.state[0, 2:]
+    for first in range(0, load.size - 3, 4):
+        a, b = load[first] > 0.0, load[first + 1] > 0.0
+        c, d = load[first + 2] > 0.0, load[first + 3] > 0.0
         if not (a or b) or not (c or d):
             status = PITCHED
         elif not (a or c) or not (b or d):
             status = ROLLED
     for k in range(1, plane.masses.size):
-        if abs(state[0, 2 + k] - state[0, 1 + k]) > plane.fold:
+        if abs(headings[k] - headings[k - 1]) > plane.fold:
             status = FOLDED
     return status
 
@@ -48,72 +49,56 @@ def parts_of(state, regular):
 
 
 @lean
-def in_parts(parts, state, turning, torque0, torque1, step, steer, surface, regular, plane, tables, found, report):
+def in_parts(parts, motion, torques, step, steer, vehicle, surfaces):
     """``step_on`` in equal parts of a step; the report is their mean, and of times locked the sum."""
-    wheels, piece, time = turning.size, step / parts, 0.0
-    ends, sums = array(doubles(2 * wheels), (2, wheels)), array(doubles(wheels * REPORTED), (wheels, REPORTED))
+    rows, piece, time, regular = motion.report, step / parts, 0.0, vehicle.slope * 9.81 * step / parts
+    ends, sums = array(doubles(torques.size), torques.shape), array(doubles(rows.size), rows.shape)
     sums[:] = 0.0
     for k in range(parts):
-        for i in range(wheels):
+        for i in range(torques.shape[1]):
             for side in range(2):
-                ends[side, i] = torque0[i] + (torque1[i] - torque0[i]) * (k + side) / parts
-        used = step_on(
-            state, turning, ends[0], ends[1], piece, steer, surface, regular / parts, plane, tables, found, report
-        )
+                ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
+        used = step_on(motion, ends, piece, steer, regular, vehicle, surfaces)
         if used < 0.0:
             return used
         time += used
-        for i in range(wheels):
-            for c in range(REPORTED):
-                sums[i, c] += report[i, c]
+        for c in range(rows.shape[0]):
+            for i in range(rows.shape[1]):
+                sums[c, i] += rows[c, i]
         if used < piece:
             return time
-    for i in range(wheels):
-        for c in range(REPORTED):
-            if c != TURNING:
-                report[i, c] = sums[i, c] if c == LOCKED else sums[i, c] / parts
+    report, locked = report_of(rows), report_of(sums).locked
+    for c in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            rows[c, i] = sums[c, i] / parts
+    for i in range(locked.size):
+        report.locked[i], report.turning[i] = locked[i], motion.turning[i]
     return step
 
 
 @lean
-def advance(state, turning, torques, step, steer, slope, plane, kind, road, tables, found, report):
-    """Go on by the n steps (s) between the torques (n + 1, W) of ``pressure``; all of the state is moved in place.
+def advance(motion, torques, step, steer, vehicle):
+    """Move a ``Motion`` on by the n steps (s) between the torques (n + 1, W) of ``pressure``.
 
-    state (2, 2 + U), turning (W,): of ``step_on``; steer (W,): rad; slope: largest cornering coefficient of the tables
-    (1/rad); found (2 + U,), report (W, 7): of ``step_on``. Returns how it ended and the time (s) that passed.
+    steer (W,): rad; vehicle: ``OnRoad``. Returns how it ended and the time (s) that passed.
     """
-    surface, time = array(doubles(3 * turning.size), (turning.size, 3)), 0.0
+    wheels, time = motion.turning.size, 0.0
+    surfaces = surfaces_of(array(doubles(4 * wheels), (4, wheels)))
     for n in range(torques.shape[0] - 1):
-        if n == 0 or not even(road):
-            under_wheels(state, step, plane, kind, road, surface)
-        regular = slope * 9.81 * step
-        parts = parts_of(state, regular)
+        if n == 0 or not even(vehicle.road):
+            under_wheels(motion.state, step, vehicle, surfaces)
+        regular = vehicle.slope * 9.81 * step
+        parts = parts_of(motion.state, regular)
         if parts <= 1:
-            used = step_on(
-                state, turning, torques[n], torques[n + 1], step, steer, surface, regular, plane, tables, found, report
-            )
+            used = step_on(motion, torques[n : n + 2], step, steer, regular, vehicle, surfaces)
         else:
-            used = in_parts(
-                parts,
-                state,
-                turning,
-                torques[n],
-                torques[n + 1],
-                step,
-                steer,
-                surface,
-                regular,
-                plane,
-                tables,
-                found,
-                report,
-            )
+            used = in_parts(parts, motion, torques[n : n + 2], step, steer, vehicle, surfaces)
         if used < 0.0:
             return NOT_FOUND, time
         time += used
         if used < step:
             return AT_REST, time
-        status = ended(state, plane, report)
+        status = ended(motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time
@@ -125,14 +110,15 @@ BODIES = ("vehicle", "trailer")
 HINGES = ("the drawbar against the truck", "the trailer's body against the drawbar")
 
 
-def ending(status: int, plane: Plane, state: np.ndarray, found: np.ndarray, report: np.ndarray) -> str:
-    """Why a sample ended a run; state (2, 2 + U), accelerations ``found`` (2 + U,), report (W, 7) of its last step."""
+def ending(status: int, plane: Plane, motion: Motion) -> str:
+    """Why a sample ended a run that moved so in its last step."""
     if status == FOLDED:
-        return _folded(plane, state[0, 2:])
+        return _folded(plane, motion.state[0, 2:])
     if status == NOT_FOUND:
         return "no loads were found"
-    first = next(i for i in range(0, plane.wheels, 4) if _lifted(report[i : i + 4, LOAD]))
-    return _tipped(status, plane, slice(first, first + 4), _acceleration(plane, first, state, found), report[:, LOAD])
+    loads = Report(*motion.report).load
+    first = next(i for i in range(0, plane.wheels, 4) if _lifted(loads[i : i + 4]))
+    return _tipped(status, plane, slice(first, first + 4), _acceleration(plane, first, motion), loads)
 
 
 def _folded(plane: Plane, headings: np.ndarray) -> str:
@@ -148,11 +134,12 @@ def _lifted(loads: np.ndarray) -> bool:
     return bool((up[0] or up[3]) and (up[1] or up[2]))
 
 
-def _acceleration(plane: Plane, first: int, state: np.ndarray, found: np.ndarray) -> tuple[float, float]:
+def _acceleration(plane: Plane, first: int, motion: Motion) -> tuple[float, float]:
     """Of the body on four wheels, along and across it (m/s^2)."""
+    found = motion.accelerations
     k, along, across = plane.group[first], np.zeros(found.size), np.zeros(found.size)
-    units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
-    ahead, aside = rows(k, 0.0, 0.0, *units[k], units, state[1], plane.reach, along, across)
+    units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
+    ahead, aside = rows(Point(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across)
     return float(along @ found + ahead), float(across @ found + aside)
 
 

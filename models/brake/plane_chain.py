@@ -6,16 +6,33 @@ prescribed, only the headings are free.
 """
 
 import math
+from typing import NamedTuple
 
 from models.machine.compiled import inlined, lean
 
-ALONE = 3
-"""Coordinates of one unit that has no other."""
+
+class Point(NamedTuple):
+    """A point that is fixed to a unit: its number, and the place (m) in its axes."""
+
+    unit: int
+    x: float
+    y: float
+
+
+class Direction(NamedTuple):
+    """A heading on the ground by its cosine and sine."""
+
+    cosine: float
+    sine: float
+
+
+ALONG_X = Direction(1.0, 0.0)
 
 
 @lean
-def point(k, x, y, positions, rates, reach):
-    """Velocity (2) in the ground's axes of the point (x, y) of unit k, in that unit's axes."""
+def velocity(point, positions, rates, reach):
+    """Velocity (2) in the ground's axes of a ``Point``."""
+    k, x, y = point
     vx, vy = rates[0], rates[1]
     for j in range(reach.shape[1]):
         way = reach[k, j] + (x if j == k else 0.0)
@@ -27,8 +44,9 @@ def point(k, x, y, positions, rates, reach):
 
 
 @lean
-def place_of(k, x, y, positions, reach):
-    """Place (2) on the ground of the point (x, y) of unit k."""
+def place_of(point, positions, reach):
+    """Place (2) on the ground of a ``Point``."""
+    k, x, y = point
     px, py = positions[0], positions[1]
     for j in range(reach.shape[1]):
         way = reach[k, j] + (x if j == k else 0.0)
@@ -40,6 +58,18 @@ def place_of(k, x, y, positions, reach):
 
 
 @inlined
+def coordinates(plane):
+    """How many coordinates a ``Plane`` has: a constant of compiled functions for one unit that has no other."""
+    return 2 + len(plane.units)
+
+
+@inlined
+def prescribed(plane):
+    """How many of the first coordinates follow a motion that is prescribed."""
+    return 0 if len(plane.units) == 1 else 2 * plane.hooked
+
+
+@inlined
 def headings(positions, units):
     """Fill the cosine and the sine of the heading of every unit (U, 2)."""
     for j in range(units.shape[0]):
@@ -47,19 +77,20 @@ def headings(positions, units):
 
 
 @inlined
-def rows(k, x, y, c, s, units, rates, reach, along, across):
-    """Fill the two rows (n,) that give the velocity of the point (x, y) of unit k in axes whose heading has the cosine
-    c and the sine s; ``units`` : see ``headings``.
+def rows(point, direction, units, rates, plane, along, across):
+    """Fill the two rows (n,) that give the velocity of a ``Point`` along a ``Direction`` and to the left of it;
+    ``units`` : see ``headings``.
 
     Its acceleration is the rows times those of the coordinates, plus the two terms returned (m/s^2); a force in these
     axes acts on the coordinates by the rows' transposes.
     """
+    c, s = direction.cosine, direction.sine
     along[0], along[1], across[0], across[1] = c, s, -s, c
     ahead, aside = 0.0, 0.0
-    for j in range(units.shape[0]):
-        way, side = reach[k, j], 0.0
-        if j == k:
-            way, side = way + x, y
+    for j in range(len(plane.units)):
+        way, side = plane.reach[point.unit, j], 0.0
+        if j == point.unit:
+            way, side = way + point.x, point.y
         turned, aslant = c * units[j, 0] + s * units[j, 1], s * units[j, 0] - c * units[j, 1]
         along[2 + j], across[2 + j] = way * aslant - side * turned, way * turned + side * aslant
         ahead -= across[2 + j] * rates[2 + j] ** 2
@@ -68,27 +99,29 @@ def rows(k, x, y, c, s, units, rates, reach, along, across):
 
 
 @inlined
-def inertia(units, rates, masses, inertias, reach, mass, right, along, across):
+def inertia(units, rates, plane, mass, right, along, across):
     """Fill the mass matrix (n, n) and what its product with the accelerations has besides the forces (n,).
 
     units : see ``headings``; along, across (n,) : room to work in.
     """
+    size = coordinates(plane)
     mass[:], right[:] = 0.0, 0.0
-    for k in range(units.shape[0]):
-        ahead, aside = rows(k, 0.0, 0.0, 1.0, 0.0, units, rates, reach, along, across)
-        for a in range(right.size):
-            right[a] -= masses[k] * (along[a] * ahead + across[a] * aside)
-            for b in range(right.size):
-                mass[a, b] += masses[k] * (along[a] * along[b] + across[a] * across[b])
-        mass[2 + k, 2 + k] += inertias[k]
+    for k in range(len(plane.units)):
+        ahead, aside = rows(Point(k, 0.0, 0.0), ALONG_X, units, rates, plane, along, across)
+        for a in range(size):
+            right[a] -= plane.masses[k] * (along[a] * ahead + across[a] * aside)
+            for b in range(size):
+                mass[a, b] += plane.masses[k] * (along[a] * along[b] + across[a] * across[b])
+        mass[2 + k, 2 + k] += plane.inertias[k]
 
 
 @inlined
-def factor(mass, first):
-    """Cholesky's factor of the mass matrix from row ``first`` on, in place of its lower triangle; of a unit alone the
-    matrix itself, which is diagonal."""
-    if mass.shape[0] == ALONE:
+def factor(mass, plane):
+    """Cholesky's factor of the mass matrix of the coordinates that are free, in place of its lower triangle; of a unit
+    alone the matrix itself, which is diagonal."""
+    if len(plane.units) == 1:
         return
+    first = prescribed(plane)
     for a in range(first, mass.shape[0]):
         for b in range(first, a + 1):
             rest = mass[a, b]
@@ -98,17 +131,18 @@ def factor(mass, first):
 
 
 @inlined
-def solve(mass, first, right):
-    """Forces (n,) to accelerations from row ``first`` on, in place, by ``factor``'s."""
-    if right.size == ALONE:
-        for a in range(ALONE):
+def solve(mass, plane, right):
+    """Forces (n,) to accelerations of the coordinates that are free, in place, by ``factor``'s."""
+    size, first = coordinates(plane), prescribed(plane)
+    if len(plane.units) == 1:
+        for a in range(size):
             right[a] /= mass[a, a]
         return
-    for a in range(first, right.size):
+    for a in range(first, size):
         for b in range(first, a):
             right[a] -= mass[a, b] * right[b]
         right[a] /= mass[a, a]
-    for a in range(right.size - 1, first - 1, -1):
-        for b in range(a + 1, right.size):
+    for a in range(size - 1, first - 1, -1):
+        for b in range(a + 1, size):
             right[a] -= mass[b, a] * right[b]
         right[a] /= mass[a, a]

@@ -5,13 +5,15 @@ truck: what stopping distances and times of locking show of the one holds for th
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import model_validator
 
-from models.brake.plane_step import LOCKED, REPORTED, step_on
+from models.brake.plane_records import motion_of, report_of
+from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY, Plane
-from models.brake.surfaces import Road, under_wheels
+from models.brake.surfaces import OnRoad, Road, surfaces_of, under_wheels
 from models.core.errors import InputError, RunFailed
 from models.core.strict import Strict, quantity
 from models.machine.compiled import njit
@@ -19,9 +21,17 @@ from models.tyre.tyre_table import Tables
 
 REGULAR = 0.1
 """Speed (m/s) below which slip angles are those of this one: without a motion across there is none at all."""
-TIME, PLACE, SPEED, TURNING, HELD = range(5)
-"""Columns of a path: s, m, m/s, rad/s at the end of a step, and the time (s) within it for which the wheel was
-locked."""
+
+
+class Path(NamedTuple):
+    """Motion of a quarter vehicle at the ends of its steps, each (n,): time (s), place (m), speed (m/s), turning of
+    the wheel (rad/s), and the time (s) within the step for which the wheel was locked."""
+
+    time: np.ndarray
+    place: np.ndarray
+    speed: np.ndarray
+    turning: np.ndarray
+    locked: np.ndarray
 
 
 class Quarter(Strict):
@@ -64,56 +74,44 @@ class Quarter(Strict):
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """Path (n, 5) from the start on, its columns named above, and the step (index) in which it came to rest, or -1."""
+    """Path from the start on, and the step (index) in which it came to rest, or -1."""
 
-    path: np.ndarray
+    path: Path
     rest: int
 
     @property
     def distance(self) -> float:
-        """Way (m) from the start to the last row."""
-        return float(self.path[-1, PLACE] - self.path[0, PLACE])
+        """Way (m) from the start to the end of the path."""
+        return float(self.path.place[-1] - self.path.place[0])
 
     @property
     def released(self) -> float:
         """Time (s) at which a wheel that was locked in one run of steps turned again; not a number if it never did."""
-        held = np.flatnonzero(self.path[:, HELD] > 0.0)
-        if held.size == 0 or self.path[held[-1], TURNING] == 0.0:
+        time, locked = self.path.time, self.path.locked
+        held = np.flatnonzero(locked > 0.0)
+        if held.size == 0 or self.path.turning[held[-1]] == 0.0:
             return float("nan")
-        return float(self.path[held[-1] - 1, TIME] + self.path[held[-1], HELD])
+        return float(time[held[-1] - 1] + locked[held[-1]])
 
 
 @njit(cache=True, error_model="numpy")
-def march(state, turning, torques, step, kind, road, plane, tables, path):
-    """Steps (s) from ``state`` (2, 2 + U) and ``turning`` (W,), both moved, under torques (n + 1, W) at their ends.
+def march(motion, torques, step, vehicle, path):
+    """Steps (s) of a ``Motion`` on one wheel under torques (n + 1, 1) at their ends, see ``advance``.
 
-    path (n + 1, 5) is filled from row 1 on, of the first wheel. Returns the step in which the vehicle came to rest, -1
-    if in none, -2 if loads were not found; a vehicle that rests is left to its torques like one that moves.
+    path is filled from its second place on. Returns the step in which the vehicle came to rest, -1 if in none, -2 if
+    loads were not found; a vehicle that rests is left to its torques like one that moves.
     """
-    found, report, rest = np.zeros(state.shape[1]), np.empty((turning.size, REPORTED)), -1
-    surface = np.empty((turning.size, 3))
+    rest, straight, surfaces = -1, np.zeros(1), surfaces_of(np.empty((4, 1)))
     for n in range(torques.shape[0] - 1):
-        under_wheels(state, step, plane, kind, road, surface)
-        used = step_on(
-            state,
-            turning,
-            torques[n],
-            torques[n + 1],
-            step,
-            np.zeros(turning.size),
-            surface,
-            REGULAR,
-            plane,
-            tables,
-            found,
-            report,
-        )
+        under_wheels(motion.state, step, vehicle, surfaces)
+        used = step_on(motion, torques[n : n + 2], step, straight, REGULAR, vehicle, surfaces)
         if used < 0.0:
             return -2
         if used < step and rest < 0:
             rest = n + 1
-        path[n + 1, 0], path[n + 1, 1], path[n + 1, 2] = path[n, 0] + step, state[0, 0], state[1, 0]
-        path[n + 1, 3], path[n + 1, 4] = turning[0], report[0, LOCKED] if used == step else 0.0
+        path.time[n + 1], path.place[n + 1] = path.time[n] + step, motion.state[0, 0]
+        path.speed[n + 1], path.turning[n + 1] = motion.state[1, 0], motion.turning[0]
+        path.locked[n + 1] = report_of(motion.report).locked[0] if used == step else 0.0
     return rest
 
 
@@ -132,21 +130,13 @@ def braked(
     """
     if not (np.isfinite(torques).all() and (torques >= 0.0).all()):
         raise InputError("", "torques", float(np.min(torques)), "must be numbers from 0 on: a brake opposes turning")
-    state, path = np.zeros((2, 3)), np.zeros((torques.size, 5))
+    state, path = np.zeros((2, 3)), Path(*np.zeros((5, torques.size)))
     state[1, 0] = speed
     spin = np.array([speed / quarter.radius if turning is None else turning])
-    path[0, SPEED], path[0, TURNING] = speed, spin[0]
-    rest = march(
-        state,
-        spin,
-        np.ascontiguousarray(torques, dtype=float)[:, None],
-        step,
-        np.zeros(1, dtype=np.int64),
-        road,
-        quarter.plane,
-        tyres.packed,
-        path,
-    )
-    if rest == -2 or not np.isfinite(path).all():
-        raise RunFailed("braking", "no loads were found", float(path[np.argmax(path[:, TIME]), TIME]))
+    path.speed[0], path.turning[0] = speed, spin[0]
+    vehicle = OnRoad(quarter.plane, np.zeros(1, dtype=np.int64), 0.0, tyres, road)
+    ends = np.ascontiguousarray(torques, dtype=float)[:, None]
+    rest = march(motion_of(state, spin), ends, step, vehicle, path)
+    if rest == -2 or not all(np.isfinite(part).all() for part in path):
+        raise RunFailed("braking", "no loads were found", float(path.time.max()))
     return Stop(path, rest)

@@ -12,14 +12,15 @@ and high-speed calculations, SAE 950311 (recalled, not checked). Along the wheel
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, NOT_FOUND, ended
-from models.brake.plane_chain import point
+from models.brake.plane_chain import Point, velocity
 from models.brake.plane_step import step_on
 from models.brake.samples import compiled
-from models.brake.surfaces import under_wheels
+from models.brake.surfaces import surfaces_of, under_wheels
 from models.brake.wheel_step import SLOWEST, phi_1
 from models.machine.compiled import njit
 
@@ -29,6 +30,13 @@ DAMPING = 0.7
 """Damping ratio at rest, of a wheel that bears its share of the mass."""
 
 
+class Lag(NamedTuple):
+    """Tyres that lag, each (W,): relaxation lengths (m), and tan of the slip angles, which are moved in place."""
+
+    length: np.ndarray
+    angle: np.ndarray
+
+
 @njit(cache=True, error_model="numpy")
 def taken_up(a, u, v, time, length):
     """tan of the slip angle after a time (s) at constant speeds u, v (m/s) with a relaxation length (m)."""
@@ -36,55 +44,44 @@ def taken_up(a, u, v, time, length):
 
 
 @njit(cache=True, error_model="numpy")
-def lag_on(state, time, steer, plane, slope, length, lag, surface):
-    """Move ``lag`` (W,) on by a time (s), and fill the fourth column of ``surface`` with it and the damper's part.
+def lag_on(state, time, steer, vehicle, lag, lagging):
+    """Move a ``Lag`` on by a time (s), and fill ``lagging`` (W,) with its angles and the damper's part.
 
     What is NaN begins as if the speeds had been there for ever.
     """
-    for i in range(lag.size):
+    plane = vehicle.plane
+    for i in range(lag.angle.size):
         k = plane.unit[i]
-        vx, vy = point(k, plane.place[i, 0], plane.place[i, 1], state[0], state[1], plane.reach)
+        vx, vy = velocity(Point(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
         c, s = math.cos(state[0, 2 + k] + steer[i]), math.sin(state[0, 2 + k] + steer[i])
-        u, v = c * vx + s * vy, c * vy - s * vx
-        if math.isnan(lag[i]):
-            lag[i] = v / max(abs(u), SLOWEST)
-        lag[i] = taken_up(lag[i], u, v, time, length[i])
+        u, v, length = c * vx + s * vy, c * vy - s * vx, lag.length[i]
+        if math.isnan(lag.angle[i]):
+            lag.angle[i] = v / max(abs(u), SLOWEST)
+        lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
         fade = max(1.0 - abs(u) / SLOW, 0.0)
-        surface[i, 3] = lag[i] + fade * fade * v * 2.0 * DAMPING / math.sqrt(max(slope, SLOWEST) * 9.81 * length[i])
+        rate = math.sqrt(max(vehicle.slope, SLOWEST) * 9.81 * length)
+        lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
 
 
 @njit(cache=True, error_model="numpy")
-def advance_lagging(state, turning, torques, step, steer, slope, plane, kind, road, tables, found, report, length, lag):
-    """``advance`` with tyres of relaxation lengths (W,) in m; ``lag`` (W,) is moved in place."""
-    surface, time = np.empty((turning.size, 4)), 0.0
+def advance_lagging(motion, torques, step, steer, vehicle, lag):
+    """``advance`` with tyres of a ``Lag``, which is moved in place."""
+    surfaces, time = surfaces_of(np.empty((4, motion.turning.size))), 0.0
     for n in range(torques.shape[0] - 1):
-        under_wheels(state, step, plane, kind, road, surface)
-        lag_on(state, 0.5 * step, steer, plane, slope, length, lag, surface)
-        used = step_on(
-            state,
-            turning,
-            torques[n],
-            torques[n + 1],
-            step,
-            steer,
-            surface,
-            slope * 9.81 * step,
-            plane,
-            tables,
-            found,
-            report,
-        )
+        under_wheels(motion.state, step, vehicle, surfaces)
+        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, surfaces.lag)
+        used = step_on(motion, torques[n : n + 2], step, steer, vehicle.slope * 9.81 * step, vehicle, surfaces)
         if used < 0.0:
             return NOT_FOUND, time
         time += used
         if used < step:
             return AT_REST, time
-        lag_on(state, 0.5 * step, steer, plane, slope, length, lag, surface)
-        status = ended(state, plane, report)
+        lag_on(motion.state, 0.5 * step, steer, vehicle, lag, surfaces.lag)
+        status = ended(motion, vehicle.plane)
         if status != FINE:
             return status, time
     return FINE, time
 
 
 by_lagging_steps = compiled(advance_lagging, "by_lagging_steps")
-"""``by_steps`` with such tyres: after its arguments come ``length`` and ``lag``."""
+"""``by_steps`` with such tyres: after its arguments comes a ``Lag``."""

@@ -13,16 +13,17 @@ import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
 from models.brake.brake import Brakes
-from models.brake.plane_step import REPORTED
+from models.brake.plane_records import REPORTED, Motion
+from models.brake.plane_step import moved_to
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves
-from models.machine.compiled import named, njit
+from models.machine.compiled import lean, named, njit
 
 
 class Row(NamedTuple):
     """The row and its parts, which are views of it.
 
-    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (W, 7):
-    see ``plane_step``.
+    time (1,): s; state (2, n): positions and rates; turning, pressure, torque (W,): rad/s, bar, N m; report (7, W):
+    see ``Motion``.
     """
 
     whole: np.ndarray
@@ -33,23 +34,32 @@ class Row(NamedTuple):
     torque: np.ndarray
     report: np.ndarray
 
+    def motion(self, accelerations: np.ndarray) -> Motion:
+        """Of the vehicle that has these ones (2 + U,)."""
+        return Motion(self.state, self.turning, accelerations, self.report)
+
 
 def row(coordinates: int, wheels: int) -> Row:
     """A row of zeros of so many coordinates and wheels."""
-    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (wheels, REPORTED))
+    shapes = ((1,), (2, coordinates), *((wheels,),) * 3, (REPORTED, wheels))
     ends = np.cumsum([math.prod(shape) for shape in shapes])
     whole = np.zeros(ends[-1])
     columns = np.split(whole, ends[:-1])
     return Row(whole, *(column.reshape(shape) for column, shape in zip(columns, shapes, strict=True)))
 
 
-def parts(rows: list[np.ndarray], like: Row) -> list[np.ndarray]:
+def parts(rows: list[np.ndarray], like: Row) -> Row:
     """Of blocks of rows that are like one, each part with an axis for the rows before its own."""
     ends = np.cumsum([part.size for part in like[1:]])
-    columns = np.split(np.concatenate(rows), ends[:-1], axis=1)
-    return [
-        np.ascontiguousarray(column).reshape(-1, *part.shape) for column, part in zip(columns, like[1:], strict=True)
-    ]
+    whole = np.concatenate(rows)
+    columns = np.split(whole, ends[:-1], axis=1)
+    return Row(
+        whole,
+        *(
+            np.ascontiguousarray(column).reshape(-1, *part.shape)
+            for column, part in zip(columns, like[1:], strict=True)
+        ),
+    )
 
 
 class Told(NamedTuple):
@@ -85,42 +95,59 @@ go: Callable[..., Any] = advance
 """Stands here for what ``moved`` puts in its place."""
 
 
-def samples(told, kept, sample, braking, state, turning, *others):
-    """Generator of a vehicle that ``go``, which is ``advance`` or stands in for it, moves on by as many samples at a
-    time as it is told for, less only where it does not move any further.
+def some_samples(told, kept, sample, braking, motion, time, *others):
+    """Move a vehicle that is at a time (s) on by as many samples as it is told for, less only where it does not move
+    any further, by ``go``, which is ``advance`` or stands in for it. How the last sample ended, and the time (s)."""
+    air, chambers, brakes, torques = braking
+    status, step = FINE, sample / (torques.shape[0] - 1)
+    for _ in range(told.samples[0]):
+        if math.isnan(told.pressures[0]):
+            by_valves(told.valves, sample, air, chambers, brakes, torques)
+        else:
+            by_pressures(told.pressures, air, brakes, torques)
+        status, used = go(motion, torques, step, told.steer, *others)
+        time += used
+        if status not in (FINE, AT_REST):
+            break
+        kept.now[0] = time
+        moved_to(kept.now, kept.rows[kept.left[0]])
+        kept.left[0] += 1
+        if status == AT_REST or time >= kept.until:
+            break
+    return status, time
+
+
+some: Callable[..., Any] = some_samples
+"""Stands here for what ``moved`` puts in its place."""
+
+
+def samples(told, kept, sample, braking, motion, *others):
+    """Generator of a vehicle that ``some_samples`` moves on.
 
     Each time, and first at the start, it gives how the last sample ended, the time (s), the speed of the first unit
     (m/s) and the supply (bar).
     """
-    air, chambers, brakes, torques = braking
-    status, time, step = FINE, 0.0, sample / (torques.shape[0] - 1)
+    status, time = FINE, 0.0
     while True:
-        yield status, time, math.hypot(state[1, 0], state[1, 1]), air.supply[0]
-        for _ in range(told.samples[0]):
-            if math.isnan(told.pressures[0]):
-                by_valves(told.valves, sample, air, chambers, brakes, torques)
-            else:
-                by_pressures(told.pressures, air, brakes, torques)
-            status, used = go(state, turning, torques, step, told.steer, *others)
-            time += used
-            if status not in (FINE, AT_REST):
-                break
-            kept.now[0] = time
-            kept.rows[kept.left[0]] = kept.now
-            kept.left[0] += 1
-            if status == AT_REST or time >= kept.until:
-                break
+        yield status, time, math.hypot(motion.state[1, 0], motion.state[1, 1]), braking.air.supply[0]
+        status, time = some(told, kept, sample, braking, motion, time, *others)
+
+
+def _with(function: Callable[..., Any], **given: Any) -> Callable[..., Any]:
+    """The function with other globals, and no cells of a closure, by whose contents numba would know it, and which are
+    others in every process if they are compiled."""
+    return FunctionType(function.__code__, globals() | given, function.__name__)
 
 
 def moved(go: Callable[..., Any]) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
-    """``samples`` by one ``go``: a global of the function and no cell of a closure, by whose contents numba would know
-    it, and which are others in every process if they are compiled."""
-    return FunctionType(samples.__code__, globals() | {"go": go}, "samples")
+    """``samples`` by one ``go``."""
+    return _with(samples, some=_with(some_samples, go=go))
 
 
 def compiled(go: Callable[..., Any], name: str) -> Callable[..., Iterator[tuple[int, float, float, float]]]:
     """``moved`` by a compiled function, compiled."""
-    return njit(cache=True, error_model="numpy")(named(moved(go), name))
+    some = lean(named(_with(some_samples, go=go), name))
+    return njit(cache=True, error_model="numpy")(named(_with(samples, some=some), name))
 
 
 by_steps = compiled(advance, "by_steps")

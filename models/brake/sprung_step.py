@@ -5,12 +5,10 @@ step, to which half a step by the accelerations leads; the engine then marches t
 method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
-then a row of each wheel: steer angle (rad), mean forces on its tyre along and across it over the step (N), and the mean
-moment that speeds up its turning (N m). What the road has beside that moment is on the chassis: brakes hold on to it,
-and locked wheels do.
+then what the wheels hold, see ``Held``. What the road has beside the moment that speeds up a wheel's turning is on the
+chassis: brakes hold on to it, and locked wheels do.
 """
 
-import math
 from collections.abc import Callable
 from types import FunctionType
 from typing import Any, NamedTuple
@@ -18,25 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE
-from models.brake.plane_step import (
-    ALONG,
-    ANGLE,
-    ASIDE,
-    CELL,
-    FORCE_X,
-    FORCE_Y,
-    KNOWN,
-    PART,
-    SPIN,
-    START,
-    TURNED,
-    TURNING,
-    begin,
-    comes_to_rest,
-    tyre,
-)
+from models.brake.plane_records import Wheels, report_of
+from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.sprung import PITCH, ROLL
-from models.brake.surfaces import under_wheels
+from models.brake.surfaces import Surfaces, under_wheels
+from models.brake.wheel_step import StepInput, Wheel
 from models.machine.compiled import lean, named, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
@@ -64,18 +48,54 @@ from models.multibody.forces import (
     touch,
 )
 from models.multibody.tree import PER_LINK, dot, three, times, twist
-from models.tyre.tyre_table import place
 
-STEER, HELD_X, HELD_Y, SPUN, ROW = range(5)
-"""Columns of a wheel's row."""
+HELD = 4
+"""Numbers that each wheel holds."""
+
+
+class Held(NamedTuple):
+    """What the wheels hold over a step, each (W,): steer angle (rad), mean forces on the tyre along and across it (N),
+    and the mean moment that speeds up the wheel's turning (N m)."""
+
+    steer: np.ndarray
+    force_x: np.ndarray
+    force_y: np.ndarray
+    moment: np.ndarray
+
+
+class Contacts(NamedTuple):
+    """Motion and loads of the wheels, each (W,): speeds of their centres along them and of their contacts across them
+    (m/s), loads (N)."""
+
+    along: np.ndarray
+    across: np.ndarray
+    load: np.ndarray
+
+
+class AtWheels(NamedTuple):
+    """What is at the wheels: what they hold, what is known of them, and what they are on.
+
+    The wheels' rates are the changes of the speeds along them, kept from step to step.
+    """
+
+    held: Held
+    wheels: Wheels
+    surfaces: Surfaces
 
 
 @lean
-def held_forces(numbers, q, v, f, motion):
-    """Add all forces to ``f`` (n,), and fill ``motion`` (W, 3): speeds of the wheels' centres along them (m/s), of
-    their contacts across (m/s), loads (N)."""
+def held_of(numbers):
+    """What the wheels hold by the end of a table of numbers."""
+    wheels = int(numbers[TYRES])
+    rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
+    return Held(rows[0], rows[1], rows[2], rows[3])
+
+
+@lean
+def held_forces(numbers, q, v, f, contacts):
+    """Add all forces to ``f`` (n,), and fill the ``Contacts``."""
     chassis, table = int(numbers[CHASSIS]), start(numbers)
-    contact, slide, way, found = (
+    contact, sliding, way, creeping = (
         array(doubles(10), (10,)),
         array(doubles(4), (4,)),
         array(doubles(WAY), (WAY,)),
@@ -83,32 +103,40 @@ def held_forces(numbers, q, v, f, motion):
     )
     report, ledger = array(doubles(REPORTED), (REPORTED,)), array(doubles(LEDGER), (LEDGER,))
     frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
-    waves, rows = numbers[int(numbers[OF_WAVES]) :], numbers[int(numbers[COUNT]) :]
-    found[2], tyres, carrying = 0.0, beyond(table, int(numbers[OF_TYRES])), row(tree[0], PER_LINK, chassis)
+    waves, held = numbers[int(numbers[OF_WAVES]) :], held_of(numbers)
+    creeping[2], tyres, carrying = 0.0, beyond(table, int(numbers[OF_TYRES])), row(tree[0], PER_LINK, chassis)
     for i in range(int(numbers[TYRES])):
-        own, held = row(tyres, PER_TYRE, i), rows[ROW * i :]
+        own = row(tyres, PER_TYRE, i)
         touch(
             own,
             waves,
             int(numbers[WAVES]),
-            held[STEER],
+            held.steer[i],
             0.0,
             v,
             chassis,
             frame,
             tree,
             contact,
-            slide,
+            sliding,
             way,
             ledger,
             report,
         )
-        motion[i, 0] = dot(three(way, PASSING), three(way, ROLLING))
-        motion[i, 1], motion[i, 2] = report[SLIP_Y], report[PRESS]
-        found[0], found[1] = held[HELD_X], held[HELD_Y]
-        creep(own, found, way, chassis, f, tree, report)
-        twist(carrying, tree[2], times(three(way, AXLE), -held[SPUN]))
+        contacts.along[i] = dot(three(way, PASSING), three(way, ROLLING))
+        contacts.across[i], contacts.load[i] = report[SLIP_Y], report[PRESS]
+        creeping[0], creeping[1] = held.force_x[i], held.force_y[i]
+        creep(own, creeping, way, chassis, f, tree, report)
+        twist(carrying, tree[2], times(three(way, AXLE), -held.moment[i]))
     leave(numbers, frame, tree, f, ledger)
+
+
+@lean
+def forces(numbers, q, v, f):
+    """Add all forces to ``f`` (n,)."""
+    w = int(numbers[TYRES])
+    motion = array(doubles(3 * w), (3, w))
+    held_forces(numbers, q, v, f, Contacts(motion[0], motion[1], motion[2]))
 
 
 @lean
@@ -116,45 +144,39 @@ def held(numbers, time, q, v, f):
     """Add the forces to ``f``, for callbacks: pointers to doubles; nothing depends on the time."""
     head = array(numbers, (HEADER,))
     n, w = int(head[JOINTS]), int(head[TYRES])
-    motion, table = array(doubles(3 * w), (w, 3)), array(numbers, (int(head[COUNT]) + ROW * w,))
-    held_forces(table, array(q, (n,)), array(v, (n,)), array(f, (n,)), motion)
+    forces(array(numbers, (int(head[COUNT]) + HELD * w,)), array(q, (n,)), array(v, (n,)), array(f, (n,)))
 
 
 @lean
 def fill(block, n, numbers):
     """``held`` in a block of doubles at an address: f, q and v (n,), of which f is cleared before."""
-    f, w = at(block), int(numbers[TYRES])
+    f = at(block)
     array(f, (n,))[:] = 0.0
-    motion = array(doubles(3 * w), (w, 3))
-    held_forces(numbers, array(beyond(f, n), (n,)), array(beyond(f, 2 * n), (n,)), array(f, (n,)), motion)
+    forces(numbers, array(beyond(f, n), (n,)), array(beyond(f, 2 * n), (n,)), array(f, (n,)))
 
 
 @lean
-def hold(numbers, q, v, torque0, torque1, step, rates, regular, first, tables, known, report):
-    """Put the tyres' mean forces over a step (s) into the table, by motion and loads at the state q, v (n,).
+def meet(contacts, regular, angles, wheels):
+    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; angles
+    of the tyres' tables."""
+    for i in range(contacts.load.size):
+        slide(i, contacts.along[i], contacts.across[i], regular, angles, wheels)
+        wheels.load[i] = contacts.load[i]
 
-    torque0, torque1 : of the brakes (W,) at the step's ends; first : whether the state is that at its start, and not
-    that in its middle; rates (W,) : changes of the wheels' speeds along them (m/s^2), taken at its start and found in
-    its middle; known : see ``plane_step``, begun there; report (W, 7) is filled.
+
+@lean
+def hold(known, before, after, step, motion, vehicle):
+    """Let the wheels hold the tyres' mean forces over a step (s) between torques (W,) of the brakes, and report them.
+
+    known : ``AtWheels`` with speeds at the start and their rates, and what ``meet`` takes.
     """
-    w, n, angles = torque0.size, q.size, tables[0]
-    motion, f = array(doubles(3 * w), (w, 3)), array(doubles(n), (n,))
-    rows = array(beyond(start(numbers), int(numbers[COUNT])), (w, ROW))
-    f[:] = 0.0
-    held_forces(numbers, q, v, f, motion)
-    for i in range(w):
-        own, u, across = known[i], motion[i, 0], motion[i, 1]
-        if first:
-            own[START] = u
-        else:
-            rates[i] = (u - own[START]) / (0.5 * step)
-        forwards = u if own[START] >= 0.0 else -u
-        own[ALONG], own[ASIDE] = max(forwards, 0.0), across
-        own[ANGLE] = math.atan2(abs(across), max(forwards, regular))
-        own[CELL], own[PART] = place(angles, own[ANGLE])
-        tyre(own, rates[i], motion[i, 2], torque0[i], torque1[i], step, tables, report[i])
-        rows[i, HELD_X], rows[i, HELD_Y] = report[i, FORCE_X], report[i, FORCE_Y]
-        rows[i, SPUN] = own[SPIN] * (report[i, TURNING] - own[TURNED]) / step
+    held, wheels, plane, report = known.held, known.wheels, vehicle.plane, report_of(motion.report)
+    for i in range(before.size):
+        speed, wheel = wheels.start[i], Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
+        given = StepInput(speed, speed + step * wheels.rate[i], before[i], after[i], step)
+        tyre(i, given, wheel, vehicle.tables, wheels, known.surfaces, report)
+        held.force_x[i], held.force_y[i] = report.force_x[i], report.force_y[i]
+        held.moment[i] = wheel.inertia * (report.turning[i] - wheel.turning) / step
 
 
 OVER, GAVE_UP = 6, 7
@@ -166,12 +188,16 @@ UPRIGHT = 0.5
 class OnEngine(NamedTuple):
     """What steps need besides what those in the plane need.
 
-    numbers : the table; rows (W, ROW) : of its wheels; rates (W,) : changes of the wheels' speeds
-    along them, kept from step to step; liveliness : see ``OnSprings``; engine : its model.
+    numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
+    middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
+    its model.
     """
 
     numbers: np.ndarray
-    rows: np.ndarray
+    known: AtWheels
+    contacts: Contacts
+    forces: np.ndarray
+    middle: np.ndarray
     rates: np.ndarray
     liveliness: float
     engine: Any
@@ -188,48 +214,46 @@ def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
     return True
 
 
-def advance(state, turning, torques, step, steer, slope, plane, kind, road, tables, found, report, own):
-    """As ``models.brake.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
+def advance(motion, torques, step, steer, vehicle, own):
+    """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
-    A run begins with zeros in ``found``. The engine's step is ``step``.
+    A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
+    taken to change as they did in the last one.
     """
-    q, v, wheels, size = state[0], state[1], turning.size, found.size
-    surface, known, rates = np.empty((wheels, 3)), np.empty((wheels, KNOWN)), np.empty(q.size)
-    regular, half, time = slope * own.liveliness * step, 0.5 * step, 0.0
+    angles, known, contacts, middle = vehicle.tables.angles, own.known, own.contacts, own.middle
+    wheels = known.wheels
+    q, v, turning, found = motion.state[0], motion.state[1], motion.turning, motion.accelerations
+    rates, size = own.rates, found.size
+    regular, half, time = vehicle.slope * own.liveliness * step, 0.5 * step, 0.0
     if not found.any():
-        own.rates[:] = 0.0
-    own.rows[:, STEER] = steer
+        wheels.rate[:] = 0.0
+    known.held.steer[:] = steer
     for n in range(torques.shape[0] - 1):
         before, after = torques[n], torques[n + 1]
-        under_wheels(state, step, plane, kind, road, surface)
-        begin(turning, surface, plane, known)
-        hold(own.numbers, q, v, before, 0.5 * (before + after), half, own.rates, regular, True, tables, known, report)
+        under_wheels(motion.state, step, vehicle, known.surfaces)
+        own.forces[:] = 0.0
+        held_forces(own.numbers, q, v, own.forces, contacts)
+        wheels.start[:] = contacts.along
+        meet(contacts, regular, angles, wheels)
+        hold(known, before, 0.5 * (before + after), half, motion, vehicle)
         accelerate(own.engine, q, v, rates)
         found[:] = rates[:size]
-        rest = comes_to_rest(v[:size], turning, found, step, plane)
+        rest = comes_to_rest(v[:size], turning, found, step, vehicle.plane)
         if rest >= 0.0:
             q += rest * v + 0.5 * rest**2 * rates
             v[:size], turning[:] = 0.0, 0.0
             if rest < step:
                 return AT_REST, time + rest
         else:
-            hold(
-                own.numbers,
-                q + half * v + 0.5 * half**2 * rates,
-                v + half * rates,
-                before,
-                after,
-                step,
-                own.rates,
-                regular,
-                False,
-                tables,
-                known,
-                report,
-            )
+            middle[0], middle[1] = q + half * v + 0.5 * half**2 * rates, v + half * rates
+            own.forces[:] = 0.0
+            held_forces(own.numbers, middle[0], middle[1], own.forces, contacts)
+            wheels.rate[:] = (contacts.along - wheels.start) / half
+            meet(contacts, regular, angles, wheels)
+            hold(known, before, after, step, motion, vehicle)
             if not march(own.engine, q, v):
                 return GAVE_UP, time
-            turning[:] = report[:, -1]
+            turning[:] = report_of(motion.report).turning
         time += step
         if not max(abs(q[ROLL]), abs(q[PITCH])) <= UPRIGHT:
             return OVER, time

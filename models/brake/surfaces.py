@@ -1,13 +1,16 @@
 """Which tyre table holds where on the road: stretches along x, each with its own surface left and right of a line."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.plane_chain import place_of, point
+from models.brake.plane_chain import Point, place_of, velocity
+from models.brake.plane_vehicle import Plane
 from models.core.errors import InputError
 from models.machine.compiled import inlined, lean
+from models.tyre.tyre_table import Tables
 
 
 class Road(NamedTuple):
@@ -22,6 +25,42 @@ class Road(NamedTuple):
     right: np.ndarray
     line: float
     kinds: int
+
+
+class OnRoad(NamedTuple):
+    """A vehicle in the plane on its tyres and its road: what stays as it is over a run.
+
+    kind (W,): which of the road's kinds of tyre each wheel has; slope: largest cornering coefficient of the tables
+    (1/rad); tables: surface by surface and kind by kind.
+    """
+
+    plane: Plane
+    kind: np.ndarray
+    slope: float
+    tables: Tables
+    road: Road
+
+
+class Surfaces(NamedTuple):
+    """What each wheel is on, each (W,): its two tables and the share of the second; lag: tan of a slip angle that lags
+    behind the motion of the wheel, not a number where none does."""
+
+    first: np.ndarray
+    second: np.ndarray
+    share: np.ndarray
+    lag: np.ndarray
+
+
+def surfaces(wheels: int) -> Surfaces:
+    """Of so many wheels, the first table under all of them, whose tyres do not lag as long as nobody says so."""
+    return Surfaces(*np.zeros((3, wheels)), np.full(wheels, math.nan))
+
+
+@inlined
+def surfaces_of(rows):
+    """The same in rows (4, W) of a compiled function, and never of Python, which would let go of them twice."""
+    rows[3, :] = math.nan
+    return Surfaces(rows[0], rows[1], rows[2], rows[3])
 
 
 @dataclass(frozen=True)
@@ -71,23 +110,24 @@ def even(road):
 
 
 @lean
-def under_wheels(state, step, plane, kind, road, surface):
-    """Fill ``surface`` (W, 3): tables of each wheel and the share of the second.
+def under_wheels(state, step, vehicle, surfaces):
+    """Fill tables and shares of the ``Surfaces`` under the wheels of an ``OnRoad``.
 
-    state (2, 2 + U): positions and rates, by which wheels are taken to move over the step; kind (W,): of each wheel's
-    tyre. Of two stretches that a wheel passes in the step, or of the two sides of the line, each has the share of the
-    way on it, forwards or backwards, so that no place of the road counts by how steps fall on it. A wheel that passes
-    both in one step is on the side where it is in the middle of the step.
+    state (2, 2 + U): positions and rates, by which wheels are taken to move over the step. Of two stretches that a
+    wheel passes in the step, or of the two sides of the line, each has the share of the way on it, forwards or
+    backwards, so that no place of the road counts by how steps fall on it. A wheel that passes both in one step is on
+    the side where it is in the middle of the step.
     """
+    plane, kind, road = vehicle.plane, vehicle.kind, vehicle.road
     if even(road):
         for i in range(kind.size):
-            surface[i, 0] = surface[i, 1] = road.left[0] * road.kinds + kind[i]
-            surface[i, 2] = 0.0
+            surfaces.first[i] = surfaces.second[i] = road.left[0] * road.kinds + kind[i]
+            surfaces.share[i] = 0.0
         return
     for i in range(plane.unit.size):
-        k, x, y = plane.unit[i], plane.place[i, 0], plane.place[i, 1]
-        px, py = place_of(k, x, y, state[0], plane.reach)
-        vx, vy = point(k, x, y, state[0], state[1], plane.reach)
+        centre = Point(plane.unit[i], plane.place[i, 0], plane.place[i, 1])
+        px, py = place_of(centre, state[0], plane.reach)
+        vx, vy = velocity(centre, state[0], state[1], plane.reach)
         low, high = min(px, px + step * vx), max(px, px + step * vx)
         right, left = min(py, py + step * vy), max(py, py + step * vy)
         here = max(np.searchsorted(road.starts, low, side="right") - 1, 0)
@@ -102,6 +142,6 @@ def under_wheels(state, step, plane, kind, road, surface):
             share = (left - road.line) / (left - right)
         else:
             first = second = road.left[here] if right >= road.line else road.right[here]
-        surface[i, 0] = first * road.kinds + kind[i]
-        surface[i, 1] = second * road.kinds + kind[i]
-        surface[i, 2] = share if first != second else 0.0
+        surfaces.first[i] = first * road.kinds + kind[i]
+        surfaces.second[i] = second * road.kinds + kind[i]
+        surfaces.share[i] = share if first != second else 0.0

@@ -7,14 +7,16 @@ the wheelbase from one axle to the other.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from models.brake.plane_chain import headings, inertia
-from models.brake.plane_step import FORCE_X, FORCE_Y, step_on
+from models.brake.plane_records import motion_of, report_of
+from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import GRAVITY, Axle, Plane, Truck, check_wheels, truck, wheels
+from models.brake.surfaces import EVEN, OnRoad, surfaces_of, under_wheels
 from models.core.errors import InputError
 from models.core.strict import quantity
 from models.machine.compiled import njit
@@ -68,62 +70,52 @@ def _wheels(trailer: Trailer, first: int, transfer: bool) -> tuple[np.ndarray, .
     return unit, np.full(4, first + 1), place, radius, spin, static, by_x, by_y
 
 
+class Pull(NamedTuple):
+    """A hooked trailer behind its hook: states (n + 1, 2, 2 + U), positions and rates at the ends of the steps, and the
+    mean forces (n, 2) in N that the hook has from the vehicle, in the ground's axes."""
+
+    states: np.ndarray
+    forces: np.ndarray
+
+
 def follow(
     plane: Plane, tables: Tables, state: np.ndarray, hook: np.ndarray, step: float, slope: float, torques: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Pull:
     """A hooked trailer behind a hook of given velocities (n + 1, 2) in m/s, one at every step (s).
 
-    state (2, 2 + U) : positions and rates at the start; slope : see ``advance``; torques (W,) : of its brakes, N m.
-    Returns the states (n + 1, 2, 2 + U) and the mean forces (n, 2) in N that the hook has from the vehicle, in the
-    ground's axes. Raises InputError.
+    state (2, 2 + U) : positions and rates at the start; slope : see ``OnRoad``; torques (W,) : of its brakes, N m.
+    Raises InputError.
     """
     if not plane.hooked:
         raise InputError("", "plane", "no hook", "must be of a trailer whose hook is prescribed")
-    states, forces = np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2))
-    states[0] = state
+    pull = Pull(np.empty((len(hook), *state.shape)), np.empty((len(hook) - 1, 2)))
     turning = np.hypot(*state[1, :2]) / plane.radius
-    if not _follow(
-        states,
-        forces,
-        turning,
-        np.ascontiguousarray(hook),
-        step,
-        slope * GRAVITY * step,
-        plane,
-        tables.packed,
-        np.asarray(torques, float),
-    ):
+    motion = motion_of(state.copy(), turning)
+    vehicle = OnRoad(plane, np.zeros(plane.wheels, dtype=np.int64), slope, tables, EVEN)
+    constant = np.tile(np.asarray(torques, float), (2, 1))
+    if not _follow(motion, np.ascontiguousarray(hook), step, constant, vehicle, pull):
         raise InputError("", "hook", None, "no loads were found: its motion is too wild for the trailer")
-    return states, forces
+    return pull
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(states, forces, turning, hook, step, regular, plane, tables, torques):
-    wheels, size = turning.size, states.shape[2]
-    surface, steer, report, found = np.zeros((wheels, 3)), np.zeros(wheels), np.zeros((wheels, 7)), np.zeros(size)
+def _follow(motion, hook, step, torques, vehicle, pull):
+    plane, state, report, found = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
+    size, straight, states, forces = found.size, np.zeros(motion.turning.size), pull.states, pull.forces
     mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
+    states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
+    under_wheels(state, step, vehicle, surfaces)
     for n in range(hook.shape[0] - 1):
-        state = states[n].copy()
         found[:2] = (hook[n + 1] - hook[n]) / step
-        if step_on(state, turning, torques, torques, step, steer, surface, regular, plane, tables, found, report) < 0.0:
+        if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, surfaces) < 0.0:
             return False
         states[n + 1] = state
         headings(0.5 * (states[n, 0] + state[0]), units)
-        inertia(
-            units,
-            0.5 * (states[n, 1] + state[1]),
-            plane.masses,
-            plane.inertias,
-            plane.reach,
-            mass,
-            right,
-            along,
-            across,
-        )
+        inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, along, across)
         forces[n] = (mass @ found - right)[:2]
-        for i in range(wheels):
+        for i in range(plane.unit.size):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])
-            fx, fy = report[i, FORCE_X], report[i, FORCE_Y]
+            fx, fy = report.force_x[i], report.force_y[i]
             forces[n, 0] -= np.cos(psi) * fx - np.sin(psi) * fy
             forces[n, 1] -= np.sin(psi) * fx + np.cos(psi) * fy
     return True

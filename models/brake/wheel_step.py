@@ -14,13 +14,62 @@ the stopping distance of light braking. A wheel that has stopped stays so while 
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from models.machine.compiled import lean
-from models.tyre.tyre_table import along, place
+from models.tyre.tyre_table import Cells, along, place
 
 SLOWEST = 1e-9
 """Speed (m/s) below which a wheel's centre is taken to have this one: slip has no meaning at rest."""
 MOST_PIECES = 100_000
+
+
+class Wheel(NamedTuple):
+    """A wheel that turns: radius (m), inertia about its axle (kg m^2), and at the start of a step the speed of turning
+    (rad/s), negative if against the direction of the wheel's centre."""
+
+    radius: float
+    inertia: float
+    turning: float
+
+
+class Grip(NamedTuple):
+    """The force along the wheel by slip, of a tyre whose slip angle and load stay as they are.
+
+    first, second : its two tables; share : of the second; cells : of the slip angle and the load in both; load : N;
+    slips (s,), mu_x (t, a, f, s) : see ``models.tyre.tyre_table.Tables``.
+    """
+
+    first: int
+    second: int
+    share: float
+    cells: Cells
+    load: float
+    slips: np.ndarray
+    mu_x: np.ndarray
+
+
+class StepInput(NamedTuple):
+    """What is done to a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
+    on), both at the step's two ends and linear in time between."""
+
+    speed0: float
+    speed1: float
+    torque0: float
+    torque1: float
+    step: float
+
+
+class Rolled(NamedTuple):
+    """A wheel after a step: speed of turning at the end (rad/s), mean force (N, positive if it brakes the vehicle),
+    mean slip, for which slips below -1 count as -1, and the time (s) for which the wheel was locked."""
+
+    turning: float
+    force: float
+    slip: float
+    locked: float
 
 
 @lean
@@ -43,27 +92,27 @@ def node(k, slips):
 
 
 @lean
-def node_force(k, grip, mu_x):
-    """Force (N) at slip node k, at -k the opposite one. grip: two tables, share of the second, cells, load."""
-    first, second, share, i, p, j, q, load = grip
-    mu = along(first, i, p, j, q, abs(k), mu_x)
-    if share > 0.0:
-        mu += share * (along(second, i, p, j, q, abs(k), mu_x) - mu)
-    return load * mu if k >= 0 else -load * mu
+def node_force(k, grip):
+    """Force (N) of a ``Grip`` at slip node k, at -k the opposite one."""
+    mu = along(grip.first, grip.cells, abs(k), grip.mu_x)
+    if grip.share > 0.0:
+        mu += grip.share * (along(grip.second, grip.cells, abs(k), grip.mu_x) - mu)
+    return grip.load * mu if k >= 0 else -grip.load * mu
 
 
 @lean
-def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
+def roll(slip, left, kappa, fade, held, grip):
     """A wheel at a slip from -1 to 1 for at most ``left`` seconds or until it leaves them.
 
     kappa : r^2 / (J u) in 1/(N s); fade : u' / u in 1/s; held : T / r in N. Returns the time used, slip then and
     integral of the slip (s).
     """
+    slips = grip.slips
     last, used, area, turned = slips.size - 1, 0.0, 0.0, 0
     cell = place(slips, abs(slip))[0]
     if slip < 0.0:
         cell = -cell - 1
-    low, high = node_force(cell, grip, mu_x), node_force(cell + 1, grip, mu_x)
+    low, high = node_force(cell, grip), node_force(cell + 1, grip)
     for _ in range(MOST_PIECES):
         bottom, top = node(cell, slips), node(cell + 1, slips)
         slope = (high - low) / (top - bottom)
@@ -76,9 +125,9 @@ def roll(slip, left, kappa, fade, held, grip, slips, mu_x):
             if cell == last or cell < -last:
                 return used, slip, area
             if turn > 0:
-                low, high = high, node_force(cell + 1, grip, mu_x)
+                low, high = high, node_force(cell + 1, grip)
             else:
-                low, high = node_force(cell, grip, mu_x), low
+                low, high = node_force(cell, grip), low
             continue
         decay = kappa * slope + fade
         time = _way(decay, rate, target - slip)
@@ -106,23 +155,20 @@ def _way(decay, rate, way):
 
 
 @lean
-def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips, mu_x):
-    """A wheel whose centre goes from speed u0 to u1, both from 0 on, while the brake's torque goes from one to another.
-
-    w0 : speed of turning (rad/s), negative if against the direction of u. Torques in N m, from 0 on, linear in time.
-    Returns the speed of turning at the end, the mean force (N, positive if it brakes the vehicle), the mean slip, for
-    which slips below -1 count as -1, and the time (s) for which the wheel was locked.
-    """
-    u0, u1 = max(u0, SLOWEST), max(u1, 0.0)
+def wheel_step(given, wheel, grip):
+    """What becomes of a ``Wheel`` by a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
+    torque0, torque1, step = given.torque0, given.torque1, given.step
+    radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
+    u0, u1 = max(given.speed0, SLOWEST), max(given.speed1, 0.0)
     mean = max(0.5 * (u0 + u1), SLOWEST)
-    kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), slips.size - 1
-    sliding = node_force(last, grip, mu_x)
+    kappa, fade, last = radius * radius / (inertia * mean), (u1 - u0) / (step * mean), grip.slips.size - 1
+    sliding = node_force(last, grip)
     gain, now, impulse, area, locked = (torque1 - torque0) / step, 0.0, 0.0, 0.0, 0.0
     slip = 1.0 - radius * w0 / u0
     if slip > 1.0:  # it turns backwards: road and brake both stop that
         stops = sliding * radius + 0.5 * (torque0 + torque1)
         if stops * step <= -inertia * w0:
-            return w0 + stops * step / inertia, sliding, slip, 0.0
+            return Rolled(w0 + stops * step / inertia, sliding, slip, 0.0)
         now = -inertia * w0 / stops
         impulse, area, slip = sliding * now, now, 1.0
     freed = False
@@ -147,10 +193,10 @@ def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips,
             area -= used
             if now >= step:
                 turned = start - radius * (sliding + held) * used / inertia
-                return turned, impulse / step, area / step, locked
+                return Rolled(turned, impulse / step, area / step, locked)
             slip, freed = -1.0, False
             continue
-        used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip, slips, mu_x)
+        used, slip, part = roll(min(slip, 1.0), left, kappa, fade, held, grip)
         if used == 0.0:  # by rounding alone: neither what lies beyond nor this takes it
             used = left
         now += used
@@ -159,5 +205,5 @@ def wheel_step(u0, u1, w0, torque0, torque1, step, radius, inertia, grip, slips,
         area += part
         freed = False
         if not slip <= 1.0:
-            return math.nan, math.nan, math.nan, math.nan
-    return u1 * (1.0 - slip) / radius, impulse / step, area / step, locked
+            return Rolled(math.nan, math.nan, math.nan, math.nan)
+    return Rolled(u1 * (1.0 - slip) / radius, impulse / step, area / step, locked)

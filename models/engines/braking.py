@@ -7,44 +7,58 @@ Y and the heading of the first unit and the angles of the hinges.
 """
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
 
 from models.brake.advance import FINE, advance
-from models.brake.plane_step import FORCE_X, FORCE_Y
+from models.brake.plane_records import Motion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.samples import moved
+from models.brake.surfaces import OnRoad
 from models.engines.free_vehicle import Driven, FreeModel, free_model
-from models.machine.compiled import lean, njit
+from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, start
 from models.vehicles.spatial import Body, SpatialVehicle
 
-HEADER, ROW = 2, 6
-"""Table: numbers of units and wheels, the reach of the units, then of each wheel unit, x, y, steer and both forces."""
+HEADER, HELD = 2, 6
+"""Numbers at the head of the table, those of units and of wheels, and numbers of each wheel."""
 
 
-@njit(cache=True, error_model="numpy")
+class Held(NamedTuple):
+    """What the wheels hold over a step, each (W,): unit, place (m) in its axes and steer angle (rad) of the wheel, and
+    the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the units."""
+
+    unit: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    steer: np.ndarray
+    force_x: np.ndarray
+    force_y: np.ndarray
+
+
+@lean
 def held(numbers, time, q, v, f):
     """Add the wheels' forces, held in their own axes, to those of the engine's coordinates; pointers to doubles."""
-    head = carray(numbers, (HEADER,))
+    head = array(numbers, (HEADER,))
     units, wheels = int(head[0]), int(head[1])
-    table = carray(numbers, (HEADER + units * units + ROW * wheels,))
-    position, force = carray(q, (2 + units,)), carray(f, (2 + units,))
-    for w in range(HEADER + units * units, table.size, ROW):
-        k, heading = int(table[w]), table[w + 3]
+    reach = array(beyond(numbers, HEADER), (units, units))
+    rows = array(beyond(numbers, HEADER + units * units), (HELD, wheels))
+    wheel = Held(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+    position, force = array(q, (2 + units,)), array(f, (2 + units,))
+    for i in range(wheels):
+        k, heading = int(wheel.unit[i]), wheel.steer[i]
         for j in range(k + 1):
             heading += position[2 + j]
         c, s = np.cos(heading), np.sin(heading)
-        fx, fy = c * table[w + 4] - s * table[w + 5], s * table[w + 4] + c * table[w + 5]
+        fx, fy = c * wheel.force_x[i] - s * wheel.force_y[i], s * wheel.force_x[i] + c * wheel.force_y[i]
         force[0] += fx
         force[1] += fy
         psi = 0.0
         for j in range(units):
             psi += position[2 + j]
-            way = table[HEADER + k * units + j] + (table[w + 1] if j == k else 0.0)
-            side = table[w + 2] if j == k else 0.0
+            way = reach[k, j] + (wheel.x[i] if j == k else 0.0)
+            side = wheel.y[i] if j == k else 0.0
             c, s = np.cos(psi), np.sin(psi)
             moment = fx * (-way * s - side * c) + fy * (way * c - side * s)
             for a in range(j + 1):
@@ -82,27 +96,28 @@ class Carried:
     """The chassis of a plane vehicle in an engine; ``advance`` stands in for the compiled one of that name."""
 
     def __init__(self, engine: str, plane: Plane) -> None:
-        units = plane.masses.size
-        wheels = np.column_stack((plane.unit, plane.place, np.zeros((plane.wheels, 3))))
+        units, none = plane.masses.size, np.zeros((3, plane.wheels))
+        wheels = np.vstack((plane.unit, plane.place.T, none))
         self.numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
-        self._wheels = self.numbers[HEADER + units * units :].reshape(-1, ROW)
+        self._held = Held(*self.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
         table = self.numbers
         driven = Driven(bodies(plane), np.zeros(3), table, held, lambda block, t, n: fill(block, n, table))
         self._model: FreeModel = free_model(engine, driven)
 
     def advance(
-        self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, steer: np.ndarray, *rest: Any
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
     ) -> tuple[int, float]:
         """As ``models.brake.advance.advance``, a step at a time, each moved by the engine."""
-        time, report = 0.0, rest[-1]
+        time, report = 0.0, Report(*motion.report)
         for n in range(len(torques) - 1):
-            before = state.copy()
-            status, used = advance(state, turning, torques[n : n + 2], step, steer, *rest)
+            before = motion.state.copy()
+            status, used = advance(motion, torques[n : n + 2], step, steer, vehicle)
             time += used
             if status != FINE:
                 return status, time
-            self._wheels[:, 3], self._wheels[:, 4:] = steer, report[:, [FORCE_X, FORCE_Y]]
-            state[:] = self._moved(before, step)
+            self._held.steer[:] = steer
+            self._held.force_x[:], self._held.force_y[:] = report.force_x, report.force_y
+            motion.state[:] = self._moved(before, step)
         return FINE, time
 
     def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:

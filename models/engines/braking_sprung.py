@@ -9,24 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.plane_step import KNOWN, REPORTED, begin
-from models.brake.plane_vehicle import Plane
+from models.brake.plane_records import KNOWN, Motion, Wheels, motion_of
 from models.brake.samples import moved
 from models.brake.sprung import Sprung
 from models.brake.sprung_step import (
     GAVE_UP,
+    HELD,
     OVER,
-    ROW,
-    STEER,
     UPRIGHT,
+    AtWheels,
+    Contacts,
+    Held,
     OnEngine,
     advance,
     fill,
     held,
     held_forces,
     hold,
+    meet,
 )
-from models.brake.surfaces import under_wheels
+from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
@@ -42,10 +44,10 @@ class OnSprings:
     """The vehicle in an engine; ``advance`` stands in for the compiled one of that name, with all coordinates."""
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
-        own, wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
+        own, self.wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
-        self._table = np.concatenate((own.numbers, np.zeros(ROW * wheels)))
-        self._known, self._allowed = np.empty((wheels, KNOWN)), set[float]()
+        self._table = np.concatenate((own.numbers, np.zeros(HELD * self.wheels)))
+        self._allowed = set[float]()
 
     @cached_property
     def liveliness(self) -> float:
@@ -54,10 +56,10 @@ class OnSprings:
         A body that rolls lets its contacts go sideways more easily than its mass would.
         """
         own, size = self.vehicle.handling, self.size
-        motion, across = np.empty((len(self._known), 3)), np.empty((len(self._known), size))
+        contacts, across = Contacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
         for j, rate in enumerate(np.eye(size)):
-            held_forces(self._table, np.zeros(size), rate, np.zeros(size), motion)
-            across[:, j] = motion[:, 1]
+            held_forces(self._table, np.zeros(size), rate, np.zeros(size), contacts)
+            across[:, j] = contacts.across
         loads = np.array([own.held.tyres[tyre.name] for tyre in own.vehicle.tyres])
         damping = np.linalg.solve(mass(own.vehicle), across.T @ (loads[:, None] * across))
         return float(np.linalg.eigvals(damping).real.max())
@@ -72,25 +74,39 @@ class OnSprings:
     @cached_property
     def _parts(self) -> tuple[OnEngine, Any, Any]:
         """What steps need, ``advance`` and the generator of samples: compiled where the engine can be called so."""
-        wheels, engine, go, by_steps = len(self._known), self._model.compiled(), advance, moved(advance)
+        engine, go, by_steps, size = self._model.compiled(), advance, moved(advance), self.size
         if engine is not None:
             from models.engines import braking_sprung_mujoco as native
 
             go, by_steps = native.advance, native.by_steps
         table = self._model.numbers
-        rows = table[-ROW * wheels :].reshape(wheels, ROW)
-        return OnEngine(table, rows, np.zeros(wheels), self.liveliness, engine or self._model), go, by_steps
+        own = OnEngine(
+            table,
+            self._at_wheels(table),
+            Contacts(*np.zeros((3, self.wheels))),
+            np.zeros(size),
+            np.zeros((2, size)),
+            np.zeros(size),
+            self.liveliness,
+            engine or self._model,
+        )
+        return own, go, by_steps
+
+    def _at_wheels(self, table: np.ndarray) -> AtWheels:
+        """Of the wheels that hold what is at the end of a table."""
+        wheels = Wheels(*np.zeros((KNOWN, self.wheels)))
+        return AtWheels(Held(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels))
 
     def advance(
-        self, state: np.ndarray, turning: np.ndarray, torques: np.ndarray, step: float, *rest: Any
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, ``state`` (2, n) having all coordinates and their rates.
+        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
-        A run begins with zeros in the accelerations ``found``. Raises RunFailed where the vehicle turns over.
+        A run begins with accelerations of zero. Raises RunFailed where the vehicle turns over.
         """
         own, go, _ = self._parts
         with self._model.at_step(step):
-            status, time = go(state, turning, torques, step, *rest, own)
+            status, time = go(motion, torques, step, steer, vehicle, own)
         return self._sound(status, time), time
 
     def moving(
@@ -124,23 +140,17 @@ class OnSprings:
             raise RunFailed(self.engine, "the engine gave up", time)
         return status
 
-    def rolling(
-        self,
-        state: np.ndarray,
-        steer: np.ndarray,
-        plane: Plane,
-        kind: np.ndarray,
-        road: Any,
-        tables: tuple[np.ndarray, ...],
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
-        surface, known = np.empty((steer.size, 3)), self._known
-        none, motion, report = np.zeros(steer.size), np.empty((steer.size, 3)), np.empty((steer.size, REPORTED))
-        own = self._parts[0]
-        own.rows[:], own.rows[:, STEER] = 0.0, steer
-        held_forces(own.numbers, *state, np.zeros(self.size), motion)
-        turning = motion[:, 0] / plane.radius
-        under_wheels(state, 0.0, plane, kind, road, surface)
-        begin(turning, surface, plane, known)
-        hold(own.numbers, *state, none, none, BLINK, none.copy(), 0.0, True, tables, known, report)
+        own, none = self._parts[0], np.zeros(steer.size)
+        known = self._at_wheels(own.numbers)
+        for part in known.held:
+            part[:] = 0.0
+        known.held.steer[:] = steer
+        held_forces(own.numbers, *state, np.zeros(self.size), own.contacts)
+        turning = own.contacts.along / vehicle.plane.radius
+        under_wheels(state, 0.0, vehicle, known.surfaces)
+        known.wheels.start[:] = own.contacts.along
+        meet(own.contacts, 0.0, vehicle.tables.angles, known.wheels)
+        hold(known, none, none, BLINK, motion_of(state, turning), vehicle)
         return self._model.acceleration(0.0, *state), turning

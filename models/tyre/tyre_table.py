@@ -8,6 +8,7 @@ is "defined at distinct points and by linear interpolation".
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -144,8 +145,7 @@ def _along(values: np.ndarray, axis: int, old: np.ndarray, new: np.ndarray) -> n
     return (1.0 - share) * below + share * above
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
+class Tables(NamedTuple):
     """Several tables on common nodes, for compiled functions: mu_x (t, a, f, s), g (t, a, s), h (t, a, f)."""
 
     angles: np.ndarray
@@ -155,10 +155,14 @@ class Tables:
     g: np.ndarray
     h: np.ndarray
 
-    @property
-    def packed(self) -> tuple[np.ndarray, ...]:
-        """All six arrays, in the order in which compiled functions take them."""
-        return self.angles, self.slips, self.loads, self.mu_x, self.g, self.h
+
+class Cells(NamedTuple):
+    """Where a slip angle and a load lie in the tables: the cells of both, and the share of each cell below it."""
+
+    angle: int
+    angle_share: float
+    load: int
+    load_share: float
 
 
 def stacked(tables: Sequence[TyreTable]) -> Tables:
@@ -189,8 +193,9 @@ def place(nodes, value):
 
 
 @lean
-def across(table, i, p, j, q, k, w, g, h):
-    """mu_y of one table in cells i, j and k of slip angle, load and slip with shares p, q and w."""
+def across(table, cells, k, w, g, h):
+    """mu_y of one table at a slip angle and a load in these ``cells``, and in cell k of slip with its share w."""
+    i, p, j, q = cells
     i1, j1, k1 = min(i + 1, h.shape[1] - 1), min(j + 1, h.shape[2] - 1), min(k + 1, g.shape[2] - 1)
     by_slip = (1.0 - p) * ((1.0 - w) * g[table, i, k] + w * g[table, i, k1])
     by_slip += p * ((1.0 - w) * g[table, i1, k] + w * g[table, i1, k1])
@@ -202,8 +207,9 @@ def across(table, i, p, j, q, k, w, g, h):
 
 
 @lean
-def along(table, i, p, j, q, k, mu_x):
-    """mu_x of one table at slip node k, in cells i and j of slip angle and load with shares p and q."""
+def along(table, cells, k, mu_x):
+    """mu_x of one table at slip node k, at a slip angle and a load in these ``cells``."""
+    i, p, j, q = cells
     i1, j1 = min(i + 1, mu_x.shape[1] - 1), min(j + 1, mu_x.shape[2] - 1)
     if q == 0.0:
         return (1.0 - p) * mu_x[table, i, j, k] + p * mu_x[table, i1, j, k]

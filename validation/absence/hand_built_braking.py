@@ -9,34 +9,104 @@ and what a tyre's table says are the tyre's.
 import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.brake.wheel_step import wheel_step
+from models.brake.plane_records import REPORTED, Report, report_of
+from models.brake.wheel_step import Grip, StepInput, Wheel, wheel_step
 from models.machine.compiled import inlined, lean, njit
 from models.machine.timing import interleave, paired_ratio
 from models.systems.braking.march import Path
 from models.systems.braking.procedures import controller_of, ready
-from models.tyre.tyre_table import across, place
+from models.tyre.tyre_table import Cells, Tables, across, place
 from validation.absence.braking import STOP
 from validation.absence.of_systems import bare
 
 CLOSE, NEARLY, PATIENCE = 1e-7, 0.98, 12
-START, RATE, ALONG, ASIDE, ANGLE, CELL, PART, EAST, NORTH, ARM, SIDE = range(11)
-"""Columns of what a step knows of each wheel: see ``models.brake.plane_step``; where it heads, and arms of its forces
-about the centre of mass."""
-COLUMNS, LOCKED = 7, 5
 MOST_PARTS = 64
 
 
+class Truck(NamedTuple):
+    """A truck on its tyres: place of the wheels (m), their loads (N), radii (m), inertias (kg m^2), its mass (kg) and
+    inertia (kg m^2), its tyres, and cosine and sine of the angle by which the front wheels are steered."""
+
+    x: np.ndarray
+    y: np.ndarray
+    load: np.ndarray
+    radius: np.ndarray
+    spin: np.ndarray
+    mass: float
+    inertia: float
+    tables: Tables
+    cosine: float
+    sine: float
+
+
+class Step(NamedTuple):
+    """How long a step takes (s), and the speed (m/s) below which slip angles are those of this one."""
+
+    time: float
+    regular: float
+
+
+class Now(NamedTuple):
+    """The truck as it moves: x, y, heading and their rates (6,), accelerations (3,), turning of its wheels (4,), and
+    the reports (7, 4) of a step and of its parts."""
+
+    state: np.ndarray
+    accelerations: np.ndarray
+    turning: np.ndarray
+    report: np.ndarray
+    sums: np.ndarray
+
+
+class Stop(NamedTuple):
+    """A whole stop at the ends of its samples: times (n,), states (n, 6), turning (n, 4), reports (n, 7, 4)."""
+
+    times: np.ndarray
+    states: np.ndarray
+    turning: np.ndarray
+    reports: np.ndarray
+
+
+class Known(NamedTuple):
+    """What a step knows of each wheel, each (4,): see ``models.brake.plane_records.Wheels``; where it heads, and arms
+    of its forces about the centre of mass. last, off (3,): accelerations of a round, and by how much they were off;
+    first (6,): state at the start; middle (4,): torques in the middle; ends (2, 4): at the ends of a part."""
+
+    start: np.ndarray
+    rate: np.ndarray
+    along: np.ndarray
+    aside: np.ndarray
+    angle: np.ndarray
+    cell: np.ndarray
+    share: np.ndarray
+    east: np.ndarray
+    north: np.ndarray
+    arm: np.ndarray
+    side: np.ndarray
+    last: np.ndarray
+    off: np.ndarray
+    first: np.ndarray
+    middle: np.ndarray
+    ends: np.ndarray
+
+
+def room() -> Known:
+    """Room for a step."""
+    wheels = {name: np.zeros(4) for name in Known._fields}
+    others = {"last": np.zeros(3), "off": np.zeros(3), "first": np.zeros(6), "ends": np.zeros((2, 4))}
+    return Known(**{**wheels, **others, "cell": np.zeros(4, dtype=np.int64)})
+
+
 @inlined
-def settle(now, course, regular, starts, truck, angles, known):
-    """Fill what is known (4, 11) of the wheels at a state ``now`` (6,): x, y, heading and their rates."""
-    x, y = truck[:2]
-    vx, vy, r = now[3], now[4], now[5]
-    c, s = course
-    ahead, aslant = math.cos(now[2]), math.sin(now[2])
+def settle(now, regular, starts, truck, known):
+    """Fill what is known of the wheels at a state."""
+    x, y, angles = truck.x, truck.y, truck.tables.angles
+    vx, vy, r = now.state[3], now.state[4], now.state[5]
+    c, s = truck.cosine, truck.sine
+    ahead, aslant = math.cos(now.state[2]), math.sin(now.state[2])
     e, f = ahead * c - aslant * s, aslant * c + ahead * s
     for i in range(4):
         if i == 2:
@@ -44,214 +114,211 @@ def settle(now, course, regular, starts, truck, angles, known):
         arm, side = x[i] * s - y[i] * c, x[i] * c + y[i] * s
         u, v = e * vx + f * vy + arm * r, e * vy - f * vx + side * r
         if starts:
-            known[i, START] = u
-        forwards = u if known[i, START] >= 0.0 else -u
+            known.start[i] = u
+        forwards = u if known.start[i] >= 0.0 else -u
         angle = math.atan2(abs(v), max(forwards, regular))
-        known[i, RATE], known[i, ALONG], known[i, ASIDE] = (v - side * r) * r, max(forwards, 0.0), v
-        known[i, ANGLE] = angle
-        known[i, CELL], known[i, PART] = place(angles, angle)
-        known[i, EAST], known[i, NORTH], known[i, ARM], known[i, SIDE] = e, f, arm, side
+        known.rate[i], known.along[i], known.aside[i] = (v - side * r) * r, max(forwards, 0.0), v
+        known.angle[i] = angle
+        known.cell[i], known.share[i] = place(angles, angle)
+        known.east[i], known.north[i], known.arm[i], known.side[i] = e, f, arm, side
 
 
 @inlined
-def tyre(know, rate, w0, torque0, torque1, step, load, radius, spin, tables, report):
-    """Fill the report (7,) of a wheel whose centre's speed along it changes at a ``rate``."""
-    _, slips, _, mu_x, g, h = tables
-    u0, v, sign, c, p = know[START], know[ASIDE], 1.0 if know[START] >= 0.0 else -1.0, int(know[CELL]), know[PART]
+def tyre(i, given, now, truck, known):
+    """Fill the report of a wheel by what is done to it in a step."""
+    report, tables, load, u0, v = report_of(now.report), truck.tables, truck.load[i], known.start[i], known.aside[i]
+    sign, cells = 1.0 if u0 >= 0.0 else -1.0, Cells(known.cell[i], known.share[i], 0, 0.0)
     w, force, slip, locked = wheel_step(
-        sign * u0,
-        sign * (u0 + step * rate),
-        sign * w0,
-        torque0,
-        torque1,
-        step,
-        radius,
-        spin,
-        (0, 0, 0.0, c, p, 0, 0.0, load),
-        slips,
-        mu_x,
+        StepInput(sign * given.speed0, sign * given.speed1, given.torque0, given.torque1, given.step),
+        Wheel(truck.radius[i], truck.spin[i], sign * now.turning[i]),
+        Grip(0, 0, 0.0, cells, load, tables.slips, tables.mu_x),
     )
-    k, part = place(slips, abs(slip))
-    side = load * across(0, c, p, 0, 0.0, k, part, g, h)
-    if slip > NEARLY and (know[ALONG] > 0.0 or v != 0.0):
-        total, speed = math.hypot(force, side), math.hypot(know[ALONG], v)
+    k, part = place(tables.slips, abs(slip))
+    side = load * across(0, cells, k, part, tables.g, tables.h)
+    if slip > NEARLY and (known.along[i] > 0.0 or v != 0.0):
+        total, speed = math.hypot(force, side), math.hypot(known.along[i], v)
         part = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
-        force += part * (total * know[ALONG] / speed - force)
+        force += part * (total * known.along[i] / speed - force)
         side += part * (total * abs(v) / speed - side)
-    report[0], report[1], report[2] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0, load
-    report[3], report[4], report[5], report[6] = slip, math.copysign(know[ANGLE], v), locked, sign * w
+    report.force_x[i], report.force_y[i] = -sign * force, -math.copysign(side, v) if v != 0.0 else 0.0
+    report.load[i], report.slip[i], report.slip_angle[i] = load, slip, math.copysign(known.angle[i], v)
+    report.locked[i], report.turning[i] = locked, sign * w
 
 
 @inlined
-def rounds(turning, torque0, torque1, step, most, truck, tables, known, found, last, report):
-    """Accelerations ``found`` (3,) that the tyres' forces give back; ``last`` (2, 3) is room. False if none."""
-    _, _, load, radius, spin, mass, inertia = truck
+def respond(now, before, after, step, truck, known):
+    """Accelerations by the tyres' forces over a step (s) between torques before and after, if they were those now."""
+    found, report = now.accelerations, report_of(now.report)
+    ax, ay, turn = 0.0, 0.0, 0.0
+    for i in range(4):
+        rate = known.rate[i] + known.east[i] * found[0] + known.north[i] * found[1] + known.arm[i] * found[2]
+        given = StepInput(known.start[i], known.start[i] + step * rate, before[i], after[i], step)
+        tyre(i, given, now, truck, known)
+        fx, fy, e, f = report.force_x[i], report.force_y[i], known.east[i], known.north[i]
+        ax, ay = ax + e * fx - f * fy, ay + f * fx + e * fy
+        turn += known.arm[i] * fx + known.side[i] * fy
+    return ax / truck.mass, ay / truck.mass, turn / truck.inertia
+
+
+@inlined
+def rounds(now, torques, step, truck, known):
+    """Find the accelerations that the tyres' forces give back; whether there are any."""
+    found, last, off = now.accelerations, known.last, known.off
     left, before = math.inf, 0.0
-    for n in range(most):
-        ax, ay, turn = 0.0, 0.0, 0.0
-        for i in range(4):
-            know = known[i]
-            rate = know[RATE] + know[EAST] * found[0] + know[NORTH] * found[1] + know[ARM] * found[2]
-            tyre(know, rate, turning[i], torque0[i], torque1[i], step, load[i], radius[i], spin[i], tables, report[i])
-            fx, fy = report[i, 0], report[i, 1]
-            ax, ay = ax + know[EAST] * fx - know[NORTH] * fy, ay + know[NORTH] * fx + know[EAST] * fy
-            turn += know[ARM] * fx + know[SIDE] * fy
-        out, change, product, square = (ax / mass, ay / mass, turn / inertia), 0.0, 0.0, 0.0
+    for n in range(PATIENCE):
+        out, change, product, square = respond(now, torques[0], torques[1], step, truck, known), 0.0, 0.0, 0.0
         for a in range(3):
-            off = out[a] - found[a]
-            change = max(change, abs(off))
-            product += off * (off - last[1, a])
-            square += (off - last[1, a]) ** 2
+            gap = out[a] - found[a]
+            change = max(change, abs(gap))
+            product += gap * (gap - off[a])
+            square += (gap - off[a]) ** 2
         left = change * min(change / before, 1.0) if before > 0.0 else change
-        done, before = not left > CLOSE or n == most - 1, change
+        done, before = not left > CLOSE or n == PATIENCE - 1, change
         mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not done else 0.0
         for a in range(3):
-            last[1, a] = out[a] - found[a]
-            found[a] = out[a] - mix * (out[a] - last[0, a])
-            last[0, a] = out[a]
+            off[a] = out[a] - found[a]
+            found[a] = out[a] - mix * (out[a] - last[a])
+            last[a] = out[a]
         if done:
             break
-    return left <= CLOSE or most == 1
+    return left <= CLOSE
 
 
 @inlined
-def rests(now, turning, found, step, mass, inertia):
+def rests(now, first, step, truck):
     """Time within the step at which the truck stands, or -1 if it does not."""
-    speed = mass * (now[3] * now[3] + now[4] * now[4]) + inertia * now[5] * now[5]
-    if speed == 0.0 and not turning.any():
+    found, mass, inertia = now.accelerations, truck.mass, truck.inertia
+    speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
+    if speed == 0.0 and not now.turning.any():
         return 0.0
-    both = mass * (now[3] * found[0] + now[4] * found[1]) + inertia * now[5] * found[2]
+    both = mass * (first[3] * found[0] + first[4] * found[1]) + inertia * first[5] * found[2]
     rate = mass * (found[0] * found[0] + found[1] * found[1]) + inertia * found[2] * found[2]
     if rate == 0.0 or both >= 0.0 or -both > step * rate or speed > 2.25 * step * step * rate:
         return -1.0
     return -both / rate
 
 
+@inlined
+def moved(now, time, known):
+    """Move the state from the start of a step on by a time (s)."""
+    state, first, found = now.state, known.first, now.accelerations
+    for a in range(3):
+        state[3 + a] = first[3 + a] + time * found[a]
+        state[a] = first[a] + 0.5 * time * (first[3 + a] + state[3 + a])
+
+
 @lean
-def go(now, turning, torque0, torque1, step, course, regular, truck, tables, room, report):
-    """One step; how long the truck still moves in it, -1 if no accelerations were found."""
-    known, found, last, first, middle = room
+def go(now, torques, step, truck, known):
+    """One ``Step`` under torques (2, 4) at its ends; how long the truck still moves in it, -1 if no accelerations were
+    found."""
+    first, middle = known.first, known.middle
     for a in range(6):
-        first[a] = now[a]
+        first[a] = now.state[a]
     for i in range(4):
-        middle[i] = 0.5 * (torque0[i] + torque1[i])
-    for half in (True, False):
-        settle(now, course, regular, half, truck, tables[0], known)
-        time, end = (0.5 * step, middle) if half else (step, torque1)
-        if not rounds(turning, torque0, end, time, 1 if half else PATIENCE, truck, tables, known, found, last, report):
-            return -1.0
-        rest = rests(first, turning, found, step, truck[5], truck[6]) if half else -1.0
-        if rest >= 0.0:
-            time = rest
-        for a in range(3):
-            now[3 + a] = first[3 + a] + time * found[a]
-            now[a] = first[a] + 0.5 * time * (first[3 + a] + now[3 + a])
-        if rest >= 0.0:
-            now[3:], turning[:] = 0.0, 0.0
-            return rest
+        middle[i] = 0.5 * (torques[0, i] + torques[1, i])
+    settle(now, step.regular, True, truck, known)
+    found = respond(now, torques[0], middle, 0.5 * step.time, truck, known)
+    now.accelerations[0], now.accelerations[1], now.accelerations[2] = found
+    rest = rests(now, first, step.time, truck)
+    if rest >= 0.0:
+        moved(now, rest, known)
+        now.state[3:], now.turning[:] = 0.0, 0.0
+        return rest
+    moved(now, 0.5 * step.time, known)
+    settle(now, step.regular, False, truck, known)
+    if not rounds(now, torques, step.time, truck, known):
+        return -1.0
+    moved(now, step.time, known)
+    turning = report_of(now.report).turning
     for i in range(4):
-        turning[i] = report[i, 6]
-    return step
+        now.turning[i] = turning[i]
+    return step.time
 
 
 @lean
-def in_parts(parts, now, turning, torque0, torque1, step, course, regular, truck, tables, room, ends, sums, report):
-    """``go`` in equal parts of a step; the report is their mean, and of times locked the sum."""
-    piece, time = step / parts, 0.0
+def in_parts(parts, now, torques, step, truck, known):
+    """``go`` in equal parts of a ``Step``; the report is their mean, and of times locked the sum."""
+    rows, sums, part, time = now.report, now.sums, Step(step.time / parts, step.regular / parts), 0.0
     sums[:] = 0.0
     for k in range(parts):
         for i in range(4):
             for side in range(2):
-                ends[side, i] = torque0[i] + (torque1[i] - torque0[i]) * (k + side) / parts
-        used = go(now, turning, ends[0], ends[1], piece, course, regular / parts, truck, tables, room, report)
+                known.ends[side, i] = torques[0, i] + (torques[1, i] - torques[0, i]) * (k + side) / parts
+        used = go(now, known.ends, part, truck, known)
         if used < 0.0:
             return used
         time += used
-        for i in range(4):
-            for c in range(COLUMNS - 1):
-                sums[i, c] += report[i, c]
-        if used < piece:
+        for c in range(REPORTED):
+            for i in range(4):
+                sums[c, i] += rows[c, i]
+        if used < part.time:
             return time
+    report, locked = report_of(rows), report_of(sums).locked
+    for c in range(REPORTED):
+        for i in range(4):
+            rows[c, i] = sums[c, i] / parts
     for i in range(4):
-        for c in range(COLUMNS - 1):
-            report[i, c] = sums[i, c] if c == LOCKED else sums[i, c] / parts
-    return step
+        report.locked[i], report.turning[i] = locked[i], now.turning[i]
+    return step.time
 
 
 @njit(cache=True, error_model="numpy")
-def march(speed, course, torque, sample, steps, slope, truck, tables, times, states, turned, reports):
-    """The whole stop: fills times (n,), states (n, 6), turning (n, 4) and reports (n, 4, 7) of the steps' ends, sample
-    by sample, of which it returns the number, 0 if no accelerations were found; torque (4,) is there from the first
-    step's end on."""
-    now, turning, none, step = np.zeros(6), speed / truck[3], np.zeros(4), sample / steps
-    room = np.empty((4, 11)), np.zeros(3), np.zeros((2, 3)), np.empty(6), np.empty(4)
-    ends, sums, regular = np.empty((2, 4)), np.empty((4, COLUMNS)), slope * 9.81 * step
-    now[3], states[0], turned[0], times[0] = speed, 0.0, turning, 0.0
-    states[0, 3] = speed
-    for n in range(1, times.size):
+def march(now, torque, steps, step, truck, known, stop):
+    """Fill a ``Stop`` sample by sample, each of so many steps; the number of its samples, 0 if no accelerations were
+    found. torque (4,) is there from the first step's end on."""
+    torques = np.zeros((2, 4))
+    torques[1] = torque
+    stop.times[0], stop.states[0], stop.turning[0] = 0.0, now.state, now.turning
+    for n in range(1, stop.times.size):
         used = 0.0
-        for k in range(steps):
-            first = none if n == 1 and k == 0 else torque
-            parts = int(min(math.ceil(regular / math.hypot(now[3], now[4])), MOST_PARTS))
+        for _ in range(steps):
+            parts = int(min(math.ceil(step.regular / math.hypot(now.state[3], now.state[4])), MOST_PARTS))
             if parts <= 1:
-                part = go(now, turning, first, torque, step, course, regular, truck, tables, room, reports[n])
+                part = go(now, torques, step, truck, known)
             else:
-                part = in_parts(
-                    parts,
-                    now,
-                    turning,
-                    first,
-                    torque,
-                    step,
-                    course,
-                    regular,
-                    truck,
-                    tables,
-                    room,
-                    ends,
-                    sums,
-                    reports[n],
-                )
+                part = in_parts(parts, now, torques, step, truck, known)
+            torques[0] = torque
             used += part
-            if part < step:
+            if part < step.time:
                 break
-        times[n], states[n], turned[n] = times[n - 1] + used, now, turning
-        if part < step:
+        stop.times[n], stop.states[n], stop.turning[n] = stop.times[n - 1] + used, now.state, now.turning
+        stop.reports[n] = now.report
+        if part < step.time:
             return n + 1 if part >= 0.0 else 0
-    return times.size
+    return stop.times.size
 
 
 def run(vehicle: Any, speed: float, steer: float, samples: int) -> Callable[[], Path]:
     """One stop from a speed (m/s) with the front wheels at an angle (rad) of the numbers of a bare vehicle
     (``models.systems.braking.run.Braked``), in at most so many samples, the start included."""
-    p, tyres, pressure = vehicle.plane, vehicle.tables.packed, vehicle.chambers.supply
-    truck = (p.place[:, 0].copy(), p.place[:, 1].copy(), p.static, p.radius, p.spin, p.masses[0], p.inertias[0])
-    course, torque = (math.cos(steer), math.sin(steer)), vehicle.brakes.rising * pressure
+    plane, pressure, step = vehicle.plane, vehicle.chambers.supply, vehicle.sample / vehicle.substeps
+    truck = Truck(
+        plane.place[:, 0].copy(),
+        plane.place[:, 1].copy(),
+        plane.static,
+        plane.radius,
+        plane.spin,
+        plane.masses[0],
+        plane.inertias[0],
+        vehicle.tables,
+        math.cos(steer),
+        math.sin(steer),
+    )
+    torque, grid = vehicle.brakes.rising * pressure, Step(step, vehicle.slope * 9.81 * step)
 
     def marched() -> Path:
-        times, states, turned, reports = (np.empty((samples, *shape)) for shape in ((), (6,), (4,), (4, COLUMNS)))
-        n = march(
-            speed,
-            course,
-            torque,
-            vehicle.sample,
-            vehicle.substeps,
-            vehicle.slope,
-            truck,
-            tyres,
-            times,
-            states,
-            turned,
-            reports,
-        )
+        now = Now(np.zeros(6), np.zeros(3), speed / truck.radius, *np.zeros((2, REPORTED, 4)))
+        now.state[3] = speed
+        stop = Stop(*(np.empty((samples, *shape)) for shape in ((), (6,), (4,), (REPORTED, 4))))
+        n = march(now, torque, vehicle.substeps, grid, truck, room(), stop)
         applied = (np.arange(n) > 0.0)[:, None]
         return Path(
-            times[:n],
-            states[:n].reshape(n, 2, 3),
-            turned[:n],
+            stop.times[:n],
+            stop.states[:n].reshape(n, 2, 3),
+            stop.turning[:n],
             pressure * applied * np.ones(4),
             torque * applied,
-            reports[1:n],
+            Report(*np.moveaxis(stop.reports[1:n], 1, 0)),
             True,
             ("x", "y", "heading_0"),
         )
@@ -278,13 +345,18 @@ def stops(speed: float) -> tuple[Job, Job]:
     return ours, run(vehicle, speed, STEER, len(ours().times))
 
 
+def forces(path: Path) -> np.ndarray:
+    """Of the tyres along and across them (2, n - 1, W) in N."""
+    return np.stack((path.reports.force_x, path.reports.force_y))
+
+
 def gap(ours: Path, theirs: Path) -> float:
     """Largest difference of states (m, rad, m/s, rad/s), of the wheels' turning (rad/s), of the tyres' forces by the
     largest one, and of pressures and torques by theirs."""
     shares = [
         np.abs(one - other).max() / np.abs(other).max()
         for one, other in (
-            (ours.reports[..., :2], theirs.reports[..., :2]),
+            (forces(ours), forces(theirs)),
             (ours.pressures, theirs.pressures),
             (ours.torques, theirs.torques),
         )

@@ -1,42 +1,53 @@
 """Vehicles in the plane under torques that are given, moved on by the step or an engine: what a truck must do then."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE, advance
-from models.brake.plane_step import LOAD, REPORTED
+from models.brake.plane_records import Report, motion_of
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, truck
-from models.brake.surfaces import EVEN, Road
+from models.brake.surfaces import EVEN, OnRoad, Road
 from models.core.errors import RunFailed
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 
 
-class Moving:
-    """A vehicle that begins by rolling along x at a speed (m/s), all its tyres alike, its front wheels steered (rad).
+def on_road(plane: Plane, tables: Tables, road: Road = EVEN, slope: float = 10.0) -> OnRoad:
+    """A vehicle whose tyres are all alike, of a slope (1/rad)."""
+    return OnRoad(plane, np.zeros(plane.wheels, dtype=int), slope, tables, road)
 
-    state (2, 2 + U) and turning (W,) are moved in place; rates (2 + U,) and report (W, 7) are those of the last step;
-    time : that passed (s); slope : of the tyres (1/rad), see ``advance``; go : that, or an engine's.
+
+class Moving:
+    """A vehicle that begins by rolling along x at a speed (m/s), its front wheels steered (rad).
+
+    motion : moved in place; time : that passed (s); go : ``advance``, or an engine's.
     """
 
     def __init__(
-        self,
-        plane: Plane,
-        tables: Tables,
-        speed: float,
-        *,
-        steer: float = 0.0,
-        road: Road = EVEN,
-        slope: float = 10.0,
-        go: Callable[..., Any] = advance,
+        self, vehicle: OnRoad, speed: float, *, steer: float = 0.0, go: Callable[..., tuple[int, float]] = advance
     ) -> None:
-        self.plane, self.state, self.turning = plane, np.zeros((2, 2 + plane.masses.size)), speed / plane.radius
-        self.state[1, 0], self.time = speed, 0.0
-        self.rates, self.report = np.zeros(self.state.shape[1]), np.zeros((plane.wheels, REPORTED))
-        steered = np.where(plane.place[:, 0] > 0.0, steer, 0.0)
-        self._go, self._others = go, (steered, slope, plane, np.zeros(plane.wheels, dtype=int), road, tables.packed)
+        self.plane, self.time = vehicle.plane, 0.0
+        state = np.zeros((2, 2 + vehicle.plane.masses.size))
+        state[1, 0] = speed
+        self.motion = motion_of(state, speed / self.plane.radius)
+        steered = np.where(self.plane.place[:, 0] > 0.0, steer, 0.0)
+        self._go, self._others = go, (steered, vehicle)
+
+    @property
+    def state(self) -> np.ndarray:
+        """Positions and rates (2, 2 + U)."""
+        return self.motion.state
+
+    @property
+    def turning(self) -> np.ndarray:
+        """Speeds of the wheels' turning (W,) in rad/s."""
+        return self.motion.turning
+
+    @property
+    def report(self) -> Report:
+        """Of the last step."""
+        return Report(*self.motion.report)
 
     @property
     def speed(self) -> float:
@@ -49,9 +60,20 @@ class Moving:
         torques (W,) : stay for one step.
         """
         ends = torques if torques.ndim > 1 else np.tile(torques, (2, 1))
-        status, used = self._go(self.state, self.turning, ends, step, *self._others, self.rates, self.report)
+        status, used = self._go(self.motion, ends, step, *self._others)
         self.time += used
         return status, used
+
+    def braked(
+        self, torques: np.ndarray, step: float = 5.5e-3, until: float = 0.0, duration: float = 200.0
+    ) -> "Moving":
+        """The same at the end of a stop, or at a speed (m/s) or a time (s) before. Raises RunFailed."""
+        status = FINE
+        while status == FINE and self.speed > until and self.time < duration - 1e-9:
+            status, _ = self.on(torques, step)
+        if status not in (FINE, AT_REST):
+            raise RunFailed("braking", "the truck does not come to its end", self.time)
+        return self
 
 
 PLANE = truck(PAPER)
@@ -60,30 +82,9 @@ LOCKS = 1e9
 """Torque (N m) that locks a wheel at once."""
 
 
-def braked(
-    torques: np.ndarray,
-    *,
-    tables: Tables | None = None,
-    speed: float = 10.0,
-    until: float = 0.0,
-    step: float = 5.5e-3,
-    plane: Plane | None = None,
-    yaw: float = 0.0,
-    duration: float = 200.0,
-    side: float = 0.0,
-    **more: Any,
-) -> Moving:
-    """The truck at the end of a stop, or at a speed (m/s) or a time (s) before.
-
-    torques (4,) : N m; yaw, side : rates at the start; more : as of ``Moving``.
-    """
-    truck = Moving(plane or PLANE, tables or stacked([ICE]), speed, slope=ICE.cornering, **more)
-    truck.state[1, 1:], status = (side, yaw), FINE
-    while status == FINE and truck.speed > until and truck.time < duration - 1e-9:
-        status, _ = truck.on(torques, step)
-    if status not in (FINE, AT_REST):
-        raise RunFailed("braking", "the truck does not come to its end", truck.time)
-    return truck
+def truck_on(tables: Tables | None = None, plane: Plane = PLANE) -> OnRoad:
+    """The truck on ice or on other tables, as steep as those of ice."""
+    return on_road(plane, tables or stacked([ICE]), slope=ICE.cornering)
 
 
 def constant(mu: float) -> Tables:
@@ -109,12 +110,13 @@ def transfer_errors(mu: float = 0.4) -> dict[str, float]:
     }
     torques, errors = {"all wheels": (1e5, 1e5), "front wheels": (1e5, 0.0), "rear wheels": (0.0, 1e5)}, {}
     for name, torque in torques.items():
-        slid = braked(np.repeat(torque, 2), tables=constant(mu), plane=light, duration=0.5)
+        slid = Moving(truck_on(constant(mu), light), 10.0).braked(np.repeat(torque, 2), duration=0.5)
         wanted = static + PAPER.mass * slowing[name] * lift * np.array([1.0, -1.0])
-        errors[name] = float(np.abs(slid.report[:, LOAD].reshape(2, 2).sum(1) / wanted - 1.0).max())
+        errors[name] = float(np.abs(slid.report.load.reshape(2, 2).sum(1) / wanted - 1.0).max())
     return errors
 
 
 def sideways_with_locked_front_wheels() -> float:
     """Lateral way (m) of a truck on ice from 10 to 1 m/s whose front wheels are steered by 0.05 rad, but locked."""
-    return float(braked(np.array([LOCKS, LOCKS, 0.0, 0.0]), steer=0.05, until=1.0).state[0, 1])
+    locked = np.array([LOCKS, LOCKS, 0.0, 0.0])
+    return float(Moving(truck_on(), 10.0, steer=0.05).braked(locked, until=1.0).state[0, 1])

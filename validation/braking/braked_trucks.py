@@ -8,7 +8,7 @@ import numpy as np
 from models.brake.brake import PAPER_FRONT, of_wheels, torque
 from models.brake.controller import AllApplied, Command, Sample
 from models.brake.plane_chain import inertia
-from models.brake.plane_step import BORNE, KNOWN, SIDE, share_out
+from models.brake.plane_step import share_out
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.port.ask import checked
 from models.brake.surfaces import Stretch, road
@@ -82,7 +82,7 @@ def jackknifed(implementation: str, folder: Path) -> float:
     def energy() -> float:
         mass, rest = np.zeros((5, 5)), np.zeros(5)
         units = np.column_stack((np.cos(state[0, 2:]), np.sin(state[0, 2:])))
-        inertia(units, state[1], plane.masses, plane.inertias, plane.reach, mass, rest, rest.copy(), rest.copy())
+        inertia(units, state[1], plane, mass, rest, rest.copy(), rest.copy())
         return float(0.5 * state[1] @ mass @ state[1])
 
     levels = [energy()]
@@ -142,16 +142,14 @@ AT_THE_EDGE_OF_LOCKING: dict[str, Any] = {
 
 def one_wheel_lifted(implementation: str, folder: Path) -> float:
     """Loads of which one would be negative: weight, and moments along and across, that change (N, N m)."""
-    known = np.zeros((4, KNOWN))
-    known[:, SIDE], known[:, BORNE] = TRUCK.place[:, 1], (9e3, 24e3, -4e3, 26e3)
+    loads = np.array([9e3, 24e3, -4e3, 26e3])
 
     def balance() -> np.ndarray:
-        loads: np.ndarray = known[:, BORNE]
         return np.array([loads.sum(), loads @ TRUCK.place[:, 0], loads @ TRUCK.place[:, 1]])
 
     before = balance()
-    share_out(known)
-    return float(np.abs(balance() - before).max()) if known[:, BORNE].min() >= 0.0 else np.inf
+    share_out(loads, TRUCK.place)
+    return float(np.abs(balance() - before).max()) if loads.min() >= 0.0 else np.inf
 
 
 def below_push_out(implementation: str, folder: Path) -> float:

@@ -13,7 +13,7 @@ from models.core.errors import RunFailed
 from models.engines.braking import Carried
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import TyreTable, stacked
-from validation.braking.braked_truck import Moving
+from validation.braking.braked_truck import Moving, on_road
 from validation.braking.quarter_stops import exact
 
 Error = Callable[[str, Path], float]
@@ -44,17 +44,17 @@ class Moved(Moving):
         steer: float = 0.0,
     ) -> None:
         go = advance if implementation == "reference" else Carried(implementation, plane).advance
-        super().__init__(plane, stacked(tyres), speed, steer=steer, road=road, go=go)
+        super().__init__(on_road(plane, stacked(tyres), road), speed, steer=steer, go=go)
         self.implementation = implementation
         if turning is not None:
             self.turning[:] = turning
 
     def under(self, torques: np.ndarray, step: float = STEP) -> bool:
         """Go on under torques (n + 1, W) at the ends of steps (s); whether it came to rest. Raises RunFailed."""
-        self.rates[:] = 0.0
+        self.motion.accelerations[:] = 0.0
         status, used = self.on(torques, step)
         if status in ENDS:
-            raise RunFailed(self.implementation, ending(status, self.plane, self.state, self.rates, self.report), used)
+            raise RunFailed(self.implementation, ending(status, self.plane, self.motion), used)
         return status == AT_REST and bool(np.isfinite(self.state).all() and np.isfinite(self.turning).all())
 
     @property

@@ -7,6 +7,7 @@ None of them knows a locked state; slips beyond 1 have the force of 1, below 0 t
 
 import math
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -27,60 +28,85 @@ SETTLED = 1e-11
 PATIENCE = 3.0
 
 
+class Numbers(NamedTuple):
+    """A quarter vehicle: mass (kg), radius (m) and inertia (kg m^2) of its wheel."""
+
+    mass: float
+    radius: float
+    inertia: float
+
+
+class Curve(NamedTuple):
+    """Friction mu (s,) by slips (s,)."""
+
+    slips: np.ndarray
+    mu: np.ndarray
+
+
+class Change(NamedTuple):
+    """A road on which friction changes at a place (m)."""
+
+    before: Curve
+    behind: Curve
+    place: float = math.inf
+
+
 @njit(cache=True, error_model="numpy")
-def force_at(u, w, radius, load, slips, mu):
+def force_at(u, w, quarter, curve):
     """Force (N) and slip of a wheel (rad/s) whose centre has a speed (m/s)."""
-    u = max(u, SLOWEST)
-    slip = (u - radius * w) / u
-    cell, share = place(slips, min(abs(slip), 1.0))
-    return math.copysign(load * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
+    u, mu = max(u, SLOWEST), curve.mu
+    slip = (u - quarter.radius * w) / u
+    cell, share = place(curve.slips, min(abs(slip), 1.0))
+    return math.copysign(quarter.mass * GRAVITY * (mu[cell] + share * (mu[cell + 1] - mu[cell])), slip), slip
 
 
 @njit(cache=True, error_model="numpy")
-def rates(u, w, torque, mass, radius, inertia, slips, mu):
+def rates(u, w, torque, quarter, curve):
     """Rates of speed and turning (m/s^2, rad/s^2); a brake holds a wheel that stands."""
-    force, _ = force_at(u, w, radius, mass * GRAVITY, slips, mu)
-    brake = torque if w > 0.0 else min(torque, radius * force)
-    return -force / mass, (radius * force - brake) / inertia
+    force, _ = force_at(u, w, quarter, curve)
+    brake = torque if w > 0.0 else min(torque, quarter.radius * force)
+    return -force / quarter.mass, (quarter.radius * force - brake) / quarter.inertia
 
 
 @njit(cache=True, error_model="numpy")
-def literal(u, w, torque, mass, radius, inertia, slips, mu, step):
+def literal(u, w, torque, quarter, curve, step):
     """One step of the paper's scheme; returns speed and turning."""
-    force, slip = force_at(u, w, radius, mass * GRAVITY, slips, mu)
-    secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * mu[1] / slips[1]
+    mass, radius, inertia = quarter
+    force, slip = force_at(u, w, quarter, curve)
+    secant = force / slip if abs(slip) > 1e-12 else mass * GRAVITY * curve.mu[1] / curve.slips[1]
     decay = secant * radius * radius / (inertia * max(u, SLOWEST))
     settled = (u - torque * u / (radius * secant)) / radius if secant > 0.0 else w - torque / inertia * step
     return u - step * force / mass, max(settled + (w - settled) * math.exp(-decay * step), 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, mu, step):
+def advanced(scheme, u, w, torques, quarter, curve, step):
     """Speed and turning after one step of a scheme, 0 Euler, 1 RK4, 2 literal, under the brake's torques (N m) at its
-    start, middle and end."""
+    start and end."""
+    now, then = torques
+    middle = 0.5 * (now + then)
     if scheme == 2:
-        return literal(u, w, middle, mass, radius, inertia, slips, mu, step)
-    a, b = rates(u, w, now, mass, radius, inertia, slips, mu)
+        return literal(u, w, middle, quarter, curve, step)
+    a, b = rates(u, w, now, quarter, curve)
     if scheme == 0:
         return u + step * a, w + step * b
-    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, mass, radius, inertia, slips, mu)
-    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, mass, radius, inertia, slips, mu)
-    a4, b4 = rates(u + step * a3, w + step * b3, then, mass, radius, inertia, slips, mu)
+    a2, b2 = rates(u + 0.5 * step * a, w + 0.5 * step * b, middle, quarter, curve)
+    a3, b3 = rates(u + 0.5 * step * a2, w + 0.5 * step * b2, middle, quarter, curve)
+    a4, b4 = rates(u + step * a3, w + step * b3, then, quarter, curve)
     return u + step / 6.0 * (a + 2.0 * a2 + 2.0 * a3 + a4), w + step / 6.0 * (b + 2.0 * b2 + 2.0 * b3 + b4)
 
 
 @njit(cache=True, error_model="numpy")
-def march(scheme, u, w, torques, change, mass, radius, inertia, slips, mu, step):
+def march(scheme, u, w, torques, quarter, road, step):
     """Way (m) until the speed is 0 by a scheme, 0 Euler, 1 RK4, 2 literal, the steps (s) taken, -1 if it does not stop
     under the torques (n + 1,) in N m at the ends of steps, and the speed (m/s) that is left.
 
-    u (m/s), w (rad/s) : speeds at the start; mu (2, s) : before and behind ``change`` (m).
+    u (m/s), w (rad/s) : speeds at the start; road : a ``Change``.
     """
     x = 0.0
     for n in range(torques.size - 1):
-        table, now, then = mu[0] if x < change else mu[1], torques[n], torques[n + 1]
-        middle = 0.5 * (now + then)
-        after, turning = advanced(scheme, u, w, now, middle, then, mass, radius, inertia, slips, table, step)
+        curve = road.before if x < road.place else road.behind
+        after, turning = advanced(scheme, u, w, (torques[n], torques[n + 1]), quarter, curve, step)
         if after <= 0.0:
             return x + 0.5 * u * step * u / (u - after), n + 1, 0.0
         x += 0.5 * step * (u + after)
@@ -89,18 +115,11 @@ def march(scheme, u, w, torques, change, mass, radius, inertia, slips, mu, step)
 
 
 def marched(
-    scheme: int,
-    quarter: Quarter,
-    torques: np.ndarray,
-    slips: np.ndarray,
-    mu: np.ndarray,
-    speed: float,
-    step: float,
-    change: float = math.inf,
+    scheme: int, quarter: Quarter, torques: np.ndarray, road: Change, speed: float, step: float
 ) -> tuple[float, int, float]:
     """``march`` of a quarter vehicle from rolling at a speed (m/s)."""
-    turning, parts = speed / quarter.radius, (quarter.mass, quarter.radius, quarter.spin_inertia)
-    way, steps, left = march(scheme, speed, turning, torques, change, *parts, slips, mu, step)
+    numbers = Numbers(quarter.mass, quarter.radius, quarter.spin_inertia)
+    way, steps, left = march(scheme, speed, speed / quarter.radius, torques, numbers, road, step)
     return way, steps, left
 
 
@@ -113,8 +132,8 @@ def stopped(
     until then is given, with the speed (m/s) that is left, else 0.
     """
     most = int(PATIENCE * speed * quarter.mass * quarter.radius / (torque * step))
-    mu = tyre.mu_x[:1, 0].repeat(2, axis=0)
-    way, _, left = marched(SCHEMES.index(scheme), quarter, np.full(most + 1, torque), tyre.slips, mu, speed, step)
+    curve = Curve(tyre.slips, tyre.mu_x[0, 0])
+    way, _, left = marched(SCHEMES.index(scheme), quarter, np.full(most + 1, torque), Change(curve, curve), speed, step)
     return way, left
 
 

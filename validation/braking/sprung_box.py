@@ -7,6 +7,7 @@ import numpy as np
 
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Pressures
+from models.brake.plane_records import REPORTED, Motion
 from models.brake.plane_vehicle import GRAVITY, truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
@@ -22,6 +23,8 @@ SPIN = 1.7
 TENSOR = ((400.0, 0.0, 0.0), (0.0, 1500.0, 0.0), (0.0, 0.0, 1700.0))
 LOCKS = 1e5
 """Torque (N m) that locks a wheel at once."""
+SUPPLY = 6.0
+"""bar"""
 GRADIENT = 2e4
 """Torque by pressure (N m/bar) of brakes whose torques are given."""
 
@@ -94,19 +97,18 @@ def braked(
     steer: float = 0.0,
     step: float = 5.5e-3,
     substeps: int = 1,
-    supply: float = 6.0,
     gradient: float = GRADIENT,
 ) -> Braked:
     """The vehicle on one surface, brakes that follow at once; without an engine the plane one.
 
-    steer : rad, of the front wheels; supply : bar, for a controller of valves; gradient : N m/bar.
+    steer : rad, of the front wheels; gradient : N m/bar. A controller of valves has SUPPLY.
     """
     brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
     return on_tyres(
         truck(own.plane),
         [tyre],
         of_wheels(brake, brake, brake, brake),
-        Chambers(none + 0.03, none + 0.02, supply),
+        Chambers(none + 0.03, none + 0.02, SUPPLY),
         steer=np.array([steer, steer, 0.0, 0.0]),
         substeps=substeps,
         sample=step,
@@ -117,23 +119,10 @@ def braked(
 
 def stays(vehicle: Braked, path: Path, duration: float = 2.0) -> float:
     """Largest speed (m/s) over ground in a time (s) after a stop, the wheels' turning included."""
-    state, turning, found = path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3)
-    report, largest = np.zeros((4, path.reports.shape[2])), 0.0
-    torques = np.tile(path.torques[-1], (2, 1))
+    motion = Motion(path.states[-1].copy(), path.turning[-1].copy(), np.zeros(3), np.zeros((REPORTED, 4)))
+    torques, largest = np.tile(path.torques[-1], (2, 1)), 0.0
     for _ in range(round(duration / vehicle.sample)):
-        vehicle.engine.advance(
-            state,
-            turning,
-            torques,
-            vehicle.sample,
-            vehicle.steer,
-            vehicle.slope,
-            vehicle.plane,
-            vehicle.kind,
-            vehicle.road,
-            vehicle.tables.packed,
-            found,
-            report,
-        )
-        largest = max(largest, float(np.hypot(*state[1, :2])), float(np.abs(turning * vehicle.plane.radius).max()))
+        vehicle.engine.advance(motion, torques, vehicle.sample, vehicle.steer, vehicle.on_road)
+        rims = np.abs(motion.turning * vehicle.plane.radius)
+        largest = max(largest, float(np.hypot(*motion.state[1, :2])), float(rims.max()))
     return largest

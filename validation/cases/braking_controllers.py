@@ -12,7 +12,6 @@ from models.brake.controller import SAMPLE
 from models.brake.controllers import CONTROLLERS
 from models.brake.controllers.five_phase import FivePhase
 from models.brake.controllers.five_phase_cycle import Frozen, limit_cycle, sampled
-from models.brake.plane_step import LOCKED
 from models.brake.plane_vehicle import GRAVITY, PAPER, truck
 from models.brake.pressure import APPLY, RELEASE, Chambers, by_valves, still
 from models.systems.braking.march import Path as Recorded
@@ -200,7 +199,7 @@ def stop(on: str, name: str, speed: float) -> dict[str, float]:
         "distance": float(path.states[-1, 0, 0]),
         "time": float(path.times[-1]),
         "used": float(used),
-        "locked": 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports[:last, :, LOCKED].T),
+        "locked": 1e3 * SAMPLE * max(_longest(wheel > 0.0) for wheel in path.reports.locked[:last].T),
         "stands": float(path.stands),
     }
 

@@ -16,7 +16,14 @@ from models.brake.trailer import CHOSEN, follow, hooked
 from models.engines.braking import Carried
 from models.systems.braking.march import on_tyres
 from models.tyre.tyre_table import Tables, TyreTable, stacked
-from validation.braking.braked_truck import ICE, PLANE, Moving, sideways_with_locked_front_wheels, transfer_errors
+from validation.braking.braked_truck import (
+    ICE,
+    PLANE,
+    Moving,
+    on_road,
+    sideways_with_locked_front_wheels,
+    transfer_errors,
+)
 from validation.braking.truck_equations import Turned, turned
 from validation.common.rows import Observed, Row, System, Table
 
@@ -66,7 +73,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def turn(until: float, steer: float = STEER, go: Callable[..., Any] = advance) -> Turned:
     """The truck from SPEED to another (m/s) on ice; the last step is shared in proportion."""
-    truck = Moving(PLANE, stacked([ICE]), SPEED, steer=steer, slope=ICE.cornering, go=go)
+    truck = Moving(on_road(PLANE, stacked([ICE]), slope=ICE.cornering), SPEED, steer=steer, go=go)
     while True:
         passed, place, fast = truck.time, truck.state[0].copy(), truck.speed
         status, used = truck.on(np.repeat(TORQUES, 2), STEP)

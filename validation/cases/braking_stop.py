@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.brake.plane_vehicle import GRAVITY
-from models.brake.quarter import PLACE, SPEED, TURNING, Quarter, Stop, braked
+from models.brake.quarter import Quarter, Stop, braked
 from models.brake.surfaces import EVEN
 from models.tyre.magic_formula import SURFACES
 from validation.braking.quarter_stops import FRONT, PATIENCE, SCHEMES, STEP, exact, met, steady, stop, stopped
@@ -123,14 +123,15 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
 
 def faults_of(found: Stop, radius: float, brakes: bool) -> list[str]:
     """What is wrong with a stop: names of rules it breaks."""
-    rim, speed = radius * found.path[:, TURNING], found.path[:, SPEED]
+    path, speed = found.path, found.path.speed
+    rim = radius * path.turning
     broken = {
-        "no number": not np.isfinite(found.path).all(),
+        "no number": not all(np.isfinite(part).all() for part in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
         "does not stop": brakes and found.rest < 0,
         "creeps": found.rest >= 0
-        and bool(np.abs(speed[found.rest :]).max() > 0.0 or np.ptp(found.path[found.rest :, PLACE]) > 0.0),
+        and bool(np.abs(speed[found.rest :]).max() > 0.0 or np.ptp(path.place[found.rest :]) > 0.0),
     }
     return [name for name, wrong in broken.items() if wrong]
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from models.brake.controller import Command, Controller, Sample
 from models.brake.controllers.slip import SlipBangBang
-from models.brake.plane_step import LOAD
 from models.brake.plane_vehicle import GRAVITY
 from models.brake.sprung import PITCH
 from models.systems.braking.march import Path as Run
@@ -48,10 +47,10 @@ def _locked_rows(mu: float) -> list[Row]:
         path = vehicle.run(steady(*4 * (LOCKS,)), speed)
         way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
-        gained = float(path.reports[late, :2, LOAD].sum() - path.reports[0, :2, LOAD].sum())
+        gained = float(path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum())
         plane, pitch = own.plane, float(path.states[late, 0, PITCH])
         moment = plane.mass * GRAVITY * (mu * plane.height + (plane.height - plane.front.radius) * pitch)
-        weight = float(path.reports[late, :, LOAD].sum()) / (plane.mass * GRAVITY)
+        weight = float(path.reports.load[late].sum()) / (plane.mass * GRAVITY)
         found += [
             Observed(
                 f"braking_suspension.locked.{place}",

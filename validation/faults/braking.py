@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from models.brake import brake, plane_vehicle
-from models.brake.advance import advance
-from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
 from models.brake.port import sensors
+from models.brake.quarter import Path as QuarterPath
 from models.brake.quarter import Stop
 from models.brake.surfaces import EVEN, Road, Stretch, road
 from models.tyre import tyre_table
 from validation.braking import braked_wheels as wheels
 from validation.braking import quarter_stops as stops
-from validation.braking.braked_truck import Moving
+from validation.braking.braked_truck import Moving, on_road
 from validation.braking.quarter_stops import LITERAL, exact, stopped
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
@@ -32,7 +31,7 @@ SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 def _first_step(own: Road, steer: float = 0.0) -> Moving:
     """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
     tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
-    truck = Moving(plane_vehicle.truck(PAPER), tables, 10.0, steer=steer, road=own, go=advance)
+    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, own), 10.0, steer=steer)
     if not steer:
         truck.turning[:] = 0.0
     truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
@@ -61,21 +60,21 @@ def _transfer() -> float:
     slide = float(stops.met("ice")[0].mu_x[0, 0, -1])
     base = 1.42 + 2.19
     wanted = 5640.0 * GRAVITY * (2.19 + slide * 1.2) / (2.0 * base)
-    return float(np.abs(report[:2, LOAD] / wanted - 1.0).max())
+    return float(np.abs(report.load[:2] / wanted - 1.0).max())
 
 
 def _split() -> float:
     """Locked, the left side dry: yaw acceleration against the moment of the reported forces."""
     truck = _first_step(SPLIT)
     x, y = np.array([1.42, 1.42, -2.19, -2.19]), np.array([0.95, -0.95, 0.9, -0.9])
-    moment = float(x @ truck.report[:, FORCE_Y] - y @ truck.report[:, FORCE_X])
+    moment = float(x @ truck.report.force_y - y @ truck.report.force_x)
     return float(abs(truck.state[1, 2] / (STEP * moment / 25000.0) - 1.0))
 
 
 def _turns_left() -> float:
     """Steered to the left: 1 if the truck does not yaw to the left, and 1 if it is not the left that is unloaded."""
     truck = _first_step(EVEN, 0.05)
-    return float(not truck.state[1, 2] > 0.0) + float(not truck.report[0, LOAD] < truck.report[1, LOAD])
+    return float(not truck.state[1, 2] > 0.0) + float(not truck.report.load[0] < truck.report.load[1])
 
 
 def _pulls_left() -> float:
@@ -150,7 +149,8 @@ def _literal(real: Any) -> Any:
 
     def stop(quarter: Any, tyre: Any, torque: float, speed: float, *rest: Any, **more: Any) -> Any:
         way = stopped(LITERAL, quarter, tyre[0], torque, speed, STEP)[0]
-        return Stop(np.array([[0.0, 0.0, speed, 0.0, 0.0], [0.0, way, 0.0, 0.0, 0.0]]), 1)
+        none = np.zeros(2)
+        return Stop(QuarterPath(none, np.array([0.0, way]), np.array([speed, 0.0]), none, none), 1)
 
     return stop
 

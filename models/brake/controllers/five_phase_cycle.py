@@ -9,16 +9,17 @@ same wheel under the same controller as it runs, by samples.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from models.brake.brake import Brake, of_wheels, torque
+from models.brake.brake import Brake, Brakes, of_wheels, torque
 from models.brake.controller import SAMPLE, Sample
 from models.brake.controllers.five_phase import FivePhase, end_of, rate
-from models.brake.wheel_step import node_force, wheel_step
+from models.brake.wheel_step import Grip, StepInput, Wheel, node_force, wheel_step
 from models.core.errors import InputError, RunFailed
 from models.machine.compiled import njit
-from models.tyre.tyre_table import TyreTable, place, stacked
+from models.tyre.tyre_table import Cells, TyreTable, place, stacked
 
 LONGEST_PHASE = 1.0
 """Time (s) after which a phase is taken never to end."""
@@ -26,8 +27,28 @@ CLOSED = 1e-9
 """Relative change of slip and torque from one cycle to the next one at which it is the limit cycle."""
 
 
-PRESSURE, TORQUE, TURNING, TIME, IMPULSE = range(5)
-"""What a wheel's state holds: bar, N m, rad/s, s, and the integral of the tyre's force over that time (N s)."""
+class State(NamedTuple):
+    """Of a wheel: pressure (bar) and torque (N m) of its brake, speed of turning (rad/s), time (s), and the integral of
+    the tyre's force over that time (N s)."""
+
+    pressure: float
+    torque: float
+    turning: float
+    time: float
+    impulse: float
+
+
+class Driven(NamedTuple):
+    """A wheel by its radius (m) and inertia (kg m^2), its brake (of one wheel) and the tyre's grip, at a speed (m/s)
+    that stays: for compiled functions."""
+
+    speed: float
+    radius: float
+    inertia: float
+    brakes: Brakes
+    grip: Grip
+
+
 MET, BACK, LOCKS, ENDLESS = range(4)
 """How a phase ends: the rim's acceleration is at its level; it has fallen to the other one, as phase 2 may; else it
 does not end."""
@@ -54,41 +75,39 @@ class Frozen:
     @property
     def peak(self) -> float:
         """Largest force (N) of the tyre."""
-        *_, grip, slips, mu_x = self.packed
-        return max(node_force(k, grip, mu_x) for k in range(slips.size))
+        grip = self.driven.grip
+        return max(node_force(k, grip) for k in range(grip.slips.size))
 
     @cached_property
-    def packed(self) -> tuple:
-        """As compiled functions take it: speed, radius, inertia, brakes, grip, slips, mu_x."""
+    def driven(self) -> Driven:
+        """As compiled functions take it."""
         tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
-        grip = (0, 0, 0.0, 0, 0.0, int(j), float(q), float(self.load))
-        return self.speed, self.radius, self.inertia, of_wheels(self.brake), grip, tables.slips, tables.mu_x
+        grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
+        return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)
 
-    def rolling(self) -> np.ndarray:
-        """State (5,) of a wheel that rolls without torque, at time 0."""
-        return np.array([0.0, 0.0, self.speed / self.radius, 0.0, 0.0])
+    def rolling(self) -> State:
+        """A wheel that rolls without torque, at time 0."""
+        return State(0.0, 0.0, self.speed / self.radius, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def rim(state, wheel):
+def rim(state, driven):
     """Acceleration (m/s^2) of the wheel's rim."""
-    speed, radius, inertia, _, grip, slips, mu_x = wheel
-    slip = min(max(1.0 - radius * state[TURNING] / speed, 0.0), 1.0)
-    k, share = place(slips, slip)
-    low, high = node_force(k, grip, mu_x), node_force(k + 1, grip, mu_x)
-    return radius * (radius * (low + share * (high - low)) - state[TORQUE]) / inertia
+    radius, inertia = driven.radius, driven.inertia
+    slip = min(max(1.0 - radius * state.turning / driven.speed, 0.0), 1.0)
+    k, share = place(driven.grip.slips, slip)
+    low, high = node_force(k, driven.grip), node_force(k + 1, driven.grip)
+    return radius * (radius * (low + share * (high - low)) - state.torque) / inertia
 
 
 @njit(cache=True, error_model="numpy")
-def go_on(state, rate, time, wheel, after):
-    """Fill ``after`` with the state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
-    speed, radius, inertia, brakes, grip, slips, mu_x = wheel
-    after[PRESSURE] = max(state[PRESSURE] + rate * time, 0.0)
-    after[TORQUE] = torque(0, after[PRESSURE], state[TORQUE], brakes)
-    after[TURNING], force, _, _ = wheel_step(
-        speed, speed, state[TURNING], state[TORQUE], after[TORQUE], time, radius, inertia, grip, slips, mu_x
-    )
-    after[TIME], after[IMPULSE] = state[TIME] + time, state[IMPULSE] + time * force
+def go_on(state, rate, time, driven):
+    """The state after a time (s) in which pressure moves at a rate (bar/s) and meets no corner."""
+    pressure = max(state.pressure + rate * time, 0.0)
+    after = torque(0, pressure, state.torque, driven.brakes)
+    given = StepInput(driven.speed, driven.speed, state.torque, after, time)
+    rolled = wheel_step(given, Wheel(driven.radius, driven.inertia, state.turning), driven.grip)
+    return State(pressure, after, rolled.turning, state.time + time, state.impulse + time * rolled.force)
 
 
 @njit(cache=True, error_model="numpy")
@@ -96,50 +115,50 @@ def corner(state, rate, brakes):
     """Time (s) to the next corner of the brake's loop, or until there is no pressure; infinite if there is none."""
     first = math.inf
     if rate > 0.0:
-        first = (brakes.push_out[0] + state[TORQUE] / brakes.rising[0] - state[PRESSURE]) / rate
+        first = (brakes.push_out[0] + state.torque / brakes.rising[0] - state.pressure) / rate
         return first if first > 1e-12 else math.inf
     if rate < 0.0:
-        for p in (brakes.release[0] + state[TORQUE] / brakes.falling[0], brakes.release[0], 0.0):
-            time = (p - state[PRESSURE]) / rate
+        for p in (brakes.release[0] + state.torque / brakes.falling[0], brakes.release[0], 0.0):
+            time = (p - state.pressure) / rate
             if time > 1e-12:
                 first = min(first, time)
     return first
 
 
 @njit(cache=True, error_model="numpy")
-def ended(state, sign, level, back, wheel):
+def ended(state, sign, level, back, driven):
     """MET where sign (rim's acceleration - level) is 0 or more, BACK where it is at most ``back`` (m/s^2), else -1."""
-    now = rim(state, wheel)
+    now = rim(state, driven)
     return MET if sign * (now - level) >= 0.0 else BACK if now <= back else -1
 
 
 @njit(cache=True, error_model="numpy")
-def phase(state, rate, sign, level, back, step, wheel):
-    """Move a state on at a rate of pressure (bar/s), by steps (s), until it has ``ended``; how it ended.
+def phase(state, rate, sign, level, back, step, driven):
+    """The state at the end of a phase from this one, at a rate of pressure (bar/s), by steps (s), and how it
+    ``ended``.
 
     A wheel that locks while pressure falls turns again later; another one does not.
     """
-    after, began, end = np.empty(5), state[TIME], ended(state, sign, level, back, wheel)
+    began, end = state.time, ended(state, sign, level, back, driven)
     while end < 0:
-        time = min(step, corner(state, rate, wheel[3]))
-        go_on(state, rate, time, wheel, after)
-        end = ended(after, sign, level, back, wheel)
+        time = min(step, corner(state, rate, driven.brakes))
+        after = go_on(state, rate, time, driven)
+        end = ended(after, sign, level, back, driven)
         if end >= 0:
             low, high = 0.0, time
             while high - low > 1e-15:
                 middle = 0.5 * (low + high)
-                go_on(state, rate, middle, wheel, after)
-                if ended(after, sign, level, back, wheel) >= 0:
+                if ended(go_on(state, rate, middle, driven), sign, level, back, driven) >= 0:
                     high = middle
                 else:
                     low = middle
-            go_on(state, rate, high, wheel, after)
-        state[:] = after
-        if end < 0 and not (state[TURNING] > 0.0 or rate < 0.0):
-            return LOCKS
-        if end < 0 and state[TIME] - began > LONGEST_PHASE:
-            return ENDLESS
-    return end
+            after = go_on(state, rate, high, driven)
+        state = after
+        if end < 0 and not (state.turning > 0.0 or rate < 0.0):
+            return state, LOCKS
+        if end < 0 and state.time - began > LONGEST_PHASE:
+            return state, ENDLESS
+    return state, end
 
 
 @dataclass(frozen=True)
@@ -162,41 +181,36 @@ def limit_cycle(frozen: Frozen, controller: FivePhase, step: float = 2e-5, most:
 
     Raises RunFailed if a phase does not end, the wheel locks while it is not released, or ``most`` cycles do not close.
     """
-    state = frozen.rolling()
-    _to_end(state, 0, controller, step, frozen)
+    state, _ = _to_end(frozen.rolling(), 0, controller, step, frozen)
     for _ in range(most):
-        state[TIME] = state[IMPULSE] = 0.0
-        path, number = [state.copy()], RELEASE
+        state = state._replace(time=0.0, impulse=0.0)
+        path, number = [state], RELEASE
         while number <= SLOW:
-            end = _to_end(state, number, controller, step, frozen)
-            path.append(state.copy())
+            state, end = _to_end(state, number, controller, step, frozen)
+            path.append(state)
             number = SLOW if end == BACK else number + 1
-        first, last = path[0], path[-1]
-        if abs(last[TORQUE] / first[TORQUE] - 1.0) + abs(last[TURNING] / first[TURNING] - 1.0) < CLOSED:
-            return _cycle(np.array(path), frozen)
+        first = path[0]
+        if abs(state.torque / first.torque - 1.0) + abs(state.turning / first.turning - 1.0) < CLOSED:
+            return _cycle(path, frozen)
     raise RunFailed("braking", f"{most} cycles of the five phases do not close")
 
 
-def _cycle(at: np.ndarray, frozen: Frozen) -> Cycle:
-    """Of the states (6, 5) at the switches of one."""
-    last, slips = at[-1], 1.0 - frozen.radius * at[:, TURNING] / frozen.speed
-    return Cycle(
-        float(last[TIME]),
-        tuple(np.diff(at[:, TIME]).tolist()),
-        float(last[IMPULSE] / last[TIME] / frozen.peak),
-        tuple(slips.tolist()),
-    )
+def _cycle(at: list[State], frozen: Frozen) -> Cycle:
+    """Of the states at the six switches of one."""
+    last, slips = at[-1], [1.0 - frozen.radius * state.turning / frozen.speed for state in at]
+    durations = tuple(np.diff([state.time for state in at]).tolist())
+    return Cycle(last.time, durations, last.impulse / last.time / frozen.peak, tuple(slips))
 
 
-def _to_end(state: np.ndarray, number: int, controller: FivePhase, step: float, frozen: Frozen) -> int:
-    """Move a state on to the end of a phase, MET or BACK; raises RunFailed."""
+def _to_end(state: State, number: int, controller: FivePhase, step: float, frozen: Frozen) -> tuple[State, int]:
+    """The state at the end of a phase, and whether that is MET or BACK; raises RunFailed."""
     sign, level = end_of(number, controller)
     back = controller.e4 if number == CLIMB else -math.inf
-    end: int = phase(state, rate(number, controller), sign, level, back, step, frozen.packed)
+    state, end = phase(state, rate(number, controller), sign, level, back, step, frozen.driven)
     if end == ENDLESS or (end == LOCKS and number != 0):
         what = f"the wheel locks in phase {number}" if end == LOCKS else f"phase {number} does not end"
-        raise RunFailed("braking", what, float(state[TIME]))
-    return end
+        raise RunFailed("braking", what, state.time)
+    return state, end
 
 
 def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: int = 4, skip: int = 5) -> Cycle:
@@ -204,20 +218,20 @@ def sampled(frozen: Frozen, controller: FivePhase, cycles: int = 30, substeps: i
 
     Raises RunFailed if it does not cycle.
     """
-    state, after, number, falling = frozen.rolling(), np.empty(5), 0, False
-    starts: list[np.ndarray] = []
+    state, driven, number, falling = frozen.rolling(), frozen.driven, 0, False
+    starts: list[State] = []
     while len(starts) <= cycles + skip:
-        wheels = np.array([frozen.radius * state[TURNING]])
+        wheels = np.array([frozen.radius * state.turning])
         given = Sample(number, round(number * SAMPLE * 1e9), wheels, True, 1e3, frozen.speed)
         pressure = float(np.asarray(controller.sample(given).pressures)[0])
-        if pressure < state[PRESSURE] and not falling:
-            starts.append(state.copy())
-        falling, number = pressure < state[PRESSURE], number + 1
-        state[PRESSURE], state[TORQUE] = pressure, torque(0, pressure, state[TORQUE], frozen.packed[3])
+        if pressure < state.pressure and not falling:
+            starts.append(state)
+        falling, number = pressure < state.pressure, number + 1
+        state = state._replace(pressure=pressure, torque=torque(0, pressure, state.torque, driven.brakes))
         for _ in range(substeps):
-            go_on(state, 0.0, SAMPLE / substeps, frozen.packed, after)
-            state[:] = after
+            state = go_on(state, 0.0, SAMPLE / substeps, driven)
         if number * SAMPLE > (cycles + skip) * LONGEST_PHASE:
-            raise RunFailed("braking", "the sampled controller does not cycle", float(state[TIME]))
-    way = starts[-1] - starts[skip]
-    return Cycle(float(way[TIME] / cycles), (), float(way[IMPULSE] / way[TIME] / frozen.peak), ())
+            raise RunFailed("braking", "the sampled controller does not cycle", state.time)
+    first, last = starts[skip], starts[-1]
+    time, impulse = last.time - first.time, last.impulse - first.impulse
+    return Cycle(time / cycles, (), impulse / time / frozen.peak, ())

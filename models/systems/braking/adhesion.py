@@ -22,7 +22,6 @@ from models.brake.figures_of_merit import (
     mean_of_fastest,
     split_rate,
 )
-from models.brake.plane_step import LOCKED
 from models.brake.plane_vehicle import GRAVITY
 from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, Path
@@ -138,7 +137,7 @@ def _rate(scene: BrakingScene, vehicle: Braked, axle: int) -> float:
 def _locks(path: Path) -> bool:
     """Whether a wheel locks above 20 km/h."""
     fast = Stop(path).speed[:-1] > 20.0 * KMH
-    return bool((path.reports[fast][:, :, LOCKED] > 0.0).any())
+    return bool((path.reports.locked[fast] > 0.0).any())
 
 
 def _between(path: Path, high: float, low: float) -> float:

@@ -10,12 +10,13 @@ import numpy as np
 from models.brake.advance import AT_REST, ENDS, FINE, ending
 from models.brake.brake import Brakes
 from models.brake.controller import LARGEST_PRESSURE, RELEASE, SAMPLE, Command, Controller, Sample, is_steady
+from models.brake.plane_records import Motion, Report
 from models.brake.plane_vehicle import Plane
 from models.brake.port.ask import STATES, WITH_SLOW, ask
 from models.brake.port.sensors import Sensed
 from models.brake.pressure import Chambers, still
 from models.brake.samples import Braking, Kept, Row, Told, by_steps, parts, row
-from models.brake.surfaces import EVEN, Road, check_way
+from models.brake.surfaces import EVEN, OnRoad, Road, check_way
 from models.core.errors import RunFailed
 from models.tyre.tyre_table import Tables, TyreTable, stacked
 
@@ -28,7 +29,7 @@ class Path:
     """What a run recorded at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
-    reports (n - 1, W, 7) : of the last step of every sample, see ``plane_step``; stands : whether it ended at rest;
+    reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest;
     coordinates : names of those of the states, the first three always x, y (m) and heading (rad); clock : what the
     clock on the wall told of overruns, if the run kept to it.
     """
@@ -38,7 +39,7 @@ class Path:
     turning: np.ndarray
     pressures: np.ndarray
     torques: np.ndarray
-    reports: np.ndarray
+    reports: Report
     stands: bool
     coordinates: tuple[str, ...] = ()
     clock: str = ""
@@ -107,11 +108,12 @@ class Braked:
         kept = Kept(now.whole, np.empty((most, now.whole.size)), np.zeros(1, dtype=np.int64), duration - 1e-9)
         states = WITH_SLOW if self.chambers.slow.size else STATES
         beyond = LARGEST_PRESSURE if isinstance(controller, Sensed) else 0.0  # noise of a sensor may exceed the supply
-        rows, status, rates = [now.whole[None].copy()], FINE, np.zeros(2 + self.plane.masses.size)
+        motion = now.motion(np.zeros(2 + self.plane.masses.size))
+        rows, status = [now.whole[None].copy()], FINE
         try:
-            for number, (status, time, speed, supply) in enumerate(self._moving(told, kept, now, rates)):
+            for number, (status, time, speed, supply) in enumerate(self._moving(told, kept, now, motion)):
                 if status in ENDS:
-                    raise RunFailed("braking", ending(status, self.plane, now.state, rates, now.report), time)
+                    raise RunFailed("braking", ending(status, self.plane, motion), time)
                 _take(rows, kept)
                 if status == AT_REST or time >= kept.until:
                     break
@@ -129,35 +131,27 @@ class Braked:
             raise
         return _path(rows, now, status == AT_REST, self.coordinates)
 
-    def _moving(self, told: Told, kept: Kept, now: Row, rates: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-        """The vehicle as it is ``now`` with its accelerations (2 + U,), moved on sample by sample; see ``samples``."""
+    @property
+    def on_road(self) -> OnRoad:
+        """The vehicle as compiled functions take it."""
+        return OnRoad(self.plane, self.kind, self.slope, self.tables, self.road)
+
+    def _moving(self, told: Told, kept: Kept, now: Row, motion: Motion) -> Iterator[tuple[int, float, float, float]]:
+        """The vehicle as it is ``now`` and in ``motion``, moved on sample by sample; see ``samples``."""
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
-        given = (
-            told,
-            kept,
-            self.sample,
-            Braking(air, self.chambers, self.brakes, torques),
-            now.state,
-            now.turning,
-            self.slope,
-            self.plane,
-            self.kind,
-            self.road,
-            self.tables.packed,
-            rates,
-            now.report,
-        )
+        braking = Braking(air, self.chambers, self.brakes, torques)
+        given = (told, kept, self.sample, braking, motion, self.on_road)
         if self.engine is not None:
             moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
             return moving
         if self.relaxation is None:
             return by_steps(*given)
-        from models.brake.relaxation import by_lagging_steps
+        from models.brake.relaxation import Lag, by_lagging_steps
 
         # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady one
-        lag = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
-        return by_lagging_steps(*given, self.relaxation, lag)
+        angle = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
+        return by_lagging_steps(*given, Lag(self.relaxation, angle))
 
 
 def on_tyres(
@@ -189,5 +183,14 @@ def _take(rows: list[np.ndarray], kept: Kept) -> None:
 
 
 def _path(rows: list[np.ndarray], now: Row, stands: bool, names: tuple[str, ...]) -> Path:
-    times, states, turning, pressures, torques, reports = parts(rows, now)
-    return Path(times[:, 0], states, turning, pressures, torques, reports[1:], stands, names)
+    all_of = parts(rows, now)
+    return Path(
+        all_of.time[:, 0],
+        all_of.state,
+        all_of.turning,
+        all_of.pressure,
+        all_of.torque,
+        Report(*np.moveaxis(all_of.report[1:], 1, 0)),
+        stands,
+        names,
+    )

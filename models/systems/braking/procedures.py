@@ -9,11 +9,12 @@ import numpy as np
 from scipy.optimize import root
 
 from models.brake.controller import Pressures, Sample
-from models.brake.plane_step import REPORTED, step_on
+from models.brake.plane_records import motion_of
+from models.brake.plane_step import step_on
 from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
 from models.brake.steering import Response, Steering, response
-from models.brake.surfaces import check_way, under_wheels
+from models.brake.surfaces import check_way, surfaces, under_wheels
 from models.core.errors import InputError, Refused
 from models.systems.braking.march import Braked, Path, Start
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
@@ -164,9 +165,7 @@ class Circle:
         vehicle, state, steer = self.vehicle, self.state(unknown), steered(self.vehicle, unknown[0])
         if not self.sprung:
             return _accelerations(vehicle, state, steer)
-        motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(
-            state, steer, vehicle.plane, vehicle.kind, vehicle.road, vehicle.tables.packed
-        )
+        motion: tuple[np.ndarray, np.ndarray] = vehicle.engine.rolling(state, steer, vehicle.on_road)
         return motion
 
     def left(self, unknown: np.ndarray) -> np.ndarray:
@@ -222,11 +221,9 @@ def _rolling(plane: Plane, state: np.ndarray, steer: np.ndarray) -> np.ndarray:
 
 def _accelerations(vehicle: Braked, state: np.ndarray, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (2 + U,) of a plane vehicle whose wheels roll without brakes, and their speeds of turning (W,)."""
-    plane, none, turning = vehicle.plane, np.zeros(vehicle.plane.wheels), _rolling(vehicle.plane, state, steer)
-    surface, rates = np.zeros((plane.wheels, 3)), np.zeros(state.shape[1])
-    rates[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
-    under_wheels(state, 0.0, plane, vehicle.kind, vehicle.road, surface)
-    regular, report = vehicle.slope * 9.81 * BLINK, np.zeros((plane.wheels, REPORTED))
-    moved = state.copy(), turning.copy(), none, none, BLINK, steer, surface, regular, plane, vehicle.tables.packed
-    step_on(*moved, rates, report)
-    return rates, turning
+    plane, none, turning = vehicle.plane, np.zeros((2, vehicle.plane.wheels)), _rolling(vehicle.plane, state, steer)
+    motion, ground = motion_of(state.copy(), turning.copy()), surfaces(plane.wheels)
+    motion.accelerations[:2] = state[1, 2] * np.array([-state[1, 1], state[1, 0]])
+    under_wheels(state, 0.0, vehicle.on_road, ground)
+    step_on(motion, none, BLINK, steer, vehicle.slope * 9.81 * BLINK, vehicle.on_road, ground)
+    return motion.accelerations, turning

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.brake.plane_step import FORCE_X, FORCE_Y, LOAD, SLIP, SLIP_ANGLE
 from models.core.assumptions import judged
 from models.core.errors import RunFailed
 from models.core.result import Channel, Result, result
@@ -17,14 +16,8 @@ from models.systems.braking.procedures import answers, check_engine, engines_of,
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import WHEELS
 
-REPORTS = {
-    "force_x": (FORCE_X, "N"),
-    "force_y": (FORCE_Y, "N"),
-    "load": (LOAD, "N"),
-    "slip": (SLIP, "1"),
-    "slip_angle": (SLIP_ANGLE, "rad"),
-}
-"""Channels of what wheels report of the last step of every sample: column and unit."""
+REPORTS = {"force_x": "N", "force_y": "N", "load": "N", "slip": "1", "slip_angle": "rad"}
+"""Channels of what wheels report of the last step of every sample, with their units."""
 
 
 def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bool = False) -> Result:
@@ -84,9 +77,11 @@ def _labelled(scene: BrakingScene, name: str, engine: str, path: Path, seconds: 
         "pressure": Channel(wheel, path.pressures, "bar"),
         "torque": Channel(wheel, path.torques, "N m"),
     }
-    begun = np.full((1, *path.reports.shape[1:]), np.nan)
-    reports = np.concatenate((begun, path.reports))
-    channels |= {key: Channel(wheel, reports[:, :, column], unit) for key, (column, unit) in REPORTS.items()}
+    begun = np.full((1, path.turning.shape[1]), np.nan)
+    channels |= {
+        name: Channel(wheel, np.concatenate((begun, getattr(path.reports, name))), unit)
+        for name, unit in REPORTS.items()
+    }
     samples = len(path.times) - 1
     return result(
         scene,

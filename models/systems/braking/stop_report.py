@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.brake.figures_of_merit import Locks, equivalent_deceleration, lock_table, mean_fully_developed, yaw_ratio
-from models.brake.plane_step import LOAD, LOCKED, SLIP
 from models.systems.braking.march import Path
 
 WHEELS = (
@@ -108,7 +107,7 @@ class Stop:
         return {
             "largest roll [deg]": float(roll[_peak(roll)]),
             "largest pitch [deg]": float(pitch[_peak(pitch)]),
-            "least wheel load [N]": float(self.path.reports[:, :, LOAD].min()),
+            "least wheel load [N]": float(self.path.reports.load.min()),
         }
 
     @property
@@ -128,7 +127,7 @@ class Stop:
     def of_wheels(self) -> dict[str, np.ndarray]:
         """What each wheel (W,) did above SLOWEST, or above half of a lower initial speed, by name and unit."""
         path, fast = self.path, self.speed[:-1] > min(SLOWEST, 0.5 * self.speed[0])
-        lengths, slips = self.lengths[fast], path.reports[fast][:, :, SLIP]
+        lengths, slips = self.lengths[fast], path.reports.slip[fast]
         pressures, whole = path.pressures[1:][fast], float(self.lengths[fast].sum())
         wheels = {"mean slip": lengths @ slips / whole, "largest slip": slips.max(axis=0)}
         wheels |= {f"slip above {limit:g} [% of time]": 100.0 * (lengths @ (slips > limit)) / whole for limit in LIMITS}
@@ -161,7 +160,7 @@ class Stop:
 
     def locks(self) -> Locks:
         """Locks of the wheels above 15 km/h."""
-        return lock_table(self.lengths, self.path.reports[:, :, LOCKED] > 0.0, self.speed[:-1])
+        return lock_table(self.lengths, self.path.reports.locked > 0.0, self.speed[:-1])
 
 
 def _peak(values: np.ndarray) -> int:

@@ -25,7 +25,7 @@ from models.core.errors import RunFailed
 from models.systems.braking.march import Braked, on_tyres
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
-from validation.braking.quarter_stops import FRONT, marched
+from validation.braking.quarter_stops import FRONT, Change, Curve, marched
 from validation.braking.sampled_quarter import EMPTY, FILL, SUPPLY, tight_distance
 
 SURFACES, CHANGE, SPEED = ("snow", "wet"), 10.0, 11.11
@@ -174,7 +174,8 @@ class BrakingStop:
     def _others(self, method: str, substeps: int) -> Result:
         number = (EULER, RK4, LITERAL).index(method)
         torques, step = self._torques(substeps), SAMPLE / substeps
-        way, steps, _ = marched(number, FRONT, torques, self.slips, self.mu, self.speed, step, self.change)
+        friction = Change(Curve(self.slips, self.mu[0]), Curve(self.slips, self.mu[1]), self.change)
+        way, steps, _ = marched(number, FRONT, torques, friction, self.speed, step)
         if steps < 0:
             raise RunFailed("reference", "it does not stop", self.duration)
         return Result(way, {"steps": steps, "force calls": WALKS[method] * steps})

@@ -1,0 +1,110 @@
+"""What a step of a vehicle in the plane reads and writes: its motion and its wheels, W of them, n coordinates.
+
+Compiled functions pass few arrays on, and name their rows where they are read: two dozen arrays that are passed
+everywhere double the time of compiling.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from models.brake.surfaces import Surfaces
+from models.machine.compiled import inlined
+
+
+class Report(NamedTuple):
+    """What the wheels did in a step, each (W,), in a whole run (samples, W).
+
+    force_x, force_y : mean forces on the wheel in its own axes (N); load : N; slip : the mean one; slip_angle : rad;
+    locked : time (s) for which the wheel was locked; turning : speed of turning at the end (rad/s).
+    """
+
+    force_x: np.ndarray
+    force_y: np.ndarray
+    load: np.ndarray
+    slip: np.ndarray
+    slip_angle: np.ndarray
+    locked: np.ndarray
+    turning: np.ndarray
+
+
+REPORTED = len(Report._fields)
+"""Numbers that a wheel reports."""
+
+
+@inlined
+def report_of(rows):
+    """The ``Report`` whose numbers are these rows (7, W), in compiled functions; in Python ``Report(*rows)``."""
+    return Report(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+
+
+class Motion(NamedTuple):
+    """A vehicle that moves, all of it moved in place.
+
+    state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
+    which the next one searches on; report (7, W) : the rows of the last step's ``Report``.
+    """
+
+    state: np.ndarray
+    turning: np.ndarray
+    accelerations: np.ndarray
+    report: np.ndarray
+
+
+def motion_of(state: np.ndarray, turning: np.ndarray) -> Motion:
+    """The motion of a vehicle in the plane that has neither accelerations nor a report yet."""
+    return Motion(state, turning, np.zeros(state.shape[1]), np.zeros((REPORTED, turning.size)))
+
+
+class Wheels(NamedTuple):
+    """What is known of each wheel within a step, each (W,).
+
+    start : speed of its centre along it at the start (m/s); rate : what that one's rate has besides the accelerations
+    of the coordinates (m/s^2); along, aside : speeds of its centre along it, from 0 on, and across it where slip angles
+    are taken; angle : slip angle (rad); cell, share : where that lies in the tables; still : load (N) besides what
+    accelerations move, load : with that; cosine, sine : of the angle by which it is steered.
+    """
+
+    start: np.ndarray
+    rate: np.ndarray
+    along: np.ndarray
+    aside: np.ndarray
+    angle: np.ndarray
+    cell: np.ndarray
+    share: np.ndarray
+    still: np.ndarray
+    load: np.ndarray
+    cosine: np.ndarray
+    sine: np.ndarray
+
+
+KNOWN = len(Wheels._fields)
+"""Numbers that are known of a wheel."""
+
+
+@inlined
+def wheels_of(rows):
+    """The ``Wheels`` whose numbers are these rows (11, W), in compiled functions; in Python ``Wheels(*rows)``."""
+    return Wheels(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7], rows[8], rows[9], rows[10])
+
+
+class Frame(NamedTuple):
+    """What the rounds of a step have in common.
+
+    along, across, press (W, n) : see ``plane_chain.rows``, and load by accelerations; units (U, 2) : see ``headings``;
+    mass (n, n) : the factor of the mass matrix; right (n,) : forces besides the tyres' ones; out, out_before, off
+    (n,) : accelerations that a round gave, that the one before gave, and by how much that was off.
+    """
+
+    wheels: Wheels
+    surfaces: Surfaces
+    report: Report
+    along: np.ndarray
+    across: np.ndarray
+    press: np.ndarray
+    units: np.ndarray
+    mass: np.ndarray
+    right: np.ndarray
+    out: np.ndarray
+    out_before: np.ndarray
+    off: np.ndarray
