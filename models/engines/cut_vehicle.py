@@ -1,7 +1,8 @@
 """A vehicle cut at its wheels in an engine: what is the same in every one.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
-forces of ``models.multibody.cut_kernel``. The reference solves the written-out equations instead.
+forces of ``models.multibody.cut_kernel``. "reference" solves the written-out equations instead, around the same forces;
+"plain" shares nothing with any of them (``models.multibody.plain``), and takes some seconds for each of the run.
 """
 
 from dataclasses import dataclass, replace
@@ -10,15 +11,18 @@ import numpy as np
 
 from models.core.errors import Refused, RunFailed
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
 from models.multibody.cut_table import Drive, table
+from models.multibody.plain.hubs import PlainHubs
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
 ENGINES = ("reference", "exudyn", "mujoco")
+PLAIN = "plain"
+"""The independent reference, which runs where it is named."""
 UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
@@ -76,7 +80,14 @@ class HubModel:
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         driven = Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces)
-        self.model = Written(driven) if engine == "reference" else free_model(engine, driven)
+        self.plain = PlainHubs(vehicle, drive, step) if engine == PLAIN else None
+        self.model: FreeModel = (
+            Plain(engine, self.plain.acceleration)
+            if self.plain
+            else Written(driven)
+            if engine == "reference"
+            else free_model(engine, driven)
+        )
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -100,6 +111,8 @@ class HubModel:
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
+        if self.plain:
+            return HubRun(times, states, *self.plain.report(times, states))
         rows, vehicle = len(times), self.vehicle
         inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
         wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
@@ -127,4 +140,4 @@ def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
 
 
 build = HubModel
-"""A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
+"""A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""

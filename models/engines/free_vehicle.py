@@ -18,6 +18,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
+from models.multibody.plain.march import Acceleration, march
 from models.vehicles.spatial import SpatialVehicle
 
 ENGINES = ("exudyn", "mujoco")
@@ -81,6 +82,22 @@ class FreeModel(ABC):
         guard(self.ENGINE, times, states, steps * step)
         positions, rates = np.split(states, 2, axis=1)
         return SpatialRun(times, positions, rates, {"steps": steps, "force calls": 4 * steps})
+
+
+class Plain(FreeModel):
+    """The independent reference: plain equations of a vehicle, marched in plain numpy; it has no table."""
+
+    def __init__(self, engine: str, equations: Acceleration) -> None:
+        """equations : accelerations (n,) at a time (s), positions and rates (n,); engine : what a run is called."""
+        self.ENGINE, self.equations = engine, equations  # type: ignore[misc]
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        return self.equations(t, q, v)
+
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; not finite from where it fails."""
+        return march(self.equations, q, v, steps, step)
 
 
 def free_model(engine: str, driven: Driven) -> FreeModel:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from models.multibody.plain.march import march
 from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, Motion
 from models.multibody.plain.parts import Parts
 from models.multibody.plain.statics import held_at_rest
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
 LEANS = [ROLL, PITCH]
 WRENCH = 6
+REPORTED = ("inside", "wrenches", "moments")
 
 
 class State(NamedTuple):
@@ -67,9 +67,10 @@ class PlainHubs:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
         return self.at(t, q, v).acceleration
 
-    def march(self, q: np.ndarray, v: np.ndarray, steps: int) -> np.ndarray:
-        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each."""
-        return march(self.acceleration, q, v, steps, self.step)
+    def report(self, times: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces (m, p) of springs and bars, wrenches (m, h, 6) and moments (m, 2) of states (m, 2 n) at times (m,)."""
+        rows = [self.at(float(t), *np.split(state, 2)) for t, state in zip(times, states, strict=True)]
+        return tuple(np.array([getattr(row, name) for row in rows]) for name in REPORTED)  # type: ignore[return-value]
 
     def _act(self, motion: Motion, row: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces (n,) of all hubs, and their wrenches (h, 6)."""

@@ -11,17 +11,20 @@ from models.core.discretisation import Estimate, Series, by_cells, by_steps, siz
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.spatial_protocol import SpatialRun
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
+from models.multibody.plain.rolling import PlainRolling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial_linear import mass
 
+REFERENCE = "reference"
+"""The independent reference: plain equations that share no force with the engines; half a minute for every second."""
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
 UPRIGHT = 0.5
@@ -105,7 +108,7 @@ class Drive:
 
 
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
-    """A manoeuvre, the first where none is named, in "exudyn" or "mujoco"; the result's detail is the Drive.
+    """A manoeuvre, the first where none is named, in "exudyn", "mujoco" or "reference"; its detail is the Drive.
 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
@@ -241,7 +244,9 @@ def _later(handling: Handling, since: float) -> Handling:
 
 
 def build(engine: str, handling: Handling) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco"."""
+    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"."""
+    if engine == REFERENCE:
+        return Plain(engine, PlainRolling(handling).acceleration)
     return free_model(engine, driven_by(handling))
 
 
@@ -265,10 +270,7 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
 
 def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float = 0.0) -> Drive:
     """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
-    count, tyres = len(run.times), len(handling.vehicle.tyres)
-    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
-    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
-    at.reports(handling.numbers, run.times, *states, report, ledger)
+    report, ledger = _reports(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     drive = Drive(handling, run, report, ledger, seconds)
@@ -276,6 +278,17 @@ def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float =
     _check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return drive
+
+
+def _reports(handling: Handling, run: SpatialRun, engine: str) -> tuple[np.ndarray, np.ndarray]:
+    """Tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; the reference has its own."""
+    if engine == REFERENCE:
+        return PlainRolling(handling).report(run.times, run.positions, run.rates)
+    count, tyres = len(run.times), len(handling.vehicle.tyres)
+    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
+    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
+    at.reports(handling.numbers, run.times, *states, report, ledger)
+    return report, ledger
 
 
 def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:
