@@ -1,5 +1,7 @@
 """The surface under a vehicle that may leave its lane, and what its driver does over time, in plain numpy."""
 
+from itertools import pairwise
+
 import numpy as np
 
 Knots = tuple[tuple[float, float], ...]
@@ -17,8 +19,8 @@ def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray
 
 
 def driven(knots: Knots, t: float) -> tuple[float, float]:
-    """Value and rate of a control at a time (s): it rests at every knot; between, 6 u^5 - 15 u^4 + 10 u^3 of its rise."""
-    for (start, low), (end, high) in zip(knots, knots[1:], strict=False):
+    """Value and rate of a control at a time (s): at rest at knots; between, 6 u^5 - 15 u^4 + 10 u^3 of the rise."""
+    for (start, low), (end, high) in pairwise(knots):
         if start < t < end:
             u = (t - start) / (end - start)
             part, slope = ((6.0 * u - 15.0) * u + 10.0) * u**3, 30.0 * (u - u * u) ** 2

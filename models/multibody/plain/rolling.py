@@ -10,7 +10,7 @@ import numpy as np
 
 from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
 from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
-from models.multibody.plain.parts import Parts, Travels
+from models.multibody.plain.parts import Parts
 from models.multibody.plain.road import driven, surface
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
@@ -61,12 +61,11 @@ class State(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Where tyres touch the road, and how.
+    """Where tyres touch the road, and how they press on it.
 
     down (w, 3) : arms from the wheels' centres to the contacts (m); along, across, normal (w, 3) : axes on the road;
     axle (w, 3); loading (w, 3) : forces of the loads; load (w,) along the normal, N; elastic (w,) : its spring's part
-    upwards; damping_power (w,), W; turning (w, 3) : of the rolling wheels (rad/s); sliding (w, 3) : velocities on the
-    road (m/s); spin (w,) : beside what carries the wheel (rad/s); beside (w,) : that beside the chassis.
+    upwards; damping_power (w,), W.
     """
 
     down: np.ndarray
@@ -78,10 +77,6 @@ class Contact(NamedTuple):
     load: np.ndarray
     elastic: np.ndarray
     damping_power: np.ndarray
-    turning: np.ndarray
-    sliding: np.ndarray
-    spin: np.ndarray
-    beside: np.ndarray
 
 
 class PlainRolling:
@@ -122,88 +117,91 @@ class PlainRolling:
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
         """Everything at a time (s), positions and rates (n,)."""
-        motion, controls = self.bodies.move(q, v), self.handling.controls
+        motion = self.bodies.move(q, v)
         mass, force = self.bodies.inertia(motion, self.handling.gravity)
         travels = self.parts.travels(motion, q, v)
         spring, other = self.parts.forces(travels, self.held)
-        force -= (spring + other) @ travels.gradient
-        steer, steering = driven(controls.steer, t)
-        points = motion.at(self._points)
-        contact = self._touch(motion, points, self._steered * steer, self._steered * steering, v)
-        creep, slides = self._creep(contact)
-        by_tyres, moments = self._press(motion, points, contact, creep)
-        torques = self._torques(t, contact.beside)
+        by_tyres, report, ledger = self._roll(t, motion, v)
         outside, power = self._outside(t, motion)
-        force += by_tyres + self._turn_wheels(motion, contact.axle, torques) + outside
-        report = TyreReport(
-            press=contact.load,
-            fx=creep[:, 0],
-            fy=creep[:, 1],
-            mz=creep[:, 2],
-            slip_x=slides[:, 0],
-            slip_y=slides[:, 1],
-            tread=slides[:, 3],
-            turn=slides[:, 2],
-            power=(creep * slides[:, :3]).sum(1),
-            steer_moment=moments[:, 2],
-            angle=self._steered * steer,
-            spin_torque=torques,
+        force += by_tyres + outside - (spring + other) @ travels.gradient
+        energy = 0.5 * (self.held + spring) @ travels.travel
+        whole = ledger._replace(
+            potential=float(ledger.potential + energy),
+            dissipated=float(ledger.dissipated + power - other @ travels.rate),
         )
-        ledger = self._account(travels, spring, other, contact)
-        ledger = ledger._replace(
-            dissipated=ledger.dissipated + power,
-            torque_power=float(torques @ contact.beside),
-            steer_power=-float(self._steered @ moments[:, 2]) * steering,
-        )
-        return State(np.linalg.solve(mass, force), report, ledger)
+        return State(np.linalg.solve(mass, force), report, whole)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), positions and rates (n,)."""
         return self.at(t, q, v).acceleration
 
     def report(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Reports (m, w, 12) of tyres and ledgers (m, 4) of states (m, n) at times (m,), in the order of their fields."""
+        """Reports (m, w, 12) of tyres and ledgers (m, 4), fields in their order, of states (m, n) at times (m,)."""
         states = [self.at(float(t), *state) for t, *state in zip(times, q, v, strict=True)]
         tyres = np.array([np.column_stack(state.tyres) for state in states])
         return tyres, np.array([state.ledger for state in states])
 
-    def _touch(
-        self, motion: Motion, points: np.ndarray, steer: np.ndarray, steering: np.ndarray, v: np.ndarray
-    ) -> Contact:
-        """How tyres press, where they touch and how they slide; steer (rad) and its rate, (w,)."""
+    def _roll(self, t: float, motion: Motion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
+        steer, steering = driven(self.handling.controls.steer, t)
+        points, angle = motion.at(self._points), self._steered * steer
+        contact = self._touch(motion, points, angle)
+        slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
+        creep = self._creep(contact, slides)
+        force, moments = self._press(motion, points, contact, creep)
+        torques = self._torques(t, beside)
+        force += self._turn_wheels(motion, contact.axle, torques)
+        power = (creep * slides[:, :3]).sum(1)
+        slip = dict(zip(("slip_x", "slip_y", "turn", "tread"), slides.T, strict=True))
+        by_creep = dict(zip(("fx", "fy", "mz"), creep.T, strict=True))
+        report = TyreReport(
+            press=contact.load,
+            power=power,
+            steer_moment=moments[:, 2],
+            angle=angle,
+            spin_torque=torques,
+            **slip,
+            **by_creep,
+        )
+        ledger = Ledger(
+            float((0.5 * contact.elastic**2 / self._stiffness).sum()),
+            float(contact.damping_power.sum()),
+            float(torques @ beside),
+            -float(self._steered @ moments[:, 2]) * steering,
+        )
+        return force, report, ledger
+
+    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> Contact:
+        """How tyres press, and where they touch; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
         elastic = np.maximum(self.loads + self._stiffness * (height - (place[:, 2] - self._height)), 0.0)
         rising = (speed * upwards).sum(1)
         load = np.where(elastic > 0.0, np.maximum(elastic - self._damping * rising, 0.0), 0.0)
-        axle = self._axles(motion, steer)
-        long = _length(upwards)
+        axle, long = self._axles(motion, steer), _length(upwards)
         normal = upwards / long[:, None]
         along = _cross(axle, normal)
         flat = _length(along)
         along /= flat[:, None]
         radius = np.maximum(place[:, 2] - height, 0.0) / (long * flat)
         down = (axle * (axle * normal).sum(1)[:, None] - normal) * (radius / flat)[:, None]
-        turning = np.array([motion.turning(row) for row in self._points.rows])
-        held = ((motion.turning(self._chassis) - turning) * axle).sum(1)
-        spin = np.where(self._rotors >= 0, v[self._rotors], held)
+        pressing = upwards * load[:, None]
+        across = _cross(normal, along)
+        return Contact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
+
+    def _slide(
+        self, motion: Motion, points: np.ndarray, contact: Contact, steering: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside the chassis, rad/s; steering (w,), rad/s."""
+        axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
+        locked = ((motion.turning(self._chassis) - turning) * axle).sum(1)
+        spin = np.where(self._rotors >= 0, v[self._rotors], locked)
         whole = turning + axle * spin[:, None] + np.multiply.outer(steering, UP)
-        return Contact(
-            down,
-            along,
-            _cross(normal, along),
-            normal,
-            axle,
-            upwards * load[:, None],
-            load * long,
-            elastic,
-            (load - elastic) * rising,
-            whole,
-            speed + _cross(whole, down),
-            spin,
-            spin - held,
-        )
+        sliding = points[:, RATE] + _cross(whole, contact.down)
+        tread = -spin * (_cross(axle, contact.down) * contact.along).sum(1)
+        on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
+        return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
 
     def _axles(self, motion: Motion, steer: np.ndarray) -> np.ndarray:
         """Axles (w, 3), to the left of their wheels: steered and leaning in the carrier's axes."""
@@ -212,21 +210,12 @@ class PlainRolling:
         turned: np.ndarray = axes @ motion.axes(self._carrier)[PLACE].T
         return turned
 
-    def _creep(self, contact: Contact) -> tuple[np.ndarray, np.ndarray]:
-        """Creep forces and moments (w, 3), and slides (w, 4) as ``bristles`` takes them."""
-        of, tread = self.handling.tyres, _cross(contact.axle, contact.down)
-        slides = np.column_stack(
-            [
-                (contact.sliding * contact.along).sum(1),
-                (contact.sliding * contact.across).sum(1),
-                (contact.turning * contact.normal).sum(1),
-                -contact.spin * (tread * contact.along).sum(1),
-            ]
-        )
-        ones = np.ones(len(slides))
+    def _creep(self, contact: Contact, slides: np.ndarray) -> np.ndarray:
+        """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
+        of, ones = self.handling.tyres, np.ones(len(slides))
         half = np.sqrt(self._radius * contact.load / self._stiffness)
         patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
-        return tyre_forces(patch, slides, of.cells), slides
+        return tyre_forces(patch, slides, of.cells)
 
     def _press(
         self, motion: Motion, points: np.ndarray, contact: Contact, creep: np.ndarray
@@ -278,11 +267,6 @@ class PlainRolling:
             total += point[FIRST:] @ pushed
             power += float(point[RATE] @ pushed)
         return total, power
-
-    def _account(self, travels: Travels, spring: np.ndarray, other: np.ndarray, contact: Contact) -> Ledger:
-        """Energy of springs and tyres, and power of dampers and tyres' dampers."""
-        energy = 0.5 * (self.held + spring) @ travels.travel + (0.5 * contact.elastic**2 / self._stiffness).sum()
-        return Ledger(float(energy), float(contact.damping_power.sum() - other @ travels.rate), 0.0, 0.0)
 
 
 def _length(rows: np.ndarray) -> np.ndarray:
