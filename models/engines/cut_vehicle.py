@@ -6,6 +6,7 @@ forces of ``models.multibody.cut_kernel``. "reference" solves the written-out eq
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
 from models.multibody.cut_table import Drive, table
-from models.multibody.plain.hubs import PlainHubs
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
+
+if TYPE_CHECKING:
+    from models.multibody.plain.hubs import PlainHubs
 
 ENGINES = ("reference", "exudyn", "mujoco")
 PLAIN = "plain"
@@ -79,15 +82,13 @@ class HubModel:
         check_step(engine, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        driven = Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces)
-        self.plain = PlainHubs(vehicle, drive, step) if engine == PLAIN else None
-        self.model: FreeModel = (
-            Plain(engine, self.plain.acceleration)
-            if self.plain
-            else Written(driven)
-            if engine == "reference"
-            else free_model(engine, driven)
-        )
+        self.plain = _plain(vehicle, drive, step) if engine == PLAIN else None
+        self.model = self._in_engine(Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
+
+    def _in_engine(self, driven: Driven) -> FreeModel:
+        if self.plain:
+            return Plain(self.engine, self.plain.acceleration)
+        return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -124,6 +125,12 @@ class HubModel:
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()
+
+
+def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
+    from models.multibody.plain.hubs import PlainHubs
+
+    return PlainHubs(vehicle, drive, step)
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:

@@ -11,15 +11,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from models.core.errors import InputError
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
-from models.multibody.plain.march import Acceleration, march
 from models.vehicles.spatial import SpatialVehicle
+
+if TYPE_CHECKING:
+    from models.multibody.plain.march import Acceleration
 
 ENGINES = ("exudyn", "mujoco")
 
@@ -87,7 +89,7 @@ class FreeModel(ABC):
 class Plain(FreeModel):
     """The independent reference: plain equations of a vehicle, marched in plain numpy; it has no table."""
 
-    def __init__(self, engine: str, equations: Acceleration) -> None:
+    def __init__(self, engine: str, equations: "Acceleration") -> None:
         """equations : accelerations (n,) at a time (s), positions and rates (n,); engine : what a run is called."""
         self.ENGINE, self.equations = engine, equations  # type: ignore[misc]
 
@@ -97,6 +99,8 @@ class Plain(FreeModel):
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; not finite from where it fails."""
+        from models.multibody.plain.march import march
+
         return march(self.equations, q, v, steps, step)
 
 

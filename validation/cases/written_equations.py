@@ -5,8 +5,8 @@ from pathlib import Path
 from models.multibody.plain.statics import held_at_rest
 from models.vehicles.free_vehicle import CARRIER
 from models.vehicles.spatial_linear import preloads
+from validation.common.checks import off
 from validation.common.rows import CaseAnswer, Row, System, at_most
-from validation.faults.campaign import off
 from validation.spatial.written_equations import (
     bristles_gap,
     cut_cars,

@@ -19,7 +19,8 @@ from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.profile_contact import N_Y, Y_, Z_
 from models.rail.wheelset import CHOSEN
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
 Law = Literal["linear", "fastsim"]

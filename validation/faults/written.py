@@ -18,7 +18,8 @@ from models.multibody.cut_table import Drive
 from models.systems.handling.run import REFERENCE, build
 from models.vehicles.spatial import SpatialVehicle
 from models.vehicles.spatial_linear import Preloads
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.faults.tyres import ALL, tyre
 from validation.spatial.written_equations import STEP, cut_cars, cut_state, drives, rolling_cars, rolling_states

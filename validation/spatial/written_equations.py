@@ -25,7 +25,7 @@ from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
-from validation.faults.campaign import off
+from validation.common.checks import off
 from validation.spatial.cars import anywhere, static, twin
 
 SEED, STEP, SPEED = 41, 1e-3, 22.0

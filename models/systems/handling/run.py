@@ -3,6 +3,7 @@
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,14 @@ from models.engines.spatial_protocol import SpatialRun
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
-from models.multibody.plain.rolling import PlainRolling
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import HandlingScene
 from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial_linear import mass
+
+if TYPE_CHECKING:
+    from models.multibody.plain.rolling import PlainRolling
 
 REFERENCE = "reference"
 """The independent reference: plain equations that share no force with the engines; half a minute for every second."""
@@ -246,8 +249,14 @@ def _later(handling: Handling, since: float) -> Handling:
 def build(engine: str, handling: Handling) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"."""
     if engine == REFERENCE:
-        return Plain(engine, PlainRolling(handling).acceleration)
+        return Plain(engine, _plain(handling).acceleration)
     return free_model(engine, driven_by(handling))
+
+
+def _plain(handling: Handling) -> "PlainRolling":
+    from models.multibody.plain.rolling import PlainRolling
+
+    return PlainRolling(handling)
 
 
 def driven_by(handling: Handling) -> Driven:
@@ -283,7 +292,7 @@ def read(handling: Handling, run: SpatialRun, engine: str = "", seconds: float =
 def _reports(handling: Handling, run: SpatialRun, engine: str) -> tuple[np.ndarray, np.ndarray]:
     """Tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; the reference has its own."""
     if engine == REFERENCE:
-        return PlainRolling(handling).report(run.times, run.positions, run.rates)
+        return _plain(handling).report(run.times, run.positions, run.rates)
     count, tyres = len(run.times), len(handling.vehicle.tyres)
     report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
     states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
