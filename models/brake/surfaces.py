@@ -53,7 +53,7 @@ class Surfaces(NamedTuple):
 
 def surfaces(wheels: int) -> Surfaces:
     """Of so many wheels, the first table under all of them, whose tyres do not lag as long as nobody says so."""
-    return Surfaces(*np.zeros((3, wheels)), np.full(wheels, math.nan))
+    return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
 @inlined

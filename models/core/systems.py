@@ -3,6 +3,7 @@
 A system's folder is a package with
 
 - ``ENGINES`` in its ``__init__``: the implementations among which ``--engine`` chooses, none if no engine computes it;
+  ``ON_REQUEST`` beside it, if there are any that are so slow that they run only where they are named;
 - ``scene``: ``build(table, file, folder)``, the checked scene of nested tables;
 - ``plan``: ``check(scene, engines)``, which refuses what cannot be run, and ``describe(scene)``, the plan as text;
 - ``effects``: a package that holds effects, where scenes of the system may name any.
@@ -49,6 +50,12 @@ class System:
     def engines(self) -> tuple[str, ...]:
         """Implementations among which ``--engine`` chooses."""
         engines: tuple[str, ...] = import_module(self.package).ENGINES
+        return engines
+
+    @property
+    def on_request(self) -> tuple[str, ...]:
+        """Further implementations that run where ``--engine`` names them, and not with all."""
+        engines: tuple[str, ...] = getattr(import_module(self.package), "ON_REQUEST", ())
         return engines
 
 

@@ -1,17 +1,19 @@
 """A vehicle cut at its wheels in an engine: what is the same in every one.
 
 In an engine it is a free vehicle (``free_vehicle``), of which springs, hub forces and stabilisers are the compiled
-forces of ``models.multibody.cut_kernel``. The reference solves the written-out equations instead.
+forces of ``models.multibody.cut_kernel``. "reference" solves the written-out equations instead, around the same forces;
+"plain" shares nothing with any of them (``models.multibody.plain``), and takes some seconds for each of the run.
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
@@ -19,7 +21,12 @@ from models.multibody.cut_table import Drive, table
 from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
+if TYPE_CHECKING:
+    from models.multibody.plain.hubs import PlainHubs
+
 ENGINES = ("reference", "exudyn", "mujoco")
+PLAIN = "plain"
+"""The independent reference, which runs where it is named."""
 UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
@@ -74,8 +81,13 @@ class HubModel:
         check_step(engine, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        driven = Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces)
-        self.model = Written(driven) if engine == "reference" else free_model(engine, driven)
+        self.plain = _plain(vehicle, drive, step) if engine == PLAIN else None
+        self.model = self._in_engine(Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
+
+    def _in_engine(self, driven: Driven) -> FreeModel:
+        if self.plain:
+            return Plain(self.engine, self.plain.acceleration)
+        return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
@@ -99,6 +111,9 @@ class HubModel:
 
     def reported(self, times: np.ndarray, states: np.ndarray) -> HubRun:
         """A run with the forces of its states."""
+        if self.plain:
+            inside, wrenches, moments = self.plain.report(times, states)
+            return HubRun(times, states, elements=inside, wrenches=wrenches, moments=moments)
         rows, vehicle = len(times), self.vehicle
         inside, moments = np.empty((rows, len(vehicle.elements))), np.empty((rows, 2))
         wrenches = np.empty((rows, len(vehicle.hubs), WRENCH))
@@ -110,6 +125,12 @@ class HubModel:
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()
+
+
+def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
+    from models.multibody.plain.hubs import PlainHubs
+
+    return PlainHubs(vehicle, drive, step)
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:
@@ -126,4 +147,4 @@ def _check(engine: str, vehicle: CutVehicle, drive: Drive, rows: int) -> None:
 
 
 build = HubModel
-"""A driven cut vehicle in "reference", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""
+"""A driven cut vehicle in "reference", "plain", "exudyn" or "mujoco"; step and duration in s. Raises Refused."""

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from models.core.errors import InputError
 from models.core.trajectory import Trajectory
 from models.engines.protocol import guard
 from models.vehicles.spatial import SpatialVehicle
+
+if TYPE_CHECKING:
+    from models.multibody.plain.march import Acceleration
 
 ENGINES = ("exudyn", "mujoco")
 
@@ -80,6 +83,24 @@ class FreeModel(ABC):
         states, times = self.march(q, v, steps, step), step * np.arange(steps + 1)
         guard(self.ENGINE, times, states, steps * step)
         return Trajectory(times, states, counts={"steps": steps, "force calls": 4 * steps})
+
+
+class Plain(FreeModel):
+    """The independent reference: plain equations of a vehicle, marched in plain numpy; it has no table."""
+
+    def __init__(self, engine: str, equations: "Acceleration") -> None:
+        """equations : accelerations (n,) at a time (s), positions and rates (n,); engine : what a run is called."""
+        self.ENGINE, self.equations = engine, equations  # type: ignore[misc]
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        return self.equations(t, q, v)
+
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+        """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; not finite from where it fails."""
+        from models.multibody.plain.march import march
+
+        return march(self.equations, q, v, steps, step)
 
 
 def free_model(engine: str, driven: Driven) -> FreeModel:

@@ -186,8 +186,8 @@ def report(numbers, times, states, inside, wrenches, moments):
     """Fill what ``forces`` tells of states (m, 2 n) at times (m,): a row of each for every one."""
     n = states.shape[1] // 2
     m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
-    out[:] = 0.0
     for i in range(len(times)):
+        out[:] = 0.0  # what enforces an angle is found from all joint forces of this state
         forces(numbers, times[i], states[i, :n], states[i, n:], m, out, inside[i], wrenches[i], moments[i])
 
 

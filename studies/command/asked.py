@@ -108,8 +108,9 @@ def engines_of(name: str | None, system: str) -> tuple[str, ...]:
         return engines
     if ":" in name:
         return _outside(name, system)
-    if name not in engines:
-        raise InputError("--engine", "", name, "no such engine", (*engines, "all"))
+    named = (*engines, *KNOWN[system].on_request)
+    if name not in named:
+        raise InputError("--engine", "", name, "no such engine", (*named, "all"))
     return (name,)
 
 

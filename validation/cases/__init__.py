@@ -61,6 +61,7 @@ CASES = (
     "wheelset",
     "contact_bridges",
     "handling",
+    "written_equations",
     "braking_stop",
     "braking_limits",
     "braking_port",

@@ -15,10 +15,10 @@ from models.rail.limit_cycle import Orbit, attained, beside, refined, solved
 from models.rail.linear import NoCriticalSpeed, critical_speed, klingel
 from models.rail.wheelset import CHOSEN, Wheelset
 from models.systems.wheelset.of_scene import IMPLEMENTATIONS, implementation
+from validation.common.checks import off
 from validation.common.rows import Observed, Row, System, Table, behaves
 from validation.contact.drawn_wheelsets import HEAVY, SEED, STIFF, Speeds, criticals, drawn
 from validation.faults import wheelset as faults
-from validation.faults.campaign import off
 
 TITLE = "A wheelset on straight track"
 SYSTEM: System = "rolling-vehicle"

@@ -7,6 +7,7 @@ it is (``engine("mujoco")``) and one with a fault in it. A run that is refused o
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -146,3 +147,8 @@ def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
 def by_hand(settings: Settings) -> Settings:
     """The same step and duration for the reference's Runge-Kutta."""
     return replace(settings, integrator=RECOMMENDED["reference"])
+
+
+def off(found: Any, wanted: Any) -> float:
+    """Largest difference by the largest."""
+    return float(np.abs(np.asarray(found) - wanted).max() / np.abs(wanted).max())

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from models.core.errors import RunFailed
 from validation.common.rows import Observed, Row, System, Table
 from validation.faults.patches import Patch
@@ -140,8 +138,3 @@ class Campaign:
 def seen(record: Record) -> list[str]:
     """Checks that see a fault."""
     return [name for name, ratio in record["ratios"].items() if not ratio <= 1.0]
-
-
-def off(found: Any, wanted: Any) -> float:
-    """Largest difference by the largest."""
-    return float(np.abs(np.asarray(found) - wanted).max() / np.abs(wanted).max())

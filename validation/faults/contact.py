@@ -14,7 +14,8 @@ from models.contact.inputs import Array
 from models.contact.linear_theory import forces
 from models.contact.material import STEEL, Material, Pair
 from models.contact.normal_problem import NormalSolution, centres
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
 PAIR = Pair()

@@ -10,7 +10,8 @@ from models.engines.cut_vehicle import HubModel
 from models.multibody.cut_kernel import WRENCH
 from models.multibody.cut_table import Drive
 from models.vehicles.cut_vehicle import CutVehicle
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import by_jacobians, r19, static
 

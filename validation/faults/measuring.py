@@ -15,7 +15,8 @@ from models.road import iso8608
 from models.sensors import rigid_body_motion as body
 from models.sensors.rotations import from_cardan, matrix
 from models.sensors.sensor_array import SensorArray, in_space, sensor_array
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
 LOAD = np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0])

@@ -9,7 +9,8 @@ from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.systems.handling.run import bodies_energy, build
 from models.vehicles.vehicle_file import load_vehicle
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 from validation.spatial.cars import cornering_error, mirrored
 

@@ -18,7 +18,8 @@ from models.rail.energy import energies, rates_and_powers
 from models.rail.equations import Equations
 from models.rail.linear import klingel
 from models.rail.wheelset import CHOSEN
-from validation.faults.campaign import Campaign, Check, Fault, off
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Context, Patch, attribute, with_globals
 
 Law = Literal["linear", "fastsim"]

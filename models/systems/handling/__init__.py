@@ -7,3 +7,5 @@ runs through the contact; forces act on the tyre, so that they oppose it.
 """
 
 ENGINES = ("exudyn", "mujoco")
+ON_REQUEST = ("reference",)
+"""The independent reference: plain equations, half a minute of time for every second of a manoeuvre."""

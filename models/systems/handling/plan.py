@@ -40,6 +40,7 @@ def describe(scene: HandlingScene) -> str:
         ),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
+        _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
     ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)

@@ -3,6 +3,7 @@
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
 from models.multibody.numbers import GRAVITY, Control, Handling
@@ -22,6 +23,11 @@ from models.tyre.bristles import SLOW
 from models.vehicles.free_vehicle import SWAY, chassis_of
 from models.vehicles.spatial_linear import mass
 
+if TYPE_CHECKING:
+    from models.multibody.plain.rolling import PlainRolling
+
+REFERENCE = "reference"
+"""The independent reference: plain equations that share no force with the engines; half a minute for every second."""
 LIMIT = 2.78
 """Step times rate up to which the classical Runge-Kutta method damps what is damped."""
 UPRIGHT = 0.5
@@ -105,7 +111,7 @@ class Drive:
 
 
 def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: bool = False) -> Result:
-    """A manoeuvre, the first where none is named, in "exudyn" or "mujoco"; the result's detail is the Drive.
+    """A manoeuvre, the first where none is named, in "exudyn", "mujoco" or "reference"; its detail is the Drive.
 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
@@ -241,8 +247,16 @@ def _later(handling: Handling, since: float) -> Handling:
 
 
 def build(engine: str, handling: Handling) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco"."""
+    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"."""
+    if engine == REFERENCE:
+        return Plain(engine, _plain(handling).acceleration)
     return free_model(engine, driven_by(handling))
+
+
+def _plain(handling: Handling) -> "PlainRolling":
+    from models.multibody.plain.rolling import PlainRolling
+
+    return PlainRolling(handling)
 
 
 def driven_by(handling: Handling) -> Driven:
@@ -265,10 +279,7 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
 
 def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
     """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
-    count, tyres = len(run.times), len(handling.vehicle.tyres)
-    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
-    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
-    at.reports(handling.numbers, run.times, *states, report, ledger)
+    report, ledger = _reports(handling, run, engine)
     if not np.isfinite(report).all():
         raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
     drive = Drive(handling, run, report, ledger, seconds)
@@ -276,6 +287,17 @@ def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float =
     _check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return drive
+
+
+def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:
+    """Tyres (m, w, REPORTED) and ledgers (m, LEDGER) of a run; the reference has its own."""
+    if engine == REFERENCE:
+        return _plain(handling).report(run.times, run.positions, run.rates)
+    count, tyres = len(run.times), len(handling.vehicle.tyres)
+    report, ledger = np.empty((count, tyres, at.REPORTED)), np.empty((count, at.LEDGER))
+    states = np.ascontiguousarray(run.positions), np.ascontiguousarray(run.rates)
+    at.reports(handling.numbers, run.times, *states, report, ledger)
+    return report, ledger
 
 
 def _check_upright(h: Handling, times: np.ndarray, positions: np.ndarray, engine: str) -> None:

@@ -1,0 +1,142 @@
+"""An elliptic patch of bristles that roll through it, in plain numpy: tractions as complex numbers, strip by strip.
+
+The law of ``models.tyre.bristles`` (Kalker's simplified theory, marched to second order) on a net that is made anew
+here. Pressure is parabolic. In a strip's own scale, tractions by the bound in its middle, a bristle runs from 1 to -1;
+without slip its traction p changes by -w per cell, w the rigid slip. Where it slides it keeps on the bound, and its
+angle to -w obeys psi' = -(|w| / g) sin psi: the tangent of the half angle shrinks by an exponential, taken as an
+eighth power. A slip that turns over a step counts a little after its middle.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+SLOW = 0.1
+"""Speed (m/s) of the tread below which slip is relative to it, and forces of both directions are mixed."""
+MARGIN = 1.0 + 2e-15
+"""A bound is a little more than itself where a traction on it is projected."""
+STILL = 1e-60
+"""Square of a rigid slip that turns no traction."""
+LONGEST = 50.0
+
+
+class Net(NamedTuple):
+    """Strips: place y / b, half length by a, share of the load per cell and height; cells: places of their centres and
+    of the middles of the steps to them, bounds there; ``peak``: pressure in the patch's middle times a b / N."""
+
+    y: np.ndarray
+    half: np.ndarray
+    share: np.ndarray
+    centre: np.ndarray
+    middle: np.ndarray
+    bound: np.ndarray
+    bound_between: np.ndarray
+    peak: float
+
+
+@cache
+def net(cells: int) -> Net:
+    """Strips of one width, an even number of at least ``cells``, with ``cells`` cells each."""
+    count = cells + cells % 2
+    y = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    centre = 1.0 - (2.0 * np.arange(cells) + 1.0) / cells
+    middle = 1.0 - 2.0 * np.arange(cells) / cells
+    middle[0] = 1.0 - 0.5 / cells
+    bound, half = 1.0 - centre**2, np.sqrt(1.0 - y**2)
+    share = (1.0 - y**2) * half
+    carried = share.sum() * bound.sum()
+    return Net(y, half, share / carried, centre, middle, bound, 1.0 - middle**2, cells * count / (4.0 * carried))
+
+
+class Patch(NamedTuple):
+    """Patches of tyres, (w,) each: half length and half width (m), load (N), mu, bristles' stiffness (N/m^3)."""
+
+    half_length: np.ndarray
+    half_width: np.ndarray
+    load: np.ndarray
+    mu: np.ndarray
+    stiffness: np.ndarray
+
+
+def tyre_forces(patch: Patch, slides: np.ndarray, cells: int) -> np.ndarray:
+    """fx, fy (N) and mz (N m) on tyres (w, 3).
+
+    slides (w, 4) : velocity on the road along and across (m/s), turning (1/s), speed of the tread (m/s).
+    """
+    tread = slides[:, 3]
+    ahead = _rolling(patch, slides[:, :3], np.maximum(np.abs(tread), SLOW), cells)
+    if (tread >= SLOW).all():
+        return ahead
+    mirrored = slides[:, :3] * np.array([-1.0, 1.0, -1.0])
+    behind = _rolling(patch, mirrored, np.maximum(np.abs(tread), SLOW), cells) * np.array([-1.0, 1.0, -1.0])
+    part = np.clip(0.5 + 0.5 * tread / SLOW, 0.0, 1.0)[:, None]
+    mixed: np.ndarray = part * ahead + (1.0 - part) * behind
+    return mixed
+
+
+def cornering_factor(cells: int) -> float:
+    """Cornering stiffness by a^2 b k, as the net sums it up, nearly 8/3: that of a bound that nothing reaches."""
+    ones = np.ones(1)
+    return -float(tyre_forces(Patch(ones, ones, ones, 1e9 * ones, ones), np.array([[0.0, 1.0, 0.0, 1.0]]), cells)[0, 1])
+
+
+def _rolling(patch: Patch, slides: np.ndarray, speed: np.ndarray, cells: int) -> np.ndarray:
+    """Forces (w, 3) of tyres that roll forwards."""
+    of = net(cells)
+    a, b = patch.half_length[:, None], patch.half_width[:, None]
+    grip, area = patch.mu * patch.load, patch.half_length * patch.half_width
+    stretch = 2.0 / cells * patch.stiffness * patch.half_length * area
+    gain = np.divide(stretch, of.peak * grip, out=np.zeros(len(a)), where=grip > 0.0)  # of a slip per bound and cell
+    x, y, spin = (slides / speed[:, None] * gain[:, None]).T[:, :, None]
+    across = of.half / (1.0 - of.y**2)
+    slip = (across * (x - spin * b * of.y) + 1j * across * y).ravel()
+    turning = 1j * (across * spin * a * of.half).ravel()
+    pulled, twisted = (part.reshape(len(a), -1) for part in _march(of, slip, turning))
+    force = grip[:, None] * of.share
+    moment = force * (a * of.half * twisted - b * of.y * pulled.real)
+    return np.column_stack([(force * pulled.real).sum(1), (force * pulled.imag).sum(1), moment.sum(1)])
+
+
+def _march(of: Net, slip: np.ndarray, turning: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums over all cells of tractions (complex) and of place times lateral traction, of many strips.
+
+    slip, turning : rigid slip per cell in a strip's middle, along + i across, and its change by the place.
+    """
+    traction, slides = _cut(-0.5 * (slip + turning * of.middle[0]), of.bound[0])
+    pulled, twisted, turn = traction.copy(), of.centre[0] * traction.imag, -2.0 * turning / len(of.centre)
+    for i in range(1, len(of.centre)):
+        w = slip + turning * of.middle[i]
+        traction, slides = _advance(traction, slides, w, turn, (of.bound[i], of.bound[i - 1], of.bound_between[i]))
+        pulled += traction
+        twisted += of.centre[i] * traction.imag
+    return pulled, twisted
+
+
+def _cut(traction: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+    """Tractions held to a bound, and which had to be."""
+    size = np.abs(traction)
+    beyond = size > bound
+    return np.where(beyond, bound * traction / np.where(beyond, size, 1.0), traction), beyond
+
+
+def _advance(
+    before: np.ndarray, slides: np.ndarray, w: np.ndarray, turn: np.ndarray, bounds: tuple[float, float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tractions in the next cell, and which bristles slide there; bounds: there, before, and between."""
+    bound, last, between = bounds
+    stuck = before - w
+    after, beyond = _cut(stuck, bound)
+    if not (slides & beyond).any():
+        return after, beyond
+    z = (np.abs(w.real) + np.abs(w.imag)) / (8.0 * between)
+    w = w + turn * np.minimum(np.minimum(0.5 * z, 0.12 + 0.2 * z), 0.47)
+    size = np.abs(w)
+    turns = slides & beyond & (size * size > STILL)
+    size = np.where(turns, size, 1.0)
+    h = np.minimum(size / (8.0 * between), LONGEST)
+    grown = (1.0 + h * (1.0 + h * (0.5 + h / 6.0))) ** 8
+    angle = before * np.conj(-w)
+    half = grown * (last * MARGIN * size + angle.real) + 1j * angle.imag
+    turned = bound * (-w / size) * half * half / np.maximum(np.abs(half) ** 2, 1e-300)
+    return np.where(turns, turned, after), beyond

@@ -1,0 +1,28 @@
+"""The surface under a vehicle that may leave its lane, and what its driver does over time, in plain numpy."""
+
+from itertools import pairwise
+
+import numpy as np
+
+Knots = tuple[tuple[float, float], ...]
+"""Times (s) and values."""
+
+
+def surface(waves: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Heights (m) and slopes along x and y, (w,) each, at places (m): the real part of a sum of plane waves.
+
+    waves (k, 4) : wave numbers along x and y (rad/m), amplitudes of cosine and sine (m).
+    """
+    amplitudes = waves[:, 2] - 1j * waves[:, 3]
+    each = amplitudes * np.exp(1j * (np.multiply.outer(x, waves[:, 0]) + np.multiply.outer(y, waves[:, 1])))
+    return each.real.sum(1), (1j * each).real @ waves[:, 0], (1j * each).real @ waves[:, 1]
+
+
+def driven(knots: Knots, t: float) -> tuple[float, float]:
+    """Value and rate of a control at a time (s): at rest at knots; between, 6 u^5 - 15 u^4 + 10 u^3 of the rise."""
+    for (start, low), (end, high) in pairwise(knots):
+        if start < t < end:
+            u = (t - start) / (end - start)
+            part, slope = ((6.0 * u - 15.0) * u + 10.0) * u**3, 30.0 * (u - u * u) ** 2
+            return low + (high - low) * part, (high - low) * slope / (end - start)
+    return next((value for time, value in reversed(knots) if time <= t), knots[0][1]), 0.0

@@ -1,0 +1,280 @@
+"""A car on brush tyres in plain numpy: what ``models.multibody.forces`` computes, all in the axes of space.
+
+Vectors of tyres are rows (w, 3). Everything comes from the vehicle, its tyres, controls, road and pushes; no table of
+numbers is read. The laws are those of the compiled forces, written down anew; the motion is that of ``motion``.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from models.multibody.plain.bristles import Patch, cornering_factor, tyre_forces
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
+from models.multibody.plain.parts import Parts
+from models.multibody.plain.road import driven, surface
+from models.multibody.plain.statics import held_at_rest
+from models.vehicles.free_vehicle import CARRIER, chassis_of, rotor
+from models.vehicles.spatial import Tyre
+
+if TYPE_CHECKING:
+    from models.multibody.numbers import Handling
+
+UP = np.array([0.0, 0.0, 1.0])
+NEXT, LAST = [1, 2, 0], [2, 0, 1]
+
+
+class TyreReport(NamedTuple):
+    """Of every tyre (w,): load (N), creep forces (N) and moment (N m) in its axes, slip along and across (m/s), speed
+    of the tread (m/s), turning (1/s), power (W), moment about the steering axis (N m), steer angle (rad), torque on the
+    wheel by brake and drive (N m)."""
+
+    press: np.ndarray
+    fx: np.ndarray
+    fy: np.ndarray
+    mz: np.ndarray
+    slip_x: np.ndarray
+    slip_y: np.ndarray
+    tread: np.ndarray
+    turn: np.ndarray
+    power: np.ndarray
+    steer_moment: np.ndarray
+    angle: np.ndarray
+    spin_torque: np.ndarray
+
+
+class Ledger(NamedTuple):
+    """Energy of springs and tyres (J); powers (W) of dampers, friction, drag and pushes; of brakes and drive; of the
+    steering on the wheels."""
+
+    potential: float
+    dissipated: float
+    torque_power: float
+    steer_power: float
+
+
+class State(NamedTuple):
+    """Accelerations (n,) at one state, and what acts there."""
+
+    acceleration: np.ndarray
+    tyres: TyreReport
+    ledger: Ledger
+
+
+class Contact(NamedTuple):
+    """Where tyres touch the road, and how they press on it.
+
+    down (w, 3) : arms from the wheels' centres to the contacts (m); along, across, normal (w, 3) : axes on the road;
+    axle (w, 3); loading (w, 3) : forces of the loads; load (w,) along the normal, N; elastic (w,) : its spring's part
+    upwards; damping_power (w,), W.
+    """
+
+    down: np.ndarray
+    along: np.ndarray
+    across: np.ndarray
+    normal: np.ndarray
+    axle: np.ndarray
+    loading: np.ndarray
+    load: np.ndarray
+    elastic: np.ndarray
+    damping_power: np.ndarray
+
+
+class PlainRolling:
+    """A car on the road, driven by its controls."""
+
+    def __init__(self, handling: "Handling") -> None:
+        self.handling, vehicle = handling, handling.vehicle
+        self.bodies = Bodies(vehicle)
+        self.parts = Parts(self.bodies, vehicle, CARRIER)
+        self.held, self.loads = held_at_rest(vehicle, CARRIER)
+        chassis = chassis_of(handling.given)
+        self._chassis, self._carrier = self.bodies.row[chassis.name], self.bodies.row[CARRIER]
+        self._middle = self.bodies.points([(chassis.name, chassis.position)])
+        self._drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
+        self._pushed = self.bodies.points([(push.body, push.point) for push in handling.pushes])
+        tyres = vehicle.tyres
+        self._points = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
+        self._rotors = np.array([self.bodies.index(rotor(tyre.name), "ry") for tyre in tyres])
+        self._height, self._stiffness, self._damping = (
+            np.array(column) for column in zip(*((t.point[2], t.stiffness, t.damping) for t in tyres), strict=True)
+        )
+        sunk = self.loads / self._stiffness
+        self._radius = self._height + sunk
+        sides = {force.name: force.stiffness for force in handling.given.side_forces}
+        cornering = np.array([sides[tyre.name] for tyre in tyres])
+        of = handling.tyres
+        self._bristles = cornering / (cornering_factor(of.cells) * self._radius * sunk * of.half_width)
+        self._leans = of.inclination * np.sign([tyre.point[1] for tyre in tyres])
+        self._shares(tyres)
+
+    def _shares(self, tyres: tuple[Tyre, ...]) -> None:
+        """Shares of steering, brake and drive of every tyre: those of an axle share evenly, and so do axles behind."""
+        axles, controls = np.array([tyre.axle for tyre in tyres]), self.handling.controls
+        beside, behind, front = np.array([np.sum(axles == axle) for axle in axles]), max(axles.max(), 1), axles == 0
+        self._steered = front.astype(float)
+        self._braked = np.where(front, controls.front_brake, (1.0 - controls.front_brake) / behind) / beside
+        self._driven = np.where(front, controls.front_drive, (1.0 - controls.front_drive) / behind) / beside
+
+    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
+        """Everything at a time (s), positions and rates (n,)."""
+        motion = self.bodies.move(q, v)
+        mass, force = self.bodies.inertia(motion, self.handling.gravity)
+        travels = self.parts.travels(motion, q, v)
+        spring, other = self.parts.forces(travels, self.held)
+        by_tyres, report, ledger = self._roll(t, motion, v)
+        outside, power = self._outside(t, motion)
+        force += by_tyres + outside - (spring + other) @ travels.gradient
+        energy = 0.5 * (self.held + spring) @ travels.travel
+        whole = ledger._replace(
+            potential=float(ledger.potential + energy),
+            dissipated=float(ledger.dissipated + power - other @ travels.rate),
+        )
+        return State(np.linalg.solve(mass, force), report, whole)
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,)."""
+        return self.at(t, q, v).acceleration
+
+    def report(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Reports (m, w, 12) of tyres and ledgers (m, 4), fields in their order, of states (m, n) at times (m,)."""
+        states = [self.at(float(t), *state) for t, *state in zip(times, q, v, strict=True)]
+        tyres = np.array([np.column_stack(state.tyres) for state in states])
+        return tyres, np.array([state.ledger for state in states])
+
+    def _roll(self, t: float, motion: Motion, v: np.ndarray) -> tuple[np.ndarray, TyreReport, Ledger]:
+        """Generalised forces (n,) of tyres, brakes and drive; the tyres' report, and their part of the ledger."""
+        steer, steering = driven(self.handling.controls.steer, t)
+        points, angle = motion.at(self._points), self._steered * steer
+        contact = self._touch(motion, points, angle)
+        slides, beside = self._slide(motion, points, contact, self._steered * steering, v)
+        creep = self._creep(contact, slides)
+        force, moments = self._press(motion, points, contact, creep)
+        torques = self._torques(t, beside)
+        force += self._turn_wheels(motion, contact.axle, torques)
+        power = (creep * slides[:, :3]).sum(1)
+        slip = dict(zip(("slip_x", "slip_y", "turn", "tread"), slides.T, strict=True))
+        by_creep = dict(zip(("fx", "fy", "mz"), creep.T, strict=True))
+        report = TyreReport(
+            press=contact.load,
+            power=power,
+            steer_moment=moments[:, 2],
+            angle=angle,
+            spin_torque=torques,
+            **slip,
+            **by_creep,
+        )
+        ledger = Ledger(
+            float((0.5 * contact.elastic**2 / self._stiffness).sum()),
+            float(contact.damping_power.sum()),
+            float(torques @ beside),
+            -float(self._steered @ moments[:, 2]) * steering,
+        )
+        return force, report, ledger
+
+    def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> Contact:
+        """How tyres press, and where they touch; steer (w,), rad."""
+        place, speed = points[:, PLACE], points[:, RATE]
+        height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
+        upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])
+        elastic = np.maximum(self.loads + self._stiffness * (height - (place[:, 2] - self._height)), 0.0)
+        rising = (speed * upwards).sum(1)
+        load = np.where(elastic > 0.0, np.maximum(elastic - self._damping * rising, 0.0), 0.0)
+        axle, long = self._axles(motion, steer), _length(upwards)
+        normal = upwards / long[:, None]
+        along = _cross(axle, normal)
+        flat = _length(along)
+        along /= flat[:, None]
+        radius = np.maximum(place[:, 2] - height, 0.0) / (long * flat)
+        down = (axle * (axle * normal).sum(1)[:, None] - normal) * (radius / flat)[:, None]
+        pressing = upwards * load[:, None]
+        across = _cross(normal, along)
+        return Contact(down, along, across, normal, axle, pressing, load * long, elastic, (load - elastic) * rising)
+
+    def _slide(
+        self, motion: Motion, points: np.ndarray, contact: Contact, steering: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Slides (w, 4) as ``bristles`` takes them, and spins (w,) beside the chassis, rad/s; steering (w,), rad/s."""
+        axle, turning = contact.axle, np.array([motion.turning(row) for row in self._points.rows])
+        locked = ((motion.turning(self._chassis) - turning) * axle).sum(1)
+        spin = np.where(self._rotors >= 0, v[self._rotors], locked)
+        whole = turning + axle * spin[:, None] + np.multiply.outer(steering, UP)
+        sliding = points[:, RATE] + _cross(whole, contact.down)
+        tread = -spin * (_cross(axle, contact.down) * contact.along).sum(1)
+        on_road = (sliding * contact.along).sum(1), (sliding * contact.across).sum(1)
+        return np.column_stack([*on_road, (whole * contact.normal).sum(1), tread]), spin - locked
+
+    def _axles(self, motion: Motion, steer: np.ndarray) -> np.ndarray:
+        """Axles (w, 3), to the left of their wheels: steered and leaning in the carrier's axes."""
+        level = np.cos(self._leans)
+        axes = np.column_stack([-np.sin(steer) * level, np.cos(steer) * level, np.sin(self._leans)])
+        turned: np.ndarray = axes @ motion.axes(self._carrier)[PLACE].T
+        return turned
+
+    def _creep(self, contact: Contact, slides: np.ndarray) -> np.ndarray:
+        """Creep forces along and across (N) and moments (N m), (w, 3), of slides (w, 4)."""
+        of, ones = self.handling.tyres, np.ones(len(slides))
+        half = np.sqrt(self._radius * contact.load / self._stiffness)
+        patch = Patch(half, of.half_width * ones, contact.load, of.friction * ones, self._bristles)
+        return tyre_forces(patch, slides, of.cells)
+
+    def _press(
+        self, motion: Motion, points: np.ndarray, contact: Contact, creep: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Generalised forces (n,) of loads and creep, and the creep's moments (w, 3) about the wheels' centres."""
+        force = contact.along * creep[:, [0]] + contact.across * creep[:, [1]]
+        moments = _cross(contact.down, force) + contact.normal * creep[:, [2]]
+        total = np.tensordot(points[:, FIRST:], force + contact.loading, ((0, 2), (0, 1)))
+        for row, moment in zip(self._points.rows, moments, strict=True):
+            total += motion.by_moment(int(row), moment)
+        about = (moments * contact.axle).sum(1)
+        fixed = self._rotors < 0
+        np.add.at(total, self._rotors[~fixed], about[~fixed])
+        for i in np.flatnonzero(fixed).tolist():
+            total += self._hold(motion, i, about[i] * contact.axle[i])
+        return total, moments
+
+    def _hold(self, motion: Motion, i: int, moment: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) of a moment that the chassis takes over from the body of wheel i."""
+        return motion.by_moment(self._chassis, moment) - motion.by_moment(int(self._points.rows[i]), moment)
+
+    def _torques(self, t: float, beside: np.ndarray) -> np.ndarray:
+        """Torques (w,) of brake and drive on wheels (N m) that spin ``beside`` the chassis (rad/s)."""
+        controls, of = self.handling.controls, self.handling.tyres
+        braking, driving = driven(controls.brake, t)[0], driven(controls.drive, t)[0]
+        torque = self._driven * driving - self._braked * braking * np.tanh(beside / of.brake_rate)
+        return np.where(self._rotors >= 0, torque, 0.0)
+
+    def _turn_wheels(self, motion: Motion, axles: np.ndarray, torques: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) of torques on the wheels, and against them on the chassis."""
+        total = np.zeros(self.bodies.size)
+        for i in np.flatnonzero(torques).tolist():
+            total[self._rotors[i]] += torques[i]
+            total -= self._hold(motion, i, torques[i] * axles[i])
+        return total
+
+    def _outside(self, t: float, motion: Motion) -> tuple[np.ndarray, float]:
+        """Generalised forces (n,) of drag and pushes, and their power (W)."""
+        heading = motion.axes(self._carrier)[PLACE]
+        total, power = np.zeros(self.bodies.size), 0.0
+        if self._drag:
+            (middle,) = motion.at(self._middle)
+            ahead = float(middle[RATE] @ heading[:, 0])
+            force = -self._drag * abs(ahead) * ahead
+            total += middle[FIRST:] @ (force * heading[:, 0])
+            power += force * ahead
+        for push, point in zip(self.handling.pushes, motion.at(self._pushed), strict=True):
+            pushed = heading @ (driven(push.size, t)[0] * np.array(push.axis))
+            total += point[FIRST:] @ pushed
+            power += float(point[RATE] @ pushed)
+        return total, power
+
+
+def _length(rows: np.ndarray) -> np.ndarray:
+    """Lengths (w,) of rows (w, 3)."""
+    return np.sqrt((rows * rows).sum(1))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Vector products of rows (w, 3)."""
+    product: np.ndarray = a[:, NEXT] * b[:, LAST] - a[:, LAST] * b[:, NEXT]
+    return product

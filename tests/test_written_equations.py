@@ -1,0 +1,149 @@
+"""Cars by their plain equations: beside both engines, law by law, through the command line; faults that they see."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.core.errors import InputError, RunFailed
+from models.core.systems import load
+from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import build as hub_model
+from models.engines.free_vehicle import Plain
+from models.multibody import forces as at
+from models.multibody.plain.road import driven, surface
+from models.multibody.plain.rolling import Ledger, TyreReport
+from models.road.plane_waves import plane_waves
+from models.systems.handling.run import run
+from studies.command.asked import SCENES, engines_of
+from validation.cases import written_equations
+from validation.faults.campaign import seen
+from validation.faults.written import CAMPAIGN
+from validation.spatial.cars import static
+from validation.spatial.written_equations import (
+    bristles_gap,
+    curved,
+    cut_cars,
+    hub_gap,
+    hub_path_gap,
+    inside_gap,
+    report_gap,
+    rolling_cars,
+    rolling_gap,
+    rolling_path_gap,
+)
+
+INSTANT, PATH = 1e-12, 1e-10
+"""Demanded of accelerations, by the largest of their state, and of paths (m, rad, and their rates)."""
+
+
+@pytest.mark.parametrize("name", ["r19_free", "twin"])
+def test_a_cut_car_moves_as_in_mujoco(name):
+    vehicle = cut_cars()[name]
+    assert hub_gap(vehicle, "mujoco", 18) < INSTANT
+    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=True) < PATH
+    assert hub_path_gap(vehicle, "mujoco", 0.01, rough=False) < PATH
+
+
+def test_what_is_felt_inside_is_that_of_its_own_state():
+    """Section forces, wrenches and the moments that enforce angles, of several states in one report."""
+    assert inside_gap(cut_cars()["twin"], 3) < INSTANT
+
+
+@pytest.mark.parametrize("name", ["r19_free", "twin", "curved"])
+def test_a_car_on_tyres_moves_as_in_mujoco(name):
+    car = rolling_cars()[name]
+    assert rolling_gap(car, "mujoco", 9) < INSTANT
+    assert report_gap(car, 9) < INSTANT
+    assert rolling_path_gap(car, "mujoco", 0.01) < PATH
+
+
+def test_bristles_are_those_of_the_kernel():
+    assert bristles_gap(20) < INSTANT
+
+
+def test_roads_and_controls_are_those_of_the_kernel():
+    waves, rng = plane_waves(4e-6, seed=2), np.random.default_rng(1)
+    x, y = rng.uniform(-200.0, 200.0, (2, 50))
+    wanted = np.array([at.height(waves.ravel(), len(waves), *place) for place in zip(x, y, strict=True)])
+    assert np.column_stack(surface(waves, x, y)) == pytest.approx(wanted, abs=1e-12 * np.abs(wanted).max())
+    knots = ((0.1, 0.2), (0.5, -0.3), (0.5 + 1e-9, 0.4), (2.0, 1.0))
+    table = np.array(knots).T.ravel()
+    for t in (-1.0, 0.1, 0.3, 0.5, 1.2345, 2.0, 3.0):
+        assert driven(knots, t) == pytest.approx(at.control(table, 0, 0, len(knots), t), rel=1e-14, abs=1e-15)
+    assert driven(((0.7, 3.0),), 0.0) == (3.0, 0.0)
+
+
+def test_reports_have_the_columns_of_the_kernel():
+    columns = [getattr(at, name.upper()) for name in TyreReport._fields]
+    assert columns == list(range(at.REPORTED))
+    assert [getattr(at, name.upper()) for name in Ledger._fields] == list(range(at.LEDGER))
+
+
+def test_engines_on_request_run_where_they_are_named():
+    assert engines_of("plain", "hub-forces") == ("plain",)
+    assert engines_of("reference", "handling") == ("reference",)
+    assert engines_of("all", "hub-forces") == engines_of(None, "hub-forces") == ("reference", "exudyn", "mujoco")
+    assert engines_of(None, "handling") == ("exudyn", "mujoco")
+    with pytest.raises(InputError, match="no such engine"):
+        engines_of("plain", "handling")
+
+
+def test_a_scene_of_handling_runs_in_the_reference():
+    """Every manoeuvre of the shipped scene, some steps of each; reports are the reference's own."""
+    scene = load(
+        SCENES / "handling.toml",
+        [f"manoeuvres.{name}.duration=0.006" for name in ("step_steer", "lane_change", "brake_in_curve")],
+    )
+    for name in scene.manoeuvres:
+        ours, theirs = (run(scene, engine, name) for engine in ("reference", "mujoco"))
+        assert np.abs(ours["positions"] - theirs["positions"]).max() < PATH
+        assert np.abs(ours["load"] - theirs["load"]).max() < 1e-8
+        assert ours.data.attrs["engine"].startswith("reference")
+
+
+def test_a_run_that_blows_up_fails():
+    def blown(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.full(len(q), np.inf)
+
+    with pytest.raises(RunFailed):
+        Plain(PLAIN, blown).run(np.zeros(1), np.zeros(1), 0.01, 1e-3)
+
+
+def test_curves_of_the_description_press():
+    """A car with curves is not the car without: the comparison of the curved one compares them."""
+    car = rolling_cars()["curved"]
+    without = car.changed(given=replace(curved(), springs=rolling_cars()["r19_free"].given.springs))
+    q, v = car.straight(10.0)
+    v[5:] += 0.3
+    ours, others = (Plain(PLAIN, written_equations_of(each)).acceleration(0.0, q, v) for each in (car, without))
+    assert np.abs(ours - others).max() > 0.1
+
+
+def written_equations_of(car):
+    from models.multibody.plain.rolling import PlainRolling
+
+    return PlainRolling(car).acceleration
+
+
+def test_a_cut_car_rests_on_its_static_loads():
+    vehicle = cut_cars()["twin"]
+    still = np.zeros(vehicle.size)
+    model = hub_model(PLAIN, vehicle, static(vehicle, 3), 1e-3, 1e-3)
+    assert np.abs(model.accelerations(0.0, still, still)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "name", ["bristles of all tyres 30 % stiffer", "stiffness and damping swapped in the table, cut"]
+)
+def test_faults_in_what_engines_share_are_seen(name):
+    fault = next(fault for fault in CAMPAIGN.faults if fault.name == name)
+    clean, planted = replace(CAMPAIGN, faults=(fault,)).measure()
+    assert seen(clean) == [] and seen(planted) != []
+
+
+@pytest.mark.full
+def test_every_row_passes(tmp_path: Path):
+    rows, _ = written_equations.measure(False, tmp_path)
+    assert [(row.id, row.reason) for row in rows if row.status != "passed"] == []

@@ -1,0 +1,84 @@
+"""Cars by their plain equations beside both engines: accelerations at random, whole paths, and every law in them."""
+
+from pathlib import Path
+
+from models.multibody.plain.statics import held_at_rest
+from models.vehicles.free_vehicle import CARRIER
+from models.vehicles.spatial_linear import preloads
+from validation.common.checks import off
+from validation.common.rows import CaseAnswer, Observed, Row, System
+from validation.spatial.written_equations import (
+    bristles_gap,
+    cut_cars,
+    hub_gap,
+    hub_path_gap,
+    inside_gap,
+    report_gap,
+    rolling_cars,
+    rolling_gap,
+    rolling_path_gap,
+)
+
+TITLE = "Cars by plain equations that share no force with the engines"
+SYSTEM: System = "rolling-vehicle"
+ENGINES = ("mujoco", "exudyn")
+STATES, FEW = 100, 12
+INSTANT, PATH, LAW = 1e-12, 1e-10, 1e-12
+WHY = "the description alone is shared: mass matrix, kinematics, preloads and every force are written twice"
+DURATION, SHORT = 1.0, 0.02
+"""s, in full and in quick: the plain equations of a car on tyres take about 20 s for each."""
+
+
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """Rows of both systems; quick: fewer states, paths of some steps."""
+    states, duration = (FEW, SHORT) if quick else (STATES, DURATION)
+    return [*_laws(states), *_hubs(states, duration), *_rolling(states, duration)], {}
+
+
+def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
+    """A row of plain equations beside other code for the same laws."""
+    return Observed(f"written.{id}", SYSTEM, quantity, value, unit).at_most(bound, WHY, "native")
+
+
+def _laws(states: int) -> list[Row]:
+    """The tyre's law, and what holds the design position."""
+    rows = [_row("bristles", f"creep forces of {states} random patches, by the load", bristles_gap(states), "1", LAW)]
+    for name, car in rolling_cars().items():
+        held = preloads(car.vehicle)
+        plain = held_at_rest(car.vehicle, CARRIER)
+        gap = max(off(other, list(known.values())) for known, other in zip(held, plain, strict=True))
+        rows.append(_row(f"preloads.{name}", f"preloads and static loads of {name}, by the largest", gap, "1", LAW))
+    return rows
+
+
+def _hubs(states: int, duration: float) -> list[Row]:
+    """Cut at their wheels."""
+    rows = []
+    for name, car in cut_cars().items():
+        for engine in ("reference", *ENGINES):
+            what = f"accelerations of {name} on hub forces and on a road at {states} random states, {engine}"
+            rows.append(_row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT))
+        what = f"section forces, wrenches and holding moments of {name} at random states"
+        rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT))
+        for kind, rough in (("road", True), ("noise", False)):
+            what = f"coordinates and rates of {name}, {duration:g} s of {kind}, mujoco"
+            rows.append(
+                _row(f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH)
+            )
+    return rows
+
+
+def _rolling(states: int, duration: float) -> list[Row]:
+    """On tyres that roll."""
+    rows = []
+    for name, car in rolling_cars().items():
+        for engine in ENGINES:
+            what = f"accelerations of {name} on tyres at {states} random states, {engine}"
+            gap = rolling_gap(car, engine, states)
+            rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT))
+        what = f"reports of the tyres and ledgers of {name} at random states, each by its largest"
+        rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT))
+        what = f"positions and rates of {name}, {duration:g} s of a turn on a rough road, mujoco"
+        gap = rolling_path_gap(car, "mujoco", duration)
+        rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH))
+    return rows

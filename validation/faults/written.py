@@ -1,0 +1,192 @@
+"""Faults in what both engines share: table, preloads, road, inertia; the plain equations of a car see them.
+
+Two engines that read one table and call one force agree to rounding under every one of these.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import build as hub_model
+from models.multibody import cut_kernel as cut_at
+from models.multibody import forces as at
+from models.multibody.cut_table import Drive
+from models.systems.handling.run import REFERENCE, build
+from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial_linear import Preloads
+from validation.common.checks import off
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import Patch, attribute
+from validation.faults.tyres import ALL, tyre
+from validation.spatial.written_equations import STEP, cut_cars, cut_state, drives, rolling_cars, rolling_states
+
+BOUND = 1e-12
+
+
+def _on_tyres() -> float:
+    """Accelerations of the twin, steered and braked on a rough slope, in MuJoCo and by the plain equations."""
+    car = rolling_cars()["twin"]
+    ((t, q, v),) = islice(rolling_states(car, 3), 2, 3)
+    return off(*(build(engine, car).acceleration(t, q, v) for engine in ("mujoco", REFERENCE)))
+
+
+def _on_hubs(choose: Callable[[list[Drive]], Drive]) -> float:
+    """Accelerations of the cut twin in MuJoCo and by the plain equations."""
+    vehicle = cut_cars()["twin"]
+    drive, (q, v) = choose(drives(vehicle)), cut_state(vehicle, 3)
+    return off(
+        *(hub_model(engine, vehicle, drive, STEP, STEP).accelerations(0.0, q, v) for engine in ("mujoco", PLAIN))
+    )
+
+
+CHECKS = {
+    "tyres": Check("accelerations of a car on tyres by its plain equations", "of the largest", BOUND, _on_tyres),
+    "hubs": Check(
+        "accelerations of a cut car on hub forces", "of the largest", BOUND, lambda: _on_hubs(lambda all_of: all_of[0])
+    ),
+    "road": Check(
+        "accelerations of a cut car on a road", "of the largest", BOUND, lambda: _on_hubs(lambda all_of: all_of[-2])
+    ),
+}
+
+
+def _preload(module: str) -> Patch:
+    """One spring bears 1 % more at rest."""
+
+    def changed(real: Any) -> Any:
+        def made(vehicle: SpatialVehicle) -> Preloads:
+            parts, tyres = real(vehicle)
+            first = max(parts, key=lambda name: abs(parts[name]))
+            return Preloads(parts | {first: 1.01 * parts[first]}, tyres)
+
+        return made
+
+    return attribute(f"{module}:preloads", changed)
+
+
+def _waves(real: Any) -> Any:
+    """The first wave of the road is 1 % higher in the table."""
+
+    def made(car: Any) -> np.ndarray:
+        numbers: np.ndarray = real(car)
+        first = int(numbers[at.OF_WAVES])
+        numbers[first + 2 : first + 4] *= 1.01
+        return numbers
+
+    return made
+
+
+def _sample(real: Any) -> Any:
+    """A road is read 0.1 mm higher under the first hub."""
+
+    def made(vehicle: Any, drive: Drive, step: float) -> np.ndarray:
+        hubs = drive.hubs.copy()
+        hubs[:, 0] += 1e-4
+        return np.asarray(real(vehicle, replace(drive, hubs=hubs), step))
+
+    return made
+
+
+def _stiff_bars(real: Any) -> Any:
+    """Bars of a car on tyres are 1 % stiffer."""
+
+    def made(*arguments: Any) -> Iterator[Any]:
+        for row, curves in real(*arguments):
+            yield [1.01 * row[0], *row[1:]], curves
+
+    return made
+
+
+def _swapped(first: int, second: int) -> Callable[[Any], Any]:
+    """Two numbers of a row of the table change places."""
+
+    def changed(real: Any) -> Any:
+        def made(*arguments: Any) -> list[float]:
+            row = list(real(*arguments))
+            row[first], row[second] = row[second], row[first]
+            return row
+
+        return made
+
+    return changed
+
+
+def _turned_bar(real: Any) -> Any:
+    """The last element of a cut car, a bar, works the other way round."""
+
+    def made(vehicle: Any, joined: Any, i: int) -> list[float]:
+        row: list[float] = real(vehicle, joined, i)
+        if i == len(vehicle.elements) - 1:
+            row[cut_at.AXIS : cut_at.AXIS + 3] = [-value for value in row[cut_at.AXIS : cut_at.AXIS + 3]]
+        return row
+
+    return made
+
+
+def _other_inertia(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], Any]:
+    """The heaviest body has another inertia in the engine."""
+
+    def changed(real: Any) -> Any:
+        def made(vehicle: SpatialVehicle, *others: Any) -> Any:
+            heavy = max(vehicle.bodies, key=lambda body: body.mass)
+            x, y, z = change(np.array(heavy.inertia)).tolist()
+            other = replace(heavy, inertia=(tuple(x), tuple(y), tuple(z)))
+            bodies = tuple(other if body is heavy else body for body in vehicle.bodies)
+            return real(replace(vehicle, bodies=bodies), *others)
+
+        return made
+
+    return changed
+
+
+def _turned_products(inertia: np.ndarray) -> np.ndarray:
+    return 2.0 * np.diag(np.diag(inertia)) - inertia
+
+
+TABLE, CUT_TABLE = "models.multibody.numbers", "models.multibody.cut_table"
+FAULTS = (
+    Fault("bristles of all tyres 30 % stiffer", "tyre", tyre(at.BRISTLES, 1.3, ALL)),
+    Fault("half widths of patches 1 % off", "tyre", tyre(at.HALF_WIDTH, 1.01, ALL)),
+    Fault("preload of a spring 1 % off, on tyres", "preload", _preload(TABLE)),
+    Fault("preload of a spring 1 % off, cut", "preload", _preload("models.vehicles.cut_vehicle")),
+    Fault("one wave of the road 1 % higher", "road", attribute(f"{TABLE}:table", _waves)),
+    Fault("road under one hub 0.1 mm higher", "road", attribute("models.engines.cut_vehicle:table", _sample)),
+    Fault(
+        "axes of springs fixed in space",
+        "frame",
+        attribute("models.multibody.plain.parts:frame_of", lambda real: lambda part, default: None),
+    ),
+    Fault("bars 1 % stiffer, on tyres", "bar", attribute(f"{TABLE}:_bars", _stiff_bars)),
+    Fault("a bar turned round, cut", "bar", attribute(f"{CUT_TABLE}:_element", _turned_bar)),
+    Fault(
+        "inertia of the chassis 1 % off, on tyres",
+        "inertia",
+        attribute("models.systems.handling.run:Driven", _other_inertia(lambda inertia: 1.01 * inertia)),
+    ),
+    Fault(
+        "products of inertia with the other sign, cut",
+        "inertia",
+        attribute("models.engines.cut_vehicle:Driven", _other_inertia(_turned_products)),
+    ),
+    Fault(
+        "shares of brake and drive swapped in the table",
+        "packing",
+        attribute(f"{TABLE}:_tyre", _swapped(at.BRAKED, at.DRIVEN)),
+    ),
+    Fault(
+        "stiffness and damping swapped in the table, cut",
+        "packing",
+        attribute(f"{CUT_TABLE}:_element", _swapped(cut_at.STIFFNESS, cut_at.DAMPING)),
+    ),
+    Fault(
+        "cornering stiffness and roll steer swapped in the table, cut",
+        "packing",
+        attribute(f"{CUT_TABLE}:_hub", _swapped(cut_at.CORNERING, cut_at.ROLL_STEER)),
+    ),
+)
+
+CAMPAIGN = Campaign("planted.written", "what engines of a car share", "rolling-vehicle", CHECKS, FAULTS)

@@ -1,0 +1,176 @@
+"""Plain equations of a car beside its engines: cars, states at random and the gaps between both.
+
+The plain side (``models.multibody.plain``) reads the description alone and shares no force, no table and no mechanics
+with the engines. What both read is the description, and for paths the tableau and the step.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from models.engines.cut_vehicle import PLAIN
+from models.engines.cut_vehicle import build as hub_model
+from models.multibody import forces as at
+from models.multibody.cut_table import Drive
+from models.multibody.numbers import Controls, Handling, Push, Tyres
+from models.multibody.plain.bristles import Patch
+from models.multibody.plain.bristles import tyre_forces as plain_tyre_forces
+from models.multibody.plain.rolling import PlainRolling
+from models.road.iso8608 import iso8608_road
+from models.road.plane_waves import plane_waves
+from models.systems.handling.run import REFERENCE, build
+from models.systems.hub_forces.measurement import HubForces, two_tracks
+from models.tyre.bristles import brush
+from models.vehicles.cut_vehicle import PITCH, ROLL, CutVehicle, Z, cut
+from models.vehicles.spatial import Curve, SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+from validation.common.checks import off
+from validation.spatial.cars import anywhere, static, twin
+
+SEED, STEP, SPEED = 41, 1e-3, 22.0
+FRAMES = ("hub", "body", "inertial")
+TILT = 0.3
+"""rad, by which a chassis rolls and pitches at random."""
+BUMP = Curve((-0.1, -0.02, 0.02, 0.1), (-4000.0, 0.0, 0.0, 6000.0))
+DAMPER = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 150.0, 400.0))
+TURN = Controls(
+    steer=((0.0, 0.01), (0.3, 0.05), (0.7, -0.05), (1.0, 0.0)),
+    brake=((0.0, 0.0), (0.4, 900.0)),
+    drive=((0.0, 0.0), (0.2, 300.0)),
+)
+
+
+def curved() -> SpatialVehicle:
+    """R19-free with a bump stop, a bent damper and dry friction in each of its first springs."""
+    car = load_vehicle("r19_free")
+    first = (replace(s, travel_force=BUMP, rate_force=DAMPER, friction=120.0) for s in car.springs[:4])
+    return replace(car, springs=(*first, *car.springs[4:]))
+
+
+def rolling_cars() -> dict[str, Handling]:
+    """Cars on a rough slope, steered, braked, driven and pushed: as shipped, without symmetry, with curves."""
+    waves, r19 = plane_waves(4e-6, seed=3), load_vehicle("r19_free")
+    gust = Push("body", (0.3, 0.1, 1.0), (0.1, 1.0, 0.2), ((0.0, 0.0), (0.4, 500.0)))
+    return {
+        "r19_free": Handling(r19, Tyres(), TURN, waves),
+        "twin": Handling(twin(), Tyres(inclination=-0.03, fixed=("fl", "rr"), cells=11), TURN, waves, 0.05, (gust,)),
+        "curved": Handling(curved(), Tyres(spin_inertia=1.2), TURN, waves),
+    }
+
+
+def rolling_states(car: Handling, count: int) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    """Times (s), positions and rates (n,) at random: any heading, leaning, at speeds from standing to 25 m/s."""
+    rng, places = np.random.default_rng(SEED), car.vehicle.coordinates()
+    leans = [places.index(("sway", turn)) for turn in ("rx", "ry")]
+    for i in range(count):
+        speed = (0.0, 0.05, 25.0)[i % 3] * rng.uniform()
+        q, v = rng.uniform(-0.03, 0.03, len(places)), rng.uniform(-0.5, 0.5, len(places))
+        q[:3], q[leans] = (*rng.uniform(-5.0, 5.0, 2), rng.uniform(-3.1, 3.1)), rng.uniform(-TILT, TILT, 2)
+        ahead = car.straight(speed)[1]
+        v = v * min(1.0, 0.1 + speed) + ahead
+        v[:2] += speed * np.array([np.cos(q[2]) - 1.0, np.sin(q[2])])
+        yield rng.uniform(0.0, 1.0), q, v
+
+
+def rolling_gap(car: Handling, engine: str, count: int) -> float:
+    """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
+    plain, model = build(REFERENCE, car), build(engine, car)
+    states = rolling_states(car, count)
+    return max(off(model.acceleration(t, q, v), plain.acceleration(t, q, v)) for t, q, v in states)
+
+
+def report_gap(car: Handling, count: int) -> float:
+    """Largest difference of the tyres' reports and ledgers, each column by its largest value."""
+    plain, numbers, worst = PlainRolling(car), car.numbers, 0.0
+    states = list(rolling_states(car, count))
+    times, q, v = (np.array(column) for column in zip(*states, strict=True))
+    tyres, ledgers = np.empty((count, len(car.vehicle.tyres), at.REPORTED)), np.empty((count, at.LEDGER))
+    at.reports(numbers, times, q, v, tyres, ledgers)
+    for ours, theirs in zip((tyres, ledgers), plain.report(times, q, v), strict=True):
+        shape = -1, ours.shape[-1]
+        gap, size = np.abs(ours - theirs).reshape(shape).max(0), np.abs(theirs).reshape(shape).max(0)
+        worst = max(worst, float((gap / np.maximum(size, 1e-300)).max()))
+    return worst
+
+
+def rolling_path_gap(car: Handling, engine: str, duration: float) -> float:
+    """Largest difference of positions and rates along a run."""
+    ours, theirs = (build(name, car).run(*car.straight(SPEED), duration, STEP) for name in (engine, REFERENCE))
+    return float(max(np.abs(ours.positions - theirs.positions).max(), np.abs(ours.rates - theirs.rates).max()))
+
+
+def cut_cars() -> dict[str, CutVehicle]:
+    """Cut at their wheels: as shipped, and without symmetry, its tyres such that they only push."""
+    return {"r19_free": cut(load_vehicle("r19_free"), "body"), "twin": cut(twin().with_tyres(pushes_only=True), "body")}
+
+
+def drives(vehicle: CutVehicle) -> list[Drive]:
+    """Six components at every hub in each frame, with no guide, pulled and enforced; and a road."""
+    rng, rows = np.random.default_rng(SEED), static(vehicle, 3).hubs
+    hubs = rows + rng.normal(0.0, 500.0, rows.shape)
+    guide, pull = rng.normal(0.0, 0.1, (3, 6)), (2e4, 3e3, 5e4, 4e3)
+    wrenches = [Drive(hubs, frame, guide=held) for frame in FRAMES for held in (None, guide)]
+    road = Drive(rng.normal(0.0, 0.01, (3, 2 * len(vehicle.hubs))), speed=SPEED)
+    return [*wrenches, Drive(hubs, guide=guide, pull=pull), road, replace(road, frame="inertial")]
+
+
+def cut_state(vehicle: CutVehicle, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates (n,) at random: any heading, leaning by TILT, its tyres about the road."""
+    q, v = anywhere(vehicle, seed)
+    q[Z] *= 2e-3
+    q[PITCH], q[ROLL] = TILT * q[PITCH], TILT * q[ROLL]
+    return q, v
+
+
+def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
+    """Largest difference of accelerations of an engine and of the plain equations, by the largest of its state."""
+    worst, all_drives = 0.0, drives(vehicle)
+    for i, drive in enumerate(all_drives):
+        models = [hub_model(name, vehicle, drive, STEP, STEP) for name in (engine, PLAIN)]
+        for seed in range(i, count, len(all_drives)):
+            q, v = cut_state(vehicle, seed)
+            time = 0.5 * STEP * (seed % 3)
+            worst = max(worst, off(*(model.accelerations(time, q, v) for model in models)))
+    return worst
+
+
+def inside_gap(vehicle: CutVehicle, count: int) -> float:
+    """Largest difference of section forces, hub wrenches and holding moments, each by its largest value."""
+    worst = 0.0
+    for drive in drives(vehicle):
+        models = [hub_model(name, vehicle, drive, STEP, STEP) for name in ("reference", PLAIN)]
+        states = np.array([np.concatenate(cut_state(vehicle, seed)) for seed in range(count)])
+        ours, theirs = (model.reported(0.5 * STEP * np.arange(count), states) for model in models)
+        for name in ("elements", "wrenches", "moments"):
+            gap, size = np.abs(getattr(ours, name) - getattr(theirs, name)).max(), np.abs(getattr(theirs, name)).max()
+            worst = max(worst, float(gap / max(size, 1e-300)))
+    return worst
+
+
+def hub_path_gap(vehicle: CutVehicle, engine: str, duration: float, rough: bool) -> float:
+    """Largest difference of coordinates and rates along a run on a rough road, or on noisy forces in the hubs' axes."""
+    steps = round(duration / STEP)
+    if rough:
+        left, right = (iso8608_road("C", seed) for seed in (1, 2))
+        drive = two_tracks(vehicle, left, right, SPEED, STEP, steps)
+    else:
+        deviation = np.tile([50.0] * 3 + [5.0] * 3, len(vehicle.hubs))
+        drive = HubForces(static(vehicle, steps + 1).hubs, STEP, "hub").noisy(deviation, SEED).drive(STEP, steps)
+    paths = [hub_model(name, vehicle, drive, STEP, duration).run().states for name in (engine, PLAIN)]
+    return float(np.abs(paths[0] - paths[1]).max())
+
+
+def bristles_gap(count: int) -> float:
+    """Largest difference of creep forces by the load and of moments by load times half width, of random patches."""
+    rng, worst, width = np.random.default_rng(SEED), 0.0, 0.09
+    for i in range(count):
+        load, mu, half = rng.uniform(50.0, 8000.0), rng.uniform(0.1, 1.2), rng.uniform(0.02, 0.12)
+        stiffness, cells = rng.uniform(1e7, 1e8), int(rng.integers(3, 40))
+        slides = rng.normal(0.0, 1.0, (8, 4)) * 10.0 ** rng.uniform(-4.0, 1.0, (8, 1))
+        slides[:, 3] = rng.uniform(1.0, 40.0, 8) if i % 2 else rng.uniform(-0.3, 0.3, 8)
+        ones = np.ones(len(slides))
+        patch = Patch(half * ones, width * ones, load * ones, mu * ones, stiffness * ones)
+        gap = plain_tyre_forces(patch, slides, cells) - brush(load, mu, half, width, stiffness, slides, cells)
+        worst = max(worst, float(np.abs(gap / (load * np.array([1.0, 1.0, width]))).max()))
+    return worst
