@@ -135,8 +135,13 @@ class SpatialReference:
 
     def _spring(self, s: SpringDamper) -> np.ndarray:
         (one, of_one), (two, of_two) = self._point(s.one, s.point_one), self._point(s.two, s.point_two)
-        row = np.array(s.axis) @ (of_two - of_one)
-        travel, rate = np.dot(s.axis, two - one - np.subtract(s.point_two, s.point_one)), row @ self.v
+        axis, apart, row = np.array(s.axis), np.subtract(s.point_two, s.point_one), np.zeros(self.size)
+        if s.frame is not None:
+            m = self.motions[s.frame]
+            apart, axis = m.rotation @ apart, m.rotation @ axis
+            row = np.cross(axis, two - one) @ m.turn
+        row = row + axis @ (of_two - of_one)
+        travel, rate = axis @ (two - one - apart), row @ self.v
         force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
         force += (s.travel_force(travel) if s.travel_force else 0.0) + (s.rate_force(rate) if s.rate_force else 0.0)
         return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row

@@ -75,7 +75,7 @@ class CutVehicle:
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
     _check(vehicle, chassis)
-    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
+    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
 
     def element(part: SpringDamper | AntiRollBar, one: str, two: str, *places: Vector) -> Element:
