@@ -5,12 +5,14 @@ forces of ``models.multibody.cut_kernel``. The reference solves the written-out 
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
 from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
@@ -19,6 +21,7 @@ from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
 ENGINES = ("reference", "exudyn", "mujoco")
+Forces = Literal["native", "compiled"]
 UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
@@ -67,15 +70,28 @@ class HubModel:
     ``model`` is the free vehicle there.
     """
 
-    def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
-        """Refused where the step does not divide the duration or the inputs are not one row per half step."""
+    def __init__(
+        self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Forces = "compiled"
+    ) -> None:
+        """Refused where the step does not divide the duration or the inputs are not one row per half step.
+
+        forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
+        equations of the reference are the same either way. An enforced tilt needs them "compiled".
+        """
         check_divides(engine, Settings("RK4", step, duration))
         self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
         _check(engine, vehicle, drive, 2 * self.steps + 1)
         check_step(engine, vehicle, step, duration)
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
-        driven = Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces)
+        division, numbers = Division((), vehicle.elements), self.numbers
+        if forces == "native" and engine != "reference":
+            if drive.guide is not None and drive.pull is None:
+                raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
+            division = divide(vehicle, engine)
+            numbers = table(replace(vehicle, elements=division.shared), drive, step)
+        self.division = division
+        driven = Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
         self.model = Written(driven) if engine == "reference" else free_model(engine, driven)
 
     def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

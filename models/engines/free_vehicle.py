@@ -1,9 +1,9 @@
 """A free vehicle in an engine: what is the same in every engine.
 
-The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
-positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
-of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
-method.
+The engine has the bodies, their joints and weights, and the springs that it is handed; all other forces come from one
+compiled kernel of (numbers, time, positions, rates, forces), the last three pointers to doubles in the order of the
+vehicle's coordinates, as those of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines
+march by the classical Runge-Kutta method.
 """
 
 from abc import ABC, abstractmethod
@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from models.core.errors import InputError
+from models.engines.native_parts import NativePart
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import SpatialRun
 from models.vehicles.spatial import SpatialVehicle
@@ -28,7 +29,8 @@ class Driven:
     """vehicle : its bodies right before those that ride on them ; gravity (3,) in m/s^2.
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces; block :
-    compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers.
+    compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
+    parts : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
     """
 
     vehicle: SpatialVehicle
@@ -36,6 +38,7 @@ class Driven:
     numbers: np.ndarray
     kernel: Any
     block: Any
+    parts: tuple[NativePart, ...] = ()
 
     @property
     def size(self) -> int:
@@ -65,6 +68,10 @@ class FreeModel(ABC):
     def compiled(self) -> Any:
         """What compiled code calls the engine by; None where it cannot."""
         return None
+
+    def native_elements(self) -> tuple[str, ...]:
+        """Names of the springs, dampers, mounts and bars of which the built model has elements of its own."""
+        return ()
 
     @abstractmethod
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from models.engines.assembly import Settings
 from models.engines.exudyn_system import items, mass_and_force, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.native_exudyn import add_parts, built_elements
 from models.vehicles.spatial_linear import Preloads
 
 
@@ -43,8 +44,14 @@ class FreeExudyn(FreeModel):
         tree = built.links[bodies[0].name][0]
         mbs.SetObjectParameter(tree, "gravity", driven.gravity.tolist())
         mbs.SetObjectParameter(tree, "forceUserFunction", user_function(driven))
-        self._sensors = recorders(mbs, [next(iter(built.places.values()))[0]])
+        node = next(iter(built.places.values()))[0]
+        add_parts(built, node, driven.parts)
+        self._sensors = recorders(mbs, [node])
         mbs.Assemble()
+
+    def native_elements(self) -> tuple[str, ...]:
+        """Names of the elements that have an object in the system."""
+        return built_elements(self.mbs, [part.element.name for part in self.driven.parts])
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from Exudyn's own residual and mass matrix."""

@@ -16,6 +16,7 @@ from models.engines.mujoco_callback import CALLBACK, installed
 from models.engines.mujoco_layout import check, offsets
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.engines.native_mujoco import add_parts, built_elements, ends, set_laws
 from models.machine.stack import array_at, double_at
 from models.vehicles.spatial import SpatialVehicle
 
@@ -62,8 +63,10 @@ class FreeMujoco(FreeModel):
     ENGINE = "mujoco"
 
     def __init__(self, driven: Driven) -> None:
-        self.driven, numbers, merged = driven, driven.numbers, carriers(driven.vehicle)
+        self.driven, numbers, parts = driven, driven.numbers, driven.parts
+        merged = {name: rider for name, rider in carriers(driven.vehicle).items() if name not in ends(parts)}
         spec = spec_of(driven.vehicle, 1e-3, merged)
+        add_parts(spec, driven.vehicle, parts)
         spec.option.gravity = driven.gravity
         spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
         self.model = spec.compile()
@@ -72,6 +75,7 @@ class FreeMujoco(FreeModel):
         if not np.array_equal(places.columns, np.arange(driven.size)):
             raise ValueError("the bodies are not in the order of a walk through their tree")
         weigh(self.model, places, driven.vehicle.bodies)
+        set_laws(self.model, parts)
         self.data = mujoco.MjData(self.model)
         self.law = timed_law(driven.kernel)
         self._marcher = Marcher(self.model)
@@ -92,6 +96,10 @@ class FreeMujoco(FreeModel):
     def compiled(self) -> Native:
         """MuJoCo's own functions and arrays."""
         return native(self.model, self.data)
+
+    def native_elements(self) -> tuple[str, ...]:
+        """Names of the elements that have a tendon or an actuator in the model."""
+        return built_elements(self.model)
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by ``mj_forward``."""

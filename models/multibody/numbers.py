@@ -8,7 +8,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.multibody import forces as at
 from models.multibody import tree
-from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART
+from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.tyre.bristles import net, shape_factor
 from models.vehicles.free_vehicle import CARRIER, anchor, chassis_of, free_vehicle, joints, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
@@ -221,14 +221,8 @@ def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
             if curve is not None:
                 row[column] = first + found.size
-                found = np.concatenate((found, _hinges(curve)))
+                found = np.concatenate((found, curve_numbers(curve)))
     return found
-
-
-def _hinges(curve: Curve) -> np.ndarray:
-    offset, slope, corners, bends = curve.hinges()
-    pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
-    return np.array([3 + len(pairs), offset, slope, *pairs])
 
 
 def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
