@@ -11,7 +11,7 @@ import numpy as np
 
 from models.core.errors import Refused, RunFailed
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.free_vehicle import Driven, FreeModel, built_share, free_model
 from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
@@ -21,7 +21,8 @@ from models.vehicles.cut_vehicle import PITCH, CutVehicle
 from models.vehicles.spatial_linear import linearise
 
 ENGINES = ("reference", "exudyn", "mujoco")
-Forces = Literal["native", "compiled"]
+Route = Literal["native", "compiled"]
+"""Whose the springs, mounts and bars are: the engine's own as far as it has them, or all in the compiled forces."""
 UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
@@ -71,7 +72,7 @@ class HubModel:
     """
 
     def __init__(
-        self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Forces = "compiled"
+        self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Route = "compiled"
     ) -> None:
         """Refused where the step does not divide the duration or the inputs are not one row per half step.
 
@@ -127,6 +128,23 @@ class HubModel:
         block = np.concatenate((np.zeros(self.size), q, np.zeros(self.size), self.numbers))
         set_joint_forces(block.ctypes.data, 0.0, self.size)
         return block[: self.size].copy()
+
+
+@dataclass(frozen=True)
+class NativeShare:
+    """Of a built model: names of the elements that are the engine's own, count of its joints; why others are not."""
+
+    elements: tuple[str, ...]
+    joints: int
+    reasons: dict[str, str]
+
+
+def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
+    """What "exudyn" or "mujoco" has as its own of a vehicle, counted in a model that is built without a callback."""
+    division = divide(vehicle, engine)
+    driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
+    elements, joints = built_share(engine, driven)
+    return NativeShare(elements, joints, division.reasons)
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:

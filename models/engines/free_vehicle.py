@@ -69,10 +69,6 @@ class FreeModel(ABC):
         """What compiled code calls the engine by; None where it cannot."""
         return None
 
-    def native_elements(self) -> tuple[str, ...]:
-        """Names of the springs, dampers, mounts and bars of which the built model has elements of its own."""
-        return ()
-
     @abstractmethod
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), positions and rates (n,)."""
@@ -94,6 +90,18 @@ def free_model(engine: str, driven: Driven) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
-    module = import_module(f"models.engines.free_vehicle_{engine}")
-    model: FreeModel = getattr(module, f"Free{engine.capitalize()}")(driven)
+    model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven)
     return model
+
+
+def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the springs, mounts and bars that a built model has as its own, and how many joints it has.
+
+    Counted in the model; it is built without its callback, for which numba would compile.
+    """
+    share: tuple[tuple[str, ...], int] = _module(engine).share(driven)
+    return share
+
+
+def _module(engine: str) -> Any:
+    return import_module(f"models.engines.free_vehicle_{engine}")
