@@ -7,7 +7,7 @@ import pytest
 
 from models.core.errors import InputError, Refused
 from models.engines.cut_vehicle import HubModel, native_share
-from models.engines.native_parts import NO_CURVE, NO_FRAME, AxialTravel, divide
+from models.engines.native_parts import NO_CURVE, NO_FRAME, NO_TRAVEL, AxialTravel, divide
 from models.multibody.cut_table import Drive
 from models.systems.hub_forces import run as running
 from models.systems.hub_forces.plan import describe
@@ -78,6 +78,15 @@ def test_an_axis_fixed_in_what_does_not_carry_the_other_end_stays_shared():
     division = divide(turned(), "mujoco")
     assert division.reasons == dict.fromkeys(("left mount.x", "rear mount.z", "front left"), NO_FRAME)
     assert sum(isinstance(part.travel, AxialTravel) for part in division.native) == 7  # of nine of mounts
+
+
+def test_a_spring_that_nothing_strains_is_no_element():
+    """A seat moves up and down alone: a spring across it has a travel of 0 in every build."""
+    car = r19()
+    across = replace(car, elements=(*car.elements[:-3], replace(car.elements[-3], axis=np.array([1.0, 0.0, 0.0]))))
+    assert car.elements[-3].name == "right seat"
+    assert divide(across, "mujoco").reasons == {"right seat": NO_TRAVEL}
+    assert acceleration_error("mujoco", across, random_states(across, 2)) < 1e-12
 
 
 def test_guides_feel_the_couple_of_an_axis_that_their_body_keeps():

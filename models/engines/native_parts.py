@@ -15,6 +15,7 @@ from models.vehicles.spatial import FREEDOMS, SpatialVehicle
 CURVES = ("mujoco",)
 """Engines whose own elements can have a force that is piecewise linear in travel or rate."""
 NO_FRAME = "its axis is fixed in no end of it that carries the other end"
+NO_TRAVEL = "no coordinate moves its ends apart along its axis"
 NO_CURVE = "curve: piecewise linear forces are functions in Exudyn, no elements"
 NO_FRICTION = {
     "exudyn": "friction: tanh is a function in Exudyn, no element",
@@ -72,9 +73,10 @@ def divide(vehicle: CutVehicle, engine: str) -> Division:
     native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
     for element in vehicle.elements:
         travel = travel_of(vehicle.tree, element)
-        if travel is None:
+        still = isinstance(travel, CoordinateTravel) and not travel.coordinates
+        if travel is None or still:
             shared.append(element)
-            reasons[element.name] = NO_FRAME
+            reasons[element.name] = NO_TRAVEL if still else NO_FRAME
             continue
         kept, left, why = _divided(element, engine)
         if kept is not None:
