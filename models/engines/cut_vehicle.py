@@ -6,14 +6,15 @@ forces of ``models.multibody.cut_kernel``. "reference" solves the written-out eq
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from models.core.errors import Refused, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
+from models.engines.free_vehicle import Driven, FreeModel, Plain, built_share, free_model
+from models.engines.native_parts import Division, divide
 from models.engines.protocol import guard
 from models.engines.spatial_protocol import check_divides, check_modes
 from models.multibody.cut_kernel import WRENCH, accelerate, joint_forces, march, report, set_joint_forces
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 ENGINES = ("reference", "exudyn", "mujoco")
 PLAIN = "plain"
 """The independent reference, which runs where it is named."""
+Route = Literal["native", "compiled"]
+"""Whose the springs, mounts and bars are: the engine's own as far as it has them, or all in the compiled forces."""
 UPRIGHT = 1.4
 """rad: a vehicle that pitches farther has tumbled, and its heading and roll become one angle at pi / 2."""
 
@@ -73,8 +76,14 @@ class HubModel:
     ``model`` is the free vehicle there.
     """
 
-    def __init__(self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float) -> None:
-        """Refused where the step does not divide the duration or the inputs are not one row per half step."""
+    def __init__(
+        self, engine: str, vehicle: CutVehicle, drive: Drive, step: float, duration: float, forces: Route = "compiled"
+    ) -> None:
+        """Refused where the step does not divide the duration or the inputs are not one row per half step.
+
+        forces : "native" leaves springs, mounts and bars to the engine, as far as it has them; the written-out
+        equations of the reference are the same either way. An enforced tilt needs them "compiled".
+        """
         check_divides(engine, Settings("RK4", step, duration))
         self.engine, self.vehicle, self.step, self.steps = engine, vehicle, step, round(duration / step)
         _check(engine, vehicle, drive, 2 * self.steps + 1)
@@ -82,7 +91,16 @@ class HubModel:
         self.numbers, self.size = table(vehicle, drive, step), vehicle.size
         weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
         self.plain = _plain(vehicle, drive, step) if engine == PLAIN else None
-        self.model = self._in_engine(Driven(vehicle.tree, weight, self.numbers, joint_forces, set_joint_forces))
+        division, numbers = Division((), vehicle.elements), self.numbers
+        if forces == "native" and engine not in (PLAIN, "reference"):
+            if drive.guide is not None and drive.pull is None:
+                raise Refused(engine, 'an enforced tilt needs every force in one place: use forces = "compiled"')
+            division = divide(vehicle, engine)
+            numbers = table(replace(vehicle, elements=division.shared), drive, step)
+        self.division = division
+        self.model = self._in_engine(
+            Driven(vehicle.tree, weight, numbers, joint_forces, set_joint_forces, division.native)
+        )
 
     def _in_engine(self, driven: Driven) -> FreeModel:
         if self.plain:
@@ -131,6 +149,23 @@ def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
     from models.multibody.plain.hubs import PlainHubs
 
     return PlainHubs(vehicle, drive, step)
+
+
+@dataclass(frozen=True)
+class NativeShare:
+    """Of a built model: names of the elements that are the engine's own, count of its joints; why others are not."""
+
+    elements: tuple[str, ...]
+    joints: int
+    reasons: dict[str, str]
+
+
+def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
+    """What "exudyn" or "mujoco" has as its own of a vehicle, counted in a model that is built without a callback."""
+    division = divide(vehicle, engine)
+    driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
+    elements, joints = built_share(engine, driven)
+    return NativeShare(elements, joints, division.reasons)
 
 
 def check_step(engine: str, vehicle: CutVehicle, step: float, duration: float) -> None:

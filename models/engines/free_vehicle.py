@@ -1,9 +1,9 @@
 """A free vehicle in an engine: what is the same in every engine.
 
-The engine has the bodies, their joints and weights; all forces come from one compiled kernel of (numbers, time,
-positions, rates, forces), the last three pointers to doubles in the order of the vehicle's coordinates, as those
-of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines march by the classical Runge-Kutta
-method.
+The engine has the bodies, their joints and weights, and the springs that it is handed; all other forces come from one
+compiled kernel of (numbers, time, positions, rates, forces), the last three pointers to doubles in the order of the
+vehicle's coordinates, as those of ``models.multibody.forces`` and ``models.multibody.cut_kernel`` are. Both engines
+march by the classical Runge-Kutta method.
 """
 
 from abc import ABC, abstractmethod
@@ -17,6 +17,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
+from models.engines.native_parts import NativePart
 from models.engines.protocol import guard
 from models.vehicles.spatial import SpatialVehicle
 
@@ -31,7 +32,8 @@ class Driven:
     """vehicle : its bodies right before those that ride on them ; gravity (3,) in m/s^2.
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces; block :
-    compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers.
+    compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
+    parts : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
     """
 
     vehicle: SpatialVehicle
@@ -39,6 +41,7 @@ class Driven:
     numbers: np.ndarray
     kernel: Any
     block: Any
+    parts: tuple[NativePart, ...] = ()
 
     @property
     def size(self) -> int:
@@ -107,6 +110,18 @@ def free_model(engine: str, driven: Driven) -> FreeModel:
     """The vehicle in "exudyn" or "mujoco"."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
-    module = import_module(f"models.engines.free_vehicle_{engine}")
-    model: FreeModel = getattr(module, f"Free{engine.capitalize()}")(driven)
+    model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven)
     return model
+
+
+def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the springs, mounts and bars that a built model has as its own, and how many joints it has.
+
+    Counted in the model; it is built without its callback, for which numba would compile.
+    """
+    share: tuple[tuple[str, ...], int] = _module(engine).share(driven)
+    return share
+
+
+def _module(engine: str) -> Any:
+    return import_module(f"models.engines.free_vehicle_{engine}")

@@ -12,6 +12,7 @@ from models.engines.assembly import Settings
 from models.engines.exudyn_system import items, mass_and_force, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
+from models.engines.native_exudyn import add_parts, built_elements
 from models.vehicles.spatial_linear import Preloads
 
 
@@ -30,6 +31,13 @@ def user_function(driven: Driven) -> Callable[..., Any]:
     return forces
 
 
+def share(driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the elements that have an object in the system, and the joints of its first tree."""
+    model = FreeExudyn(driven)
+    names = built_elements(model.mbs, [part.element.name for part in driven.parts])
+    return names, len(model.mbs.GetObject(model.tree)["jointTypes"])
+
+
 class FreeExudyn(FreeModel):
     """One free vehicle in one Exudyn system."""
 
@@ -40,10 +48,12 @@ class FreeExudyn(FreeModel):
         mbs: Any = self._container.AddSystem()
         self.mbs, built = mbs, Build(driven.vehicle, mbs, Preloads({}, {}), mbs.AddObject(items.ObjectGround()))
         add_tree(built, list(bodies))
-        tree = built.links[bodies[0].name][0]
-        mbs.SetObjectParameter(tree, "gravity", driven.gravity.tolist())
-        mbs.SetObjectParameter(tree, "forceUserFunction", user_function(driven))
-        self._sensors = recorders(mbs, [next(iter(built.places.values()))[0]])
+        self.tree = built.links[bodies[0].name][0]
+        mbs.SetObjectParameter(self.tree, "gravity", driven.gravity.tolist())
+        mbs.SetObjectParameter(self.tree, "forceUserFunction", user_function(driven))
+        node = next(iter(built.places.values()))[0]
+        add_parts(built, node, driven.parts)
+        self._sensors = recorders(mbs, [node])
         mbs.Assemble()
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

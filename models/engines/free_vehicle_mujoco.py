@@ -16,6 +16,7 @@ from models.engines.mujoco_callback import CALLBACK, installed
 from models.engines.mujoco_layout import check, offsets
 from models.engines.mujoco_native import Native, native
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
+from models.engines.native_mujoco import add_parts, built_elements, ends, set_laws
 from models.machine.stack import array_at, double_at
 from models.vehicles.spatial import SpatialVehicle
 
@@ -56,22 +57,37 @@ def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     return only
 
 
+def compiled_model(driven: Driven) -> mujoco.MjModel:
+    """Bodies, joints, springs and the callback's numbers, without the callback."""
+    numbers, parts = driven.numbers, driven.parts
+    merged = {name: rider for name, rider in carriers(driven.vehicle).items() if name not in ends(parts)}
+    spec = spec_of(driven.vehicle, 1e-3, merged)
+    add_parts(spec, driven.vehicle, parts)
+    spec.option.gravity = driven.gravity
+    spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
+    model = spec.compile()
+    model.numeric_data[:] = numbers
+    places = Numbers(driven.vehicle, model, merged)
+    if not np.array_equal(places.columns, np.arange(driven.size)):
+        raise ValueError("the bodies are not in the order of a walk through their tree")
+    weigh(model, places, driven.vehicle.bodies)
+    set_laws(model, parts)
+    return model
+
+
+def share(driven: Driven) -> tuple[tuple[str, ...], int]:
+    """Names of the elements that have a tendon or an actuator in the model, and its joints."""
+    model = compiled_model(driven)
+    return built_elements(model), int(model.njnt)
+
+
 class FreeMujoco(FreeModel):
     """One free vehicle in one MuJoCo model; the callback's numbers lie in the model."""
 
     ENGINE = "mujoco"
 
     def __init__(self, driven: Driven) -> None:
-        self.driven, numbers, merged = driven, driven.numbers, carriers(driven.vehicle)
-        spec = spec_of(driven.vehicle, 1e-3, merged)
-        spec.option.gravity = driven.gravity
-        spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
-        self.model = spec.compile()
-        self.model.numeric_data[:] = numbers
-        places = Numbers(driven.vehicle, self.model, merged)
-        if not np.array_equal(places.columns, np.arange(driven.size)):
-            raise ValueError("the bodies are not in the order of a walk through their tree")
-        weigh(self.model, places, driven.vehicle.bodies)
+        self.driven, self.model = driven, compiled_model(driven)
         self.data = mujoco.MjData(self.model)
         self.law = timed_law(driven.kernel)
         self._marcher = Marcher(self.model)

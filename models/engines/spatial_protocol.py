@@ -76,6 +76,12 @@ def build(
             "a reduced vehicle has bodies without mass, rigid springs or locked freedoms, which only "
             "the closed form of the reference has: use --engine reference, or the whole vehicle",
         )
+    for spring in (spring for spring in vehicle.springs if spring.frame is not None):
+        raise Refused(
+            engine,
+            f"the axis of {spring.name!r} is fixed in {spring.frame!r}: in ride the engines know axes that are fixed "
+            "in the space; use --engine reference, whose closed form has the others, or leave out frame",
+        )
     linear = linearise(vehicle, speed)
     if settings is not None:
         _check(engine, linear, settings, road)

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.vehicles.spatial import FREEDOMS, SpatialVehicle, SpringDamper, Vector
-from models.vehicles.spatial_linear import preloads
-
-UNIT = np.eye(3)
+from models.vehicles.spatial import FREEDOMS, AntiRollBar, SpatialVehicle, SpringDamper, Vector
+from models.vehicles.spatial_linear import UNIT, End, preloads
 
 
 @dataclass
@@ -109,14 +107,7 @@ class SpatialReference:
         for spring in self.vehicle.springs:
             out += self._spring(spring)
         for bar in self.vehicle.bars:
-            (left, rows), (right, others) = (
-                self._point(bar.left, bar.point_left),
-                self._point(bar.right, bar.point_right),
-            )
-            apart, row = left[2] - bar.point_left[2] - right[2] + bar.point_right[2], (rows - others)[2] / bar.track
-            roll = np.eye(self.size)[self.index[bar.body, "rx"]]
-            moment = self.held.parts[bar.name] + bar.stiffness * (roll @ self.q - apart / bar.track)
-            out += (moment + bar.damping * (roll - row) @ self.v) * (row - roll)
+            out += self._bar(bar)
         for tyre, height, rate in zip(self.vehicle.tyres, heights, rates, strict=True):
             place, rows = self._point(tyre.body, tyre.point)
             elastic = self.held.tyres[tyre.name] + tyre.stiffness * (height - place[2] + tyre.point[2])
@@ -134,9 +125,27 @@ class SpatialReference:
         return out
 
     def _spring(self, s: SpringDamper) -> np.ndarray:
-        (one, of_one), (two, of_two) = self._point(s.one, s.point_one), self._point(s.two, s.point_two)
-        row = np.array(s.axis) @ (of_two - of_one)
-        travel, rate = np.dot(s.axis, two - one - np.subtract(s.point_two, s.point_one)), row @ self.v
+        travel, row = self._travel((s.one, s.point_one), (s.two, s.point_two), s.axis, s.frame)
+        rate = row @ self.v
         force = self.held.parts[s.name] + s.stiffness * travel + s.damping * rate
         force += (s.travel_force(travel) if s.travel_force else 0.0) + (s.rate_force(rate) if s.rate_force else 0.0)
         return -(force + s.friction * np.tanh(rate / s.friction_rate)) * row
+
+    def _bar(self, bar: AntiRollBar) -> np.ndarray:
+        """Forces (n,) of a bar; the roll of a body beside itself is 0."""
+        ends = (bar.right, bar.point_right), (bar.left, bar.point_left)
+        apart, row = self._travel(*ends, (0.0, 0.0, 1.0), bar.frame)
+        roll = np.eye(self.size)[self.index[bar.body, "rx"]] * (bar.frame != bar.body)
+        turned, row = roll @ self.q - apart / bar.track, roll - row / bar.track
+        moment = self.held.parts[bar.name] + bar.stiffness * turned + bar.damping * row @ self.v
+        return np.asarray(-moment * row)
+
+    def _travel(self, one: End, two: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
+        """axis . (point two - point one) less its value in the design position, and its derivatives (n,)."""
+        (first, of_first), (second, of_second) = self._point(*one), self._point(*two)
+        along, apart, row = np.array(axis), np.subtract(two[1], one[1]), np.zeros(self.size)
+        if frame is not None:
+            m = self.motions[frame]
+            apart, along = m.rotation @ apart, m.rotation @ along
+            row = np.cross(along, second - first) @ m.turn
+        return float(along @ (second - first - apart)), row + along @ (of_second - of_first)

@@ -2,14 +2,17 @@
 
 Springs, mounts and bars inside; at every hub the six measured components, or, in the virtual measurement, the tyre on
 its road; and what stabilises roll and pitch. All numbers lie in one table, see ``table``: a head, joints, bodies,
-elements, hubs, then the inputs of every half step.
+elements, hubs, then the inputs of every half step, and curves.
 """
+
+import math
 
 import numpy as np
 
 from models.machine.compiled import lean, njit
 from models.machine.stack import array, at, beyond, doubles, start
 from models.multibody.cut_mechanics import (
+    ALONG,
     PARENT,
     PER_BODY,
     PER_JOINT,
@@ -23,7 +26,8 @@ from models.multibody.cut_mechanics import (
     solve,
     turned,
 )
-from models.multibody.tree import dot, plus, put, three
+from models.multibody.parts import on_curve
+from models.multibody.tree import cross, dot, plus, put, three, times
 from models.multibody.tree import out as into
 from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL
 
@@ -54,16 +58,19 @@ columns; m/s^2; the chassis' last joint; m/s; the pull's N m/rad, N m s/rad; 1/s
 FRAMES = ("hub", "body", "inertial")
 NONE, PULLED, HELD = range(3)
 """Stabilisers: none; a moment towards an angle and its rate; a moment that enforces the acceleration of the angle."""
-ONE, POINT_ONE, TWO, POINT_TWO, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING, PER_ELEMENT = 0, 1, 4, 5, 8, 11, 12, 13, 14, 15
+ONE, POINT_ONE, TWO, POINT_TWO, AXIS, DESIGN, FORCE, STIFFNESS, DAMPING = 0, 1, 4, 5, 8, 11, 12, 13, 14
+AXIS_JOINT, FRICTION, FRICTION_RATE, ON_TRAVEL, ON_RATE, PER_ELEMENT = range(15, 21)
+"""Numbers of an element: last joint and point of both ends, axis, travel at rest, preload, N/m, N s/m; the last joint
+of the body in which the axis is fixed, N, m/s, and where the table has its curves (0: nowhere)."""
 LAST, ARM, HEIGHT, LOAD, TYRE, TYRE_DAMPING, CORNERING, ROLL_STEER, ONE_SIDED, PER_HUB = 0, 1, 4, 5, 6, 7, 8, 9, 10, 11
 WRENCH, GUIDING = 6, 6
 """Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
 
 
 @lean
-def _element(e, joints, m, chassis, v, row):
+def _element(e, numbers, joints, m, chassis, v, row):
     """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis."""
-    axis, travel, rate = turned(m[chassis + 1], three(e, AXIS)), -e[DESIGN], 0.0
+    axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
     for side in range(2):
         sign, j = 2.0 * side - 1.0, int(e[TWO * side])
@@ -75,7 +82,34 @@ def _element(e, joints, m, chassis, v, row):
             row[j] += sign * along
             rate += sign * along * v[j]
             j = int(joints[j, PARENT])
-    return e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
+    if e[AXIS_JOINT] > chassis:
+        rate += _turn_axis(e, joints, m, chassis, v, axis, row)
+    force = e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
+    if e[FRICTION] != 0.0:
+        force += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
+    if e[ON_TRAVEL] != 0.0:
+        force += on_curve(beyond(start(numbers), int(e[ON_TRAVEL])), travel)
+    if e[ON_RATE] != 0.0:
+        force += on_curve(beyond(start(numbers), int(e[ON_RATE])), rate)
+    return force
+
+
+@lean
+def ends_apart(e, m):
+    """From the first to the second point of an element."""
+    return plus(locate(m[int(e[TWO]) + 1], e, POINT_TWO), times(locate(m[int(e[ONE]) + 1], e, POINT_ONE), -1.0))
+
+
+@lean
+def _turn_axis(e, joints, m, chassis, v, axis, row):
+    """Add to ``row`` what an axis that turns beside the chassis changes of the travel; the rate of that."""
+    moved, rate, j = cross(axis, ends_apart(e, m)), 0.0, int(e[AXIS_JOINT])
+    while j > chassis:
+        along = joints[j, TURNS] * dot(moved, three(m[j + 1], ALONG))
+        row[j] += along
+        rate += along * v[j]
+        j = int(joints[j, PARENT])
+    return rate
 
 
 @lean
@@ -138,7 +172,7 @@ def parts(numbers):
         numbers[one:two].reshape(b, PER_BODY),
         numbers[two:three].reshape(e, PER_ELEMENT),
         numbers[three:four].reshape(h, PER_HUB),
-        numbers[four:].reshape(int(head[ROWS]), int(head[COLUMNS])),
+        numbers[four : four + int(head[ROWS]) * int(head[COLUMNS])].reshape(int(head[ROWS]), int(head[COLUMNS])),
     )
 
 
@@ -155,7 +189,7 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
     travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)
     for i in range(len(elements)):
-        inside[i] = _element(elements[i], joints, m, chassis, v, travel)
+        inside[i] = _element(elements[i], numbers, joints, m, chassis, v, travel)
         for j in range(chassis + 1, len(joints)):
             out[j] -= inside[i] * travel[j]
     for i in range(count):

@@ -13,6 +13,7 @@ from models.machine.stack import array, doubles
 from models.multibody.cut_kernel import (
     ARM,
     AXIS,
+    AXIS_JOINT,
     CHASSIS,
     DESIGN,
     GRAVITY,
@@ -21,6 +22,7 @@ from models.multibody.cut_kernel import (
     PER_TIME,
     TWO,
     WRENCH,
+    ends_apart,
     forces,
     frame,
     parts,
@@ -88,20 +90,23 @@ def _load_hubs(head, hubs, m, wrenches, acting):
 
 
 @lean
-def _load_elements(elements, m, chassis, inside, acting, travels):
-    """Write places and forces at both ends of every element, negative, and its travel."""
+def _load_elements(elements, m, inside, acting, travels):
+    """Write places and forces at both ends of every element and the couple on its frame, negative, and its travel."""
     for i in range(len(elements)):
         e = elements[i]
-        axis = turned(m[chassis + 1], three(e, AXIS))
+        axis = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS))
         travels[i] = -e[DESIGN]
         for side in range(2):
-            row, sign = acting[2 * i + side], 2.0 * side - 1.0
+            row, sign = acting[3 * i + side], 2.0 * side - 1.0
             place = locate(m[int(e[ONE + TWO * side]) + 1], e, TWO * side + 1)
             for k in range(3):
                 travels[i] += sign * axis[k] * place[k]
             put(row, 0, place)
             put(row, 3, times(axis, sign * inside[i]))
             put(row, 6, (0.0, 0.0, 0.0))
+        put(acting[3 * i + 2], 0, (0.0, 0.0, 0.0))
+        put(acting[3 * i + 2], 3, (0.0, 0.0, 0.0))
+        put(acting[3 * i + 2], 6, times(cross(axis, ends_apart(e, m)), inside[i]))
 
 
 @lean
@@ -131,15 +136,15 @@ def _feel_point(joints, m, point, gravity, qdd):
 def felt(numbers, every, states, guides, carried, points, own_axes, out):
     """Write answers (n, all) of states (n, 2 c), ``every`` half steps apart from time 0 on.
 
-    guides (g,) : last joint of each body; carried (g, b + h + 2 e) : whether what acts on bodies, hubs and ends of
-    elements acts behind it; points (p, PER_POINT); own_axes : whether guides and hubs are given in the axes of what
-    they carry instead of the chassis'.
+    guides (g,) : last joint of each body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both ends and
+    the frame of elements acts behind it; points (p, PER_POINT); own_axes : whether guides and hubs are given in the
+    axes of what they carry instead of the chassis'.
     """
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, b, e, h, chassis = len(joints), len(bodies), len(elements), len(hubs), int(head[CHASSIS])
     m, mass, sides = np.empty((n + 1, PER_MOTION)), np.empty((n, n)), np.empty((1, n))
     inside, travels, wrenches, moments = np.empty(e), np.empty(e), np.empty((h, WRENCH)), np.empty(2)
-    acting, per_time, gravity = np.empty((b + h + 2 * e, 9)), head[PER_TIME], head[GRAVITY]
+    acting, per_time, gravity = np.empty((b + h + 3 * e, 9)), head[PER_TIME], head[GRAVITY]
     for i in range(len(states)):
         q, v, row = states[i, :n], states[i, n:], out[i]
         sides[:] = 0.0
@@ -148,7 +153,7 @@ def felt(numbers, every, states, guides, carried, points, own_axes, out):
         solve(mass, sides)
         _move_bodies(joints, bodies, m, gravity, sides[0], acting[:b])
         _load_hubs(head, hubs, m, wrenches, acting[b : b + h])
-        _load_elements(elements, m, chassis, inside, acting[b + h :], travels)
+        _load_elements(elements, m, inside, acting[b + h :], travels)
         row[:e], row[e : 2 * e] = inside, travels
         at = 2 * e
         for k in range(6):

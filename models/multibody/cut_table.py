@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.multibody import cut_kernel as kernel
-from models.vehicles.cut_vehicle import ROLL, CutVehicle
+from models.multibody.parts import curve_numbers
+from models.vehicles.cut_vehicle import ROLL, CutVehicle, Element
 from models.vehicles.free_vehicle import anchor
 from models.vehicles.free_vehicle import joints as free_joints
 from models.vehicles.spatial import Vector
@@ -60,7 +61,7 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
     for body in (body for body in vehicle.tree.bodies if body.mass or np.any(body.inertia)):
         arm = np.subtract(body.position, joined.origin[body.name])
         bodies.append([joined.last[body.name], body.mass, *arm, *np.ravel(body.inertia)])
-    elements = [_element(vehicle, joined, i) for i in range(len(vehicle.elements))]
+    elements = [_element(element, joined) for element in vehicle.elements]
     hubs = [_hub(vehicle, joined, i) for i in range(len(vehicle.hubs))]
     inputs = drive.hubs if drive.guide is None else np.hstack([drive.hubs, drive.guide])
     head = np.zeros(kernel.HEADER)
@@ -72,17 +73,29 @@ def table(vehicle: CutVehicle, drive: Drive, step: float) -> np.ndarray:
     if drive.guide is not None:
         head[kernel.GUIDE] = kernel.PULLED if drive.pull else kernel.HELD
     head[kernel.ROLL_STIFFNESS : kernel.PITCH_DAMPING + 1] = drive.pull or 0.0
-    parts = (head, joined.rows, np.array(bodies, float), np.array(elements), np.array(hubs), inputs)
-    whole = np.concatenate([np.ravel(part) for part in parts])
+    rows = np.array(elements, float).reshape(-1, kernel.PER_ELEMENT)
+    parts = (head, joined.rows, np.array(bodies, float), rows, np.array(hubs), inputs)
+    curves = _put_curves(vehicle, rows, sum(part.size for part in parts))
+    whole = np.concatenate([*(np.ravel(part) for part in parts), curves])
     whole[kernel.ALL] = len(whole)
     return whole
 
 
-def _element(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:
-    e = vehicle.elements[i]
+def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray:
+    """Numbers of all curves, and into the rows of their elements where they are, of which the first is at ``first``."""
+    placed = list[float]()
+    for row, element in zip(rows, vehicle.elements, strict=True):
+        for column, curve in ((kernel.ON_TRAVEL, element.travel_force), (kernel.ON_RATE, element.rate_force)):
+            if curve is not None:
+                row[column] = first + len(placed)
+                placed += curve_numbers(curve).tolist()
+    return np.array(placed)
+
+
+def _element(e: Element, joined: Joints) -> list[float]:
     one, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
-    design = float(e.axis @ (e.point_two - e.point_one))
-    return [joined.last[e.one], *one, joined.last[e.two], *two, *e.axis, design, e.held, e.stiffness, e.damping]
+    law = (e.held, e.stiffness, e.damping, joined.last[e.frame], e.friction, e.friction_rate, 0.0, 0.0)
+    return [joined.last[e.one], *one, joined.last[e.two], *two, *e.axis, e.design, *law]
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:

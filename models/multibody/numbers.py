@@ -8,9 +8,9 @@ import numpy as np
 from models.core.errors import InputError
 from models.multibody import forces as at
 from models.multibody import tree
-from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART
+from models.multibody.parts import ON_RATE, ON_TRAVEL, PER_PART, curve_numbers
 from models.tyre.bristles import net, shape_factor
-from models.vehicles.free_vehicle import anchor, chassis_of, free_vehicle, joints, rotor
+from models.vehicles.free_vehicle import CARRIER, anchor, chassis_of, free_vehicle, joints, rotor
 from models.vehicles.spatial import Curve, SpatialVehicle, Vector
 from models.vehicles.spatial_linear import Preloads, preloads
 
@@ -196,6 +196,9 @@ def _springs(own: Handling, points: _Points) -> Iterator[_Part]:
             raise InputError(
                 own.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
             )
+        if s.frame != CARRIER:
+            allowed = "must be left out: in handling the axes of springs are fixed in the carrier, which only yaws"
+            raise InputError(own.vehicle.name, f"springs[{s.name}].frame", s.frame, allowed)
         ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
         rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
         law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate, rest]
@@ -218,14 +221,8 @@ def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
             if curve is not None:
                 row[column] = first + found.size
-                found = np.concatenate((found, _hinges(curve)))
+                found = np.concatenate((found, curve_numbers(curve)))
     return found
-
-
-def _hinges(curve: Curve) -> np.ndarray:
-    offset, slope, corners, bends = curve.hinges()
-    pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
-    return np.array([3 + len(pairs), offset, slope, *pairs])
 
 
 def _tyre(own: Handling, i: int, points: _Points) -> list[float]:

@@ -6,9 +6,12 @@ share of a coordinate, less what it is at rest; its force draws both together.
 
 import math
 
+import numpy as np
+
 from models.machine.compiled import lean
 from models.machine.stack import beyond, row
 from models.multibody.tree import PER_SPOT, PUSH, RATE, WHERE, add, dot, plus, three, times
+from models.vehicles.spatial import Curve
 
 (
     STIFFNESS,
@@ -49,9 +52,9 @@ def press(numbers, first, count, spots, q, v, f):
         if e[FRICTION] != 0.0:
             other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
         if e[ON_TRAVEL] != 0.0:
-            other += _curve(beyond(numbers, int(e[ON_TRAVEL])), travel)
+            other += on_curve(beyond(numbers, int(e[ON_TRAVEL])), travel)
         if e[ON_RATE] != 0.0:
-            other += _curve(beyond(numbers, int(e[ON_RATE])), rate)
+            other += on_curve(beyond(numbers, int(e[ON_RATE])), rate)
         energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
         power -= other * rate
         if own >= 0:
@@ -63,10 +66,17 @@ def press(numbers, first, count, spots, q, v, f):
 
 
 @lean
-def _curve(numbers, argument):
-    """Force on a curve at a pointer."""
+def on_curve(numbers, argument):
+    """Force on a curve at a pointer: count of numbers, offset, slope, then corners and bends in turn."""
     head = row(numbers, 3, 0)
     hinges, force = row(numbers, int(head[0]), 0), head[1] + head[2] * argument
     for i in range(3, len(hinges), 2):
         force += hinges[i + 1] * max(argument - hinges[i], 0.0)
     return force
+
+
+def curve_numbers(curve: Curve) -> np.ndarray:
+    """Numbers of a curve, as ``on_curve`` reads them."""
+    offset, slope, corners, bends = curve.hinges()
+    pairs = [value for pair in zip(corners, bends, strict=True) for value in pair]
+    return np.array([3 + len(pairs), offset, slope, *pairs])

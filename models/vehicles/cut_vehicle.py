@@ -1,9 +1,10 @@
 """A vehicle in space, cut at the wheels: what is above the cut, free to move and turn without limit.
 
-All bodies ride on the chassis, in its own axes, and so do the axes of springs, mounts and bars: what is inside the
-vehicle feels relative coordinates alone. The chassis itself has position, heading (about the vertical), pitch and
-roll, in this order, so that roll and pitch say where gravity points whatever the heading is. Two carriers without mass
-hold these joints. Wheels ride along sideways. The tyres are cut off; what they did comes from outside, at the hubs.
+All bodies ride on the chassis, in its own axes. The axes of springs, mounts and bars are fixed in it, too, unless their
+frame is another body: what is inside the vehicle feels relative coordinates alone. The chassis itself has position,
+heading (about the vertical), pitch and roll, in this order, so that roll and pitch say where gravity points whatever
+the heading is. Two carriers without mass hold these joints. Wheels ride along sideways. The tyres are cut off; what
+they did comes from outside, at the hubs.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.vehicles.free_vehicle import guided
-from models.vehicles.spatial import AntiRollBar, Body, SpatialVehicle, SpringDamper, Vector, steiner
+from models.vehicles.spatial import AntiRollBar, Body, Curve, SpatialVehicle, SpringDamper, Vector, steiner
 from models.vehicles.spatial_linear import preloads
 
 GRAVITY = 9.81
@@ -23,10 +24,12 @@ ANGLES = {"roll": ROLL, "pitch": PITCH, "heading": HEADING}
 
 @dataclass(frozen=True)
 class Element:
-    """A force F = held + stiffness d + damping d' along an axis of the chassis, positive in compression, or a moment.
+    """A force along an axis, positive in compression, or a moment.
 
-    d = axis . (point two - point one) less its design value, in the chassis' frame; of an anti-roll bar the axis is
-    divided by the track, so that d is an angle and F a moment. points in the design position, m; N or N m.
+    F = held + stiffness d + damping d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate) with
+    d = axis . (point two - point one) less its design value, in the axes of the body ``frame``, the chassis mostly; of
+    an anti-roll bar the axis is divided by the track, so that d is an angle and F a moment. points in the design
+    position, m; N or N m.
     """
 
     name: str
@@ -38,6 +41,21 @@ class Element:
     stiffness: float
     damping: float
     held: float
+    frame: str
+    travel_force: Curve | None = None
+    rate_force: Curve | None = None
+    friction: float = 0.0
+    friction_rate: float = 1.0
+
+    def gauge(self) -> "Element":
+        """An element whose force is the travel d of this one."""
+        straight = replace(self, travel_force=None, rate_force=None, friction=0.0)
+        return replace(straight, stiffness=1.0, damping=0.0, held=0.0)
+
+    @property
+    def design(self) -> float:
+        """axis . (point two - point one) in the design position."""
+        return float(self.axis @ (self.point_two - self.point_one))
 
     @property
     def unit(self) -> str:
@@ -75,15 +93,20 @@ class CutVehicle:
 def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     """Cut a vehicle whose body ``chassis`` has all six freedoms; InputError for what cannot be cut."""
     _check(vehicle, chassis)
-    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=())
+    whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
 
     def element(part: SpringDamper | AntiRollBar, one: str, two: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
         force = held.parts[part.name]
-        return Element(part.name, one, two, first, second, axis, part.stiffness, part.damping, force)
+        return Element(part.name, one, two, first, second, axis, part.stiffness, part.damping, force, str(part.frame))
 
-    springs = (element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis) for s in whole.springs)
+    def bent(s: SpringDamper) -> Element:
+        straight = element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis)
+        rough = replace(straight, friction=s.friction, friction_rate=s.friction_rate)
+        return replace(rough, travel_force=s.travel_force, rate_force=s.rate_force)
+
+    springs = map(bent, whole.springs)
     bars = (element(b, b.left, b.right, b.point_left, b.point_right, (0.0, 0.0, 1.0 / b.track)) for b in whole.bars)
     loads = np.array([held.tyres[tyre.name] for tyre in whole.tyres])
     return CutVehicle(chassis, _tree(whole, chassis), whole, (*springs, *bars), loads)
@@ -116,13 +139,6 @@ def _check(vehicle: SpatialVehicle, chassis: str) -> None:
     for spring in vehicle.springs:
         if spring.two is None:
             raise InputError(vehicle.name, f"springs[{spring.name}].bodies", "ground", "a cut vehicle has no ground")
-        if spring.travel_force or spring.rate_force or spring.friction:
-            raise InputError(
-                vehicle.name,
-                f"springs[{spring.name}]",
-                None,
-                "has a curve or friction: the cut vehicle knows linear springs and dampers alone",
-            )
     for bar in vehicle.bars:
         if bar.body != chassis:
             place = f"anti_roll_bars[{bar.name}].body"

@@ -1,9 +1,9 @@
 """A vehicle of the ride that may turn through any angle: the same bodies, masses and springs on a carrier that yaws.
 
-The laws of ``spatial`` hold along directions fixed in space, for small motion about straight travel. Here a massless
+The laws of the ride hold along directions fixed in space, for small motion about straight travel. Here a massless
 **carrier** on the ground has the chassis' motion in the plane, x, y and yaw, all finite (ISO 8855: x forward, y left, z
 up). On it a massless **sway** has the rest, z, roll and pitch, about axes on the ground below the chassis' centre, and
-the chassis is fixed to it. Directions that were fixed in space are fixed in the carrier now. All that had no parent
+the chassis is fixed to it. Springs and bars that name no frame have the carrier's. All that had no parent
 rides on the chassis, which guides it: what it has no coordinate for, as wheels and occupants have none along y, it does
 with the chassis, which feels its inertia and its weight there. So wheel loads balance the inertia of the whole vehicle.
 Each tyre that turns gets a **rotor**, a body of its own with the spin.
@@ -45,7 +45,8 @@ def free_vehicle(
         if spin_inertia and tyre.name not in fixed
     ]
     bars = tuple(_swaying(bar) if bar.body == chassis.name else bar for bar in vehicle.bars)
-    return replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
+    free = replace(vehicle, bodies=_walked(bodies), bars=bars, side_forces=(), drags=(), outputs=(), gravity=gravity)
+    return free.in_frame(CARRIER)
 
 
 def guided(vehicle: SpatialVehicle, chassis: str) -> SpatialVehicle:

@@ -2,7 +2,11 @@
 
 Axes of ride (see ``models.ride``): x forward, y left, z up from the ground. Every point is given in metres where it
 lies in the **design position**, all coordinates zero, in which every body is parallel to the axes. The laws below are
-exact, not linearised; "along a" always means along a direction fixed in space.
+exact, not linearised. "Along a" means along a direction that is fixed in a **frame**: in the axes of the body that a
+spring or a bar names, or in the space where it names none.
+
+Which frame stands for none is the law of a system: the space in ride, the carrier in handling (``free_vehicle``), the
+chassis under hub forces (``cut_vehicle``); each of them names it when it makes its vehicle.
 """
 
 from bisect import bisect_right
@@ -83,17 +87,18 @@ class Curve:
 class SpringDamper:
     """Spring, damper, curves and dry friction between p1 fixed to body ``one`` and p2 fixed to body ``two``.
 
-    With a = ``axis`` (a unit vector fixed in space) and d = a . (p2 - p1) less its value in the design position,
+    With a = ``axis`` (a unit vector fixed in ``frame``) and d = a . (p2 - p1) less its value in the design position,
 
         F = F0 + k d + c d' + travel_force(d) + rate_force(d') + friction tanh(d' / friction_rate),
 
     acts as +F a at p1 on body one and as -F a at p2 on body two (None: the ground). With one above, two below and a
     up, travel d and force F are positive in compression. F0 is the preload of ``spatial_linear.preloads``, 0 without
-    gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of the pair is what the guide takes up
-    that keeps a fixed in space. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at rest; elsewhere, as
-    with a spring beside the wheel that it carries, bodies that turn together strain it.
+    gravity. The two forces are equal and opposite; the couple (p1 - p2) x F a of the pair is taken up by the frame,
+    which keeps a. It is 0 where p2 - p1 is 0 or along a, as in most suspensions at rest. Where it is not, as with a
+    spring beside the wheel that it carries, bodies that turn together strain a spring whose frame is the space.
 
-    point_one, point_two (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s).
+    point_one, point_two (m), stiffness (N/m), damping (N s/m), friction (N), friction_rate (m/s); frame: the body in
+    whose axes a is fixed, None for the space.
     """
 
     name: str
@@ -108,6 +113,7 @@ class SpringDamper:
     rate_force: Curve | None = None
     friction: float = 0.0
     friction_rate: float = 0.01
+    frame: str | None = None
 
     @property
     def bent(self) -> bool:
@@ -120,9 +126,10 @@ class AntiRollBar:
     """A bar between a body that rolls and the points ``left`` and ``right`` of an axle's bodies.
 
     With e = rx - (h_left - h_right) / (y_left - y_right), rx the body's own roll coordinate (rad) and h how far each
-    point has risen from its design position, the moment M = M0 + stiffness e + damping e' (N m) acts as -M on the
-    coordinate rx, as the vertical force +M / (y_left - y_right) at left and as the opposite one at right. The body
-    has no parent, so that -M turns it about the space's x. M0 is the preload.
+    point has risen from its design position along z of ``frame``, the moment M = M0 + stiffness e + damping e' (N m)
+    acts as -M on the coordinate rx, as the force +M / (y_left - y_right) along z at left and as the opposite one at
+    right. In the space (None) the body has no parent, so that -M turns it about the space's x. Where the frame is the
+    body itself, rx counts as 0, and -M is the couple of the two forces. M0 is the preload.
     """
 
     name: str
@@ -133,6 +140,7 @@ class AntiRollBar:
     point_right: Vector
     stiffness: float
     damping: float = 0.0
+    frame: str | None = None
 
     @property
     def track(self) -> float:
@@ -286,6 +294,14 @@ class SpatialVehicle:
     def with_tyres(self, pushes_only: bool) -> "SpatialVehicle":
         """The vehicle with all tyres so."""
         return replace(self, tyres=tuple(replace(tyre, pushes_only=pushes_only) for tyre in self.tyres))
+
+    def in_frame(self, frame: str) -> "SpatialVehicle":
+        """The vehicle with this body as the frame of all springs and bars that name none."""
+        return replace(
+            self,
+            springs=tuple(replace(spring, frame=spring.frame or frame) for spring in self.springs),
+            bars=tuple(replace(bar, frame=bar.frame or frame) for bar in self.bars),
+        )
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

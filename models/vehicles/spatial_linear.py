@@ -27,6 +27,8 @@ NOTHING = 1e-10
 """Share of the largest one below which a travel of a reduced vehicle counts as none."""
 Gains = tuple[float, float]
 """Stiffness and damping."""
+End = tuple[str | None, Vector]
+"""A body, None for the ground, and a point (m) that is fixed to it, in the design position."""
 
 
 UNIT = np.eye(3)
@@ -81,6 +83,21 @@ class Kinematics:
                 for _, _, inner in motions[k:]:
                     second[:, outer, inner] = second[:, inner, outer] = TURN[along - 3] @ first[:, inner]
         return second
+
+    def turned_axis(self, frame: str | None, axis: Vector) -> np.ndarray:
+        """(3, n): change of an axis that is fixed in a body, by the coordinates; zeros for the space, None."""
+        return np.zeros((3, self.size)) if frame is None else np.cross(self.turn(frame), axis, axisa=0).T
+
+    def travel_bend(self, one: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
+        """(n, n): second derivatives of axis . (point two - point one), the axis fixed in a body or in the space."""
+        ends, second = self.shift(*two) - self.shift(*one), self.bend(*two) - self.bend(*one)
+        total = np.tensordot(axis, second, 1)
+        if frame is None:
+            return total
+        mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
+        beyond = x + axis[0], y + axis[1], z + axis[2]
+        bent = self.bend(frame, beyond) - self.bend(frame, (x, y, z))
+        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], one[1]), bent, 1))
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
         """Coordinates that move a body, from the ground outwards: (the body that has it, freedom, index)."""
@@ -206,8 +223,9 @@ def _parts(vehicle: SpatialVehicle, motion: Kinematics, gains: Mapping[str, Gain
     """Spring-dampers and bars by name."""
     rows = dict[str, Part]()
     for spring in vehicle.springs:
-        apart = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
-        rows[spring.name] = np.array(spring.axis) @ apart, *gains[spring.name]
+        ends = motion.shift(spring.two, spring.point_two) - motion.shift(spring.one, spring.point_one)
+        apart, turning = np.subtract(spring.point_two, spring.point_one), motion.turned_axis(spring.frame, spring.axis)
+        rows[spring.name] = np.array(spring.axis) @ ends + apart @ turning, *gains[spring.name]
     return rows | {bar.name: (_twist(motion, bar), bar.stiffness, bar.damping) for bar in vehicle.bars}
 
 
@@ -235,11 +253,11 @@ def _geometric(vehicle: SpatialVehicle, motion: Kinematics) -> np.ndarray:
     for body in vehicle.bodies:
         total += body.mass * vehicle.gravity * motion.bend(body.name, body.position)[2]
     for spring in vehicle.springs:
-        apart = motion.bend(spring.two, spring.point_two) - motion.bend(spring.one, spring.point_one)
-        total += held.parts[spring.name] * np.tensordot(spring.axis, apart, 1)
+        ends = (spring.one, spring.point_one), (spring.two, spring.point_two)
+        total += held.parts[spring.name] * motion.travel_bend(*ends, spring.axis, spring.frame)
     for bar in vehicle.bars:
-        risen = motion.bend(bar.left, bar.point_left)[2] - motion.bend(bar.right, bar.point_right)[2]
-        total -= held.parts[bar.name] / bar.track * risen
+        ends = (bar.left, bar.point_left), (bar.right, bar.point_right)
+        total += held.parts[bar.name] / bar.track * motion.travel_bend(*ends, (0.0, 0.0, 1.0), bar.frame)
     for tyre in vehicle.tyres:
         total -= held.tyres[tyre.name] * motion.bend(tyre.body, tyre.point)[2]
     return total

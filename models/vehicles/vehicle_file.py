@@ -214,8 +214,21 @@ class _Builder:
         self._need(acts, f"{place}.stiffness", None, "is missing: neither spring, damper, curve nor friction")
         travel, rate = (self._curve(f"{place}.{key}", getattr(spring, key)) for key in ("travel_force", "rate_force"))
         return SpringDamper(
-            spring.name, *ends, *points, axis, *gains, travel, rate, spring.friction, spring.friction_rate
+            spring.name,
+            *ends,
+            *points,
+            axis,
+            *gains,
+            travel,
+            rate,
+            spring.friction,
+            spring.friction_rate,
+            self._frame(place, spring.frame),
         )
+
+    def _frame(self, place: str, name: str | None) -> str | None:
+        """The body that a table names as its frame, if any."""
+        return None if name is None else self._body(f"{place}.frame", name)
 
     def _ends(self, place: str, bodies: Sequence[str]) -> tuple[str, str | None]:
         """The two bodies, None for the ground."""
@@ -261,8 +274,9 @@ class _Builder:
             acts = any(mount.stiffness) or any(mount.damping)
             place = _place("mounts", mount.name, "stiffness")
             self._need(acts, place, mount.stiffness, "has neither spring nor damper")
+            frame = self._frame(_place("mounts", mount.name), mount.frame)
             for name, axis, k, c in zip("xyz", np.eye(3), mount.stiffness, mount.damping, strict=True):
-                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c)
+                yield SpringDamper(f"{mount.name}.{name}", *ends, at, at, _vector(axis), k, c, frame=frame)
 
     def _seat_spring(self, seat: SeatTable) -> SpringDamper:
         """Carrier below, occupant above: turned round so that force is positive in compression."""

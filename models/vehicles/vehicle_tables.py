@@ -16,6 +16,7 @@ Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 Name = Annotated[str, Field(min_length=1)]
 
 UP = [0.0, 0.0, 1.0]
+FRAME = "body in whose axes the direction is fixed; by default what the system of the scene takes"
 
 
 def of(unit: str, meaning: str, default: Any = ...) -> Any:
@@ -65,6 +66,7 @@ class SpringTable(Entry):
     rate_force: CurveTable | None = Field(None, description="force over rate beside the damper")
     friction: float = quantity("N", "dry friction", default=0.0, zero=True)
     friction_rate: float = quantity("m/s", "friction is friction * tanh(rate / friction_rate)", default=0.01)
+    frame: str | None = Field(None, description=FRAME)
 
 
 class MountTable(Entry):
@@ -74,6 +76,7 @@ class MountTable(Entry):
     point: Triple = of("m", "its place")
     stiffness: NotNegativeTriple = of("N/m", "along x, y, z")
     damping: NotNegativeTriple = of("N s/m", "along x, y, z", [0.0, 0.0, 0.0])
+    frame: str | None = Field(None, description=FRAME)
 
 
 class SeatTable(Entry):

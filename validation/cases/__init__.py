@@ -56,6 +56,7 @@ CASES = (
     "choice_linear",
     "choice_nonlinear",
     "hub_forces",
+    "native_builds",
     "contact_price",
     "fastsim",
     "wheelset",

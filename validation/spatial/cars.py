@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,7 +15,7 @@ from models.multibody.cut_table import Drive
 from models.multibody.numbers import Handling
 from models.tyre.bristles import brush
 from models.vehicles.cut_vehicle import CutVehicle, cut
-from models.vehicles.spatial import SpatialVehicle
+from models.vehicles.spatial import Curve, SpatialVehicle, SpringDamper
 from models.vehicles.vehicle_file import load_vehicle
 
 SEED = 31
@@ -37,6 +38,30 @@ def twin() -> SpatialVehicle:
     bodies = tuple(replace(b, mass=b.mass * (1 + 0.03 * i)) for i, b in enumerate(whole.bodies))
     chassis = replace(bodies[0], inertia=((200.0, 15.0, -10.0), (15.0, 1390.0, 8.0), (-10.0, 8.0, 1617.0)))
     return replace(whole, springs=springs, bodies=(chassis, *bodies[1:]))
+
+
+@cache
+def rough_car() -> CutVehicle:
+    """The twin with stops, digressive dampers and dry friction in its suspension and mounts, cut.
+
+    One wheel moves in all three directions, on a spring along none of them; one seat has no spring but a curve.
+    """
+    whole, skew = twin(), tuple((np.array([0.2, 0.95, -0.3]) / np.linalg.norm([0.2, 0.95, -0.3])).tolist())
+    wheel = whole.tyres[0]
+    bodies = tuple(replace(b, freedoms=("x", "y", "z")) if b.name == wheel.body else b for b in whole.bodies)
+    lateral = SpringDamper("lateral", "body", wheel.body, wheel.point, wheel.point, skew, 2e5, 800.0)
+    seat = Curve((-0.1, 0.1), (-1500.0, 1500.0))
+    stop = Curve((-0.08, -0.02, 0.0, 0.015, 0.05), (-3000.0, -200.0, 0.0, 100.0, 2500.0))
+    damper = Curve((-1.0, -0.1, 0.0, 0.1, 1.0), (-900.0, -300.0, 0.0, 200.0, 500.0))
+    more: tuple[dict[str, Any], ...] = (
+        {"travel_force": stop},
+        {"rate_force": damper},
+        {"friction": 80.0, "friction_rate": 0.02},
+        {},
+    )
+    springs = [replace(s, **more[i % 4]) for i, s in enumerate(whole.springs)]
+    springs[-1] = replace(springs[-1], stiffness=0.0, travel_force=seat)
+    return cut(replace(whole, bodies=bodies, springs=(*springs, lateral)), "body")
 
 
 def static(vehicle: CutVehicle, rows: int, frame: str = "hub") -> Drive:

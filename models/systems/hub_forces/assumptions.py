@@ -12,7 +12,7 @@ from models.systems.hub_forces.measurement import Angles, travels
 from models.systems.hub_forces.scene import HubScene, Road
 from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
 
-_SMOOTHER = "take a smoother road.iso8608, a lower road.speed, or stiffer springs: no stop is in the cut vehicle"
+_SMOOTHER = "take a smoother road.iso8608, a lower road.speed, stiffer springs, or give them a stop as travel_force"
 ON_TYRES = "on tyres"
 """In place of a method: the run on the road that gives a virtual measurement."""
 PUSHES = 1.0
@@ -42,11 +42,11 @@ def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angle
 
 
 def inside(vehicle: CutVehicle, travel: Callable[[Result], Watched], remedy: str) -> list[Assumption]:
-    """Of linear springs, mounts and bars, whose travels (m, rad) are told by name."""
+    """Of springs, mounts and bars without stops, whose travels (m, rad) are told by name: a travel_force is one."""
     kinds = (("springs", "N", "m", TRAVEL), ("bars", "N m", "rad", TURN))
     listed = []
     for kind, of, unit, most in kinds:
-        names = {each.name for each in vehicle.elements if each.unit == of}
+        names = {each.name for each in vehicle.elements if each.unit == of and not each.travel_force}
 
         def watched(run: Result, names: set[str] = names) -> Watched:
             return {name: values for name, values in travel(run).items() if name in names}

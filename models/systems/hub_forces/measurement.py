@@ -69,7 +69,7 @@ def truth(engine: str, vehicle: CutVehicle, road: Drive, frame: str, step: float
 def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
     """Travel (m,) of every spring, mount and bar from the design position by name, m (rad of a bar), positive in
     compression, along a run."""
-    gauges = tuple(replace(element, stiffness=1.0, damping=0.0, held=0.0) for element in vehicle.elements)
+    gauges = tuple(element.gauge() for element in vehicle.elements)
     still = Drive(np.zeros((2 * len(run.times) - 1, WRENCH * len(vehicle.hubs))))
     model = build("reference", replace(vehicle, elements=gauges), still, run.times[1], run.times[-1])
     values = model.reported(run.times, run.states).elements

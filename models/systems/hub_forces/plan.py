@@ -10,7 +10,8 @@ from models.core.assumptions import assumption_lines
 from models.core.errors import InputError
 from models.core.finding import Finding, gathered
 from models.core.scene_effects import lines as effect_lines
-from models.engines.cut_vehicle import check_step
+from models.engines.cut_vehicle import check_step, native_share
+from models.engines.free_vehicle import ENGINES as FREE_ENGINES
 from models.measured.signal import UNITS, Quantity, Signal
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
 from models.systems.hub_forces.scene import Frame, HubScene
@@ -66,7 +67,7 @@ def describe(scene: HubScene) -> str:
             "vehicle",
             f"{vehicle.tree.name}: {vehicle.size} freedoms, {body.mass:.6g} kg, cut at {', '.join(vehicle.hubs)}",
         ),
-        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, in the chassis' axes"),
+        _line("inside", f"{len(vehicle.elements)} springs, mounts and bars, {_frames(vehicle)}"),
         _line("forces", f"{source}, six per hub in the frame {forces.frame!r}, {forces.interpolation}"),
         _line("noise", _noise(scene)),
     ]
@@ -82,7 +83,8 @@ def describe(scene: HubScene) -> str:
     if scene.study == COMPARING:
         lines.append(_line("compared", "free, with kalman_filter, with prescribed_angles: a scene each"))
     lines += [_line("doubt", text) for text in doubts(scene)]
-    never = "drag, tyres that roll, curves and friction of springs"
+    lines += _whose_forces(scene, vehicle)
+    never = "drag, tyres that roll"
     runs = [*([ON_TYRES] if scene.road is not None else []), scene.stabilise.method]
     assumed = {each.says: each for run in runs for each in assumptions(scene, vehicle, run)}
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumed.values()), _line("never", never)])
@@ -96,6 +98,26 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
 
     vehicle = scene.cut_vehicle()
     return Measurement(scene, vehicle, None, *scene.measured(vehicle)).tilt.doubts
+
+
+def _frames(vehicle: CutVehicle) -> str:
+    """In whose axes those of elements are fixed."""
+    others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
+    return "; ".join(["in the chassis' axes", *others])
+
+
+def _whose_forces(scene: HubScene, vehicle: CutVehicle) -> list[str]:
+    """What each engine has as its own and what it shares, counted in the models as they are built."""
+    shared = "hub forces" if scene.road is None else "hub forces, tyres on the road"
+    if scene.forces_with(scene.stabilise.method) == "compiled":
+        return [_line("native", "bodies and joints"), _line("shared", f"springs, mounts and bars, {shared}")]
+    lines = []
+    for engine in FREE_ENGINES:
+        share = native_share(engine, vehicle)
+        count = f"{len(share.elements)} of {len(vehicle.elements)} springs, mounts and bars, {share.joints} joints"
+        lines.append(_line("native", f"{engine}: {count}"))
+        lines += [_line("shared", f"{engine}: {name}, {why}") for name, why in share.reasons.items()]
+    return [*lines, _line("shared", f"{shared}: no engine has sampled ones")]
 
 
 def _noise(scene: HubScene) -> str:

@@ -19,7 +19,7 @@ from models.core.result import Channel, Result, result
 from models.core.signals import Smooth
 from models.core.smoothing import smoothed
 from models.core.steps import divides
-from models.engines.cut_vehicle import HubRun, build
+from models.engines.cut_vehicle import HubRun, Route, build
 from models.multibody.cut_table import Drive
 from models.road.iso8608 import iso8608_road
 from models.systems.hub_forces.assumptions import ON_TYRES, assumptions
@@ -106,7 +106,8 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
     vehicle, road, step = scene.cut_vehicle(), scene.road, scene.run.step
     if road is None:
         return Measurement(scene, vehicle, None, *scene.measured(vehicle))
-    true, errors = on_road(vehicle, road, scene.forces.frame, (engine, step, scene.run.duration), error)
+    march = (engine, step, scene.run.duration, scene.run.forces)
+    true, errors = on_road(vehicle, road, scene.forces.frame, march, error)
     forces, angles = recorded(true, scene.forces.frame, round(1.0 / (scene.forces.sampling_rate * step)))
     if scene.forces.noise == "white":
         forces = forces.noisy(scene.deviations(vehicle), scene.seed)
@@ -116,29 +117,34 @@ def measure(scene: HubScene, engine: str, error: bool = False) -> Measurement:
 
 
 def on_road(
-    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, float, float], error: bool = False
+    vehicle: CutVehicle, road: Road, frame: Frame, march: tuple[str, float, float, Route], error: bool = False
 ) -> tuple[HubRun, dict[str, Estimate]]:
     """The vehicle on its tyres over a road, its hub forces in a frame; and errors of the run, where they are asked for.
 
-    march : engine, step and duration (s).
+    march : engine, step and duration (s), and whose the forces of springs are.
     """
-    engine, step, duration = march
+    engine, step, duration, kind = march
     left, right = (iso8608_road(road.iso8608, road.seed + i) for i in range(2))
 
     def drive(step: float, steps: int) -> Drive:
         return replace(two_tracks(vehicle, left, right, road.speed, step, steps), frame=frame)
 
-    true = build(engine, vehicle, drive(step, round(duration / step)), step, duration).run()
-    return true, errors_of_steps(engine, vehicle, true, drive)[0] if error else {}
+    true = build(engine, vehicle, drive(step, round(duration / step)), step, duration, kind).run()
+    return true, errors_of_steps(engine, vehicle, true, drive, forces=kind)[0] if error else {}
 
 
 def errors_of_steps(
-    engine: str, vehicle: CutVehicle, run: HubRun, drive: Callable[[float, int], Drive], period: float = 0.0
+    engine: str,
+    vehicle: CutVehicle,
+    run: HubRun,
+    drive: Callable[[float, int], Drive],
+    period: float = 0.0,
+    forces: Route = "compiled",
 ) -> tuple[dict[str, Estimate], str]:
     """Errors of what ``principal`` lists of a run in an engine, by name, and how they were told.
 
     drive : what drives it, for a step (s) and so many steps; period : of its samples (s), 0 for none: longer steps must
-    divide it, or they would take the samples' noise for motion.
+    divide it, or they would take the samples' noise for motion; forces : whose those of springs are.
     """
     step, steps = float(run.times[1]), len(run.times) - 1
 
@@ -151,7 +157,7 @@ def errors_of_steps(
         inputs = drive(own, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
         part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
-        path = build(engine, vehicle, part, own, count * own).run(run.states[row])
+        path = build(engine, vehicle, part, own, count * own, forces).run(run.states[row])
         return principal(vehicle, path, first * own)
 
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
@@ -195,7 +201,8 @@ def run(
     """
     measurement, method = measurement or measure(scene, engine, error), method or scene.stabilise.method
     drive = measurement.drive(method, scene.run.step, scene.steps)
-    model = build(engine, measurement.vehicle, drive, scene.run.step, scene.run.duration)
+    kind = scene.forces_with(method)
+    model = build(engine, measurement.vehicle, drive, scene.run.step, scene.run.duration, kind)
     begun = time.process_time()
     path = model.run(measurement.start(drive))
     seconds = time.process_time() - begun
@@ -203,7 +210,7 @@ def run(
     if not error:
         return found
     vehicle, period = measurement.vehicle, measurement.forces.period
-    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period)
+    told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period, kind)
     if (
         before := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much

@@ -14,6 +14,7 @@ from models.core.steps import divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
 from models.core.tables import NEWTONS, RADIANS, RADIANS_PER_SECOND
 from models.core.time_series import CHASSIS, other_unit, read_time_series
+from models.engines.cut_vehicle import Route
 from models.systems.hub_forces.measurement import Angles, HubForces
 from models.vehicles.cut_vehicle import CutVehicle, cut
 from models.vehicles.vehicle_file import load_vehicle
@@ -41,6 +42,9 @@ class Run(Strict):
 
     duration: float = quantity("s", "of the measurement and of every run", default=15.0)
     step: float = quantity("s", "of Runge-Kutta 4 in every engine", default=1e-3)
+    forces: Route = Field(
+        default="native", description="springs, mounts and bars of the engine's own, or all in its one callback"
+    )
 
 
 class Road(Strict):
@@ -106,6 +110,10 @@ class HubScene(SceneFile):
         """Steps of every run."""
         return round(self.run.duration / self.run.step)
 
+    def forces_with(self, method: Method) -> Route:
+        """Route springs a run has: an enforced tilt needs all forces in one place, whatever the scene says."""
+        return "compiled" if method == "prescribed" else self.run.forces
+
     def cut_vehicle(self) -> CutVehicle:
         """The vehicle without its tyres; raises InputError."""
         vehicle = load_vehicle(self.vehicle.file, self.folder, self.file, "vehicle.file")
@@ -155,6 +163,9 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
         _check_file_only(file, scene)
     elif scene.forces.accept:
         raise InputError(file, "forces.accept", scene.forces.accept, "is of forces.file: nothing else is checked")
+    if "forces" in scene.run.model_fields_set and scene.run.forces != scene.forces_with(scene.stabilise.method):
+        allowed = "an enforced tilt needs all forces in one place: drop it, or choose another stabilise.method"
+        raise InputError(file, "run.forces", scene.run.forces, allowed)
     _check_steps(file, scene)
     return with_own(scene)
 

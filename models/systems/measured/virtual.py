@@ -104,7 +104,7 @@ def virtual_measurement(
     error : whether the error of the steps on the road is estimated, by further runs.
     """
     signals = check(vehicle, own, file)
-    run, told = on_road(vehicle, own.road, own.frame, (engine, own.step, own.duration), error)
+    run, told = on_road(vehicle, own.road, own.frame, (engine, own.step, own.duration, "compiled"), error)
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
     moved = travels(vehicle, run) if own.travels else {}

@@ -1,0 +1,198 @@
+"""Springs, dampers, mounts and bars of a cut vehicle as Exudyn's own: connectors of coordinates and along an axis.
+
+A travel that is a sum of coordinates is a spring-damper between two of them, or a matrix where it is one of more. A
+travel along an axis that is fixed in a turning body has no connector that is exact: Exudyn takes axes as they lie in
+the space. So what the body carries is hung up a second time, as a tree of the same coordinates on the ground: there the
+body stands still, and a connector from the ground along a fixed axis is exact. Its links have next to no mass. Every
+point of it costs a walk through the tree, so the springs of a mount, along x, y and z at one place, are one connector.
+
+Names of these objects are those of the elements.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from models.engines.exudyn_system import items, lists
+from models.engines.exudyn_tree import JOINTS, Build
+from models.engines.native_parts import AxialTravel, CoordinateTravel, NativePart
+from models.vehicles.cut_vehicle import Element
+from models.vehicles.free_vehicle import anchor, joints
+
+Axial = tuple[Element, AxialTravel]
+MASS = 1e-15
+"""kg and kg m^2 of a link of a second tree: Exudyn divides by them, and the vehicle must not feel them."""
+LAW, NEXT = "native law: ", "; "
+"""What a name of an object begins with, and what stands between the names of several elements in it."""
+
+
+def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
+    """All parts into a system whose one tree has its coordinates in ``node``."""
+    coordinates, trees, axial = _Coordinates(built, node), _Trees(built, node), list[Axial]()
+    for part in parts:
+        if isinstance(part.travel, CoordinateTravel):
+            coordinates.add(part.element, part.travel)
+        else:
+            axial.append((part.element, part.travel))
+    for group in _at_one_place(axial):
+        trees.add(group)
+
+
+def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
+    """Those of these names that an assembled system has an object of."""
+    objects = [mbs.GetObject(i)["name"] for i in range(mbs.systemData.NumberOfObjects())]
+    listed = {name for each in objects if each.startswith(LAW) for name in each.removeprefix(LAW).split(NEXT)}
+    return tuple(name for name in elements if _plain(name) in listed)
+
+
+def _name(*elements: Element) -> str:
+    """Name of the object that is these elements."""
+    return LAW + NEXT.join(_plain(element.name) for element in elements)
+
+
+def _plain(name: str) -> str:
+    """An element's name without what stands between names."""
+    return name.replace(NEXT, " ")
+
+
+def _at_one_place(parts: Sequence[Axial]) -> list[list[Axial]]:
+    """Parts along x, y and z at the same places together, no two along the same axis; every other one alone."""
+    groups = dict[object, list[Axial]]()
+    for i, (element, travel) in enumerate(parts):
+        places = (travel.frame, travel.body, *travel.foot, *travel.tip)
+        key: object = places if np.count_nonzero(travel.axis) == 1 else i
+        if any(np.any(travel.axis * other.axis) for _, other in groups.get(key, ())):
+            key = i
+        groups.setdefault(key, []).append((element, travel))
+    return list(groups.values())
+
+
+def _gains(element: Element) -> dict[str, float]:
+    return {"stiffness": element.stiffness, "damping": element.damping}
+
+
+def _sunk(element: Element) -> float:
+    """Travel at which a spring has its preload."""
+    return element.held / element.stiffness if element.stiffness else 0.0
+
+
+def _along_axes(group: Sequence[Axial]) -> dict[str, Any]:
+    """Law of one connector for parts along different axes; an axis may count backwards."""
+    stiffness, damping, offset = np.zeros((3, 3))
+    for element, travel in group:
+        stiffness += element.stiffness * travel.axis**2
+        damping += element.damping * travel.axis**2
+        offset += (travel.design - _sunk(element)) * travel.axis
+    names = _name(*(element for element, _ in group))
+    return {"name": names, "stiffness": stiffness, "damping": damping, "offset": offset}
+
+
+class _Coordinates:
+    """Connectors between coordinates of one node."""
+
+    def __init__(self, built: Build, node: Any) -> None:
+        self.built, self.node, self.markers = built, node, dict[int, Any]()
+
+    def add(self, element: Element, travel: CoordinateTravel) -> None:
+        """One connector, or a matrix where more than two coordinates count."""
+        if len(travel.coordinates) > 2:
+            return self._add_matrix(element, travel)
+        if not travel.coordinates:
+            return
+        first, *others = [self._marker(i) for i in travel.coordinates]
+        factor, *rest = travel.factors
+        other, against = (others[0], -rest[0]) if others else (self._still(), 1.0)
+        self.built.mbs.AddObject(
+            items.CoordinateSpringDamperExt(
+                name=_name(element),
+                markerNumbers=[other, first],
+                factor0=against,
+                factor1=factor,
+                offset=-_sunk(element),
+                **_gains(element),
+            )
+        )
+
+    def _add_matrix(self, element: Element, travel: CoordinateTravel) -> None:
+        row = np.zeros(self.built.size(self.node))
+        row[list(travel.coordinates)] = travel.factors
+        self.built.mbs.AddObject(
+            items.ObjectGenericODE2(
+                name=_name(element),
+                nodeNumbers=[self.node],
+                massMatrix=np.zeros((row.size, row.size)),
+                stiffnessMatrix=element.stiffness * np.outer(row, row),
+                dampingMatrix=element.damping * np.outer(row, row),
+                forceVector=-element.held * row,
+            )
+        )
+
+    def _marker(self, coordinate: int) -> Any:
+        if coordinate not in self.markers:
+            self.markers[coordinate] = self.built.coordinate(self.node, coordinate)
+        return self.markers[coordinate]
+
+    def _still(self) -> Any:
+        if -1 not in self.markers:
+            self.markers[-1] = self.built.coordinate(self.built.mbs.AddNode(items.NodePointGround()), 0)
+        return self.markers[-1]
+
+
+class _Trees:
+    """Second trees, one for each body in which axes are fixed, and connectors from the ground to them."""
+
+    def __init__(self, built: Build, node: Any) -> None:
+        self.built, self.node, self.trees = built, node, dict[str, Any]()
+
+    def add(self, group: Sequence[Axial]) -> None:
+        """One connector, from the place of the foot on the ground to the tip."""
+        (element, travel), *others = group
+        mbs, (link, origin) = self.built.mbs, anchor(self.built.vehicle, travel.body)
+        foot = mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self.built.ground, localPosition=travel.foot.tolist()))
+        tip = mbs.AddMarker(
+            items.MarkerKinematicTreeRigid(
+                objectNumber=self._tree(travel.frame),
+                linkNumber=link,
+                localPosition=np.subtract(travel.tip, origin).tolist(),
+            )
+        )
+        if others or np.count_nonzero(travel.axis) == 1:
+            mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[foot, tip], **_along_axes(group)))
+            return
+        mbs.AddObject(
+            items.LinearSpringDamper(
+                name=_name(element),
+                markerNumbers=[foot, tip],
+                axisMarker0=travel.axis.tolist(),
+                offset=travel.design - _sunk(element),
+                **_gains(element),
+            )
+        )
+
+    def _tree(self, frame: str) -> Any:
+        """What a body carries, hung on the ground where it lies in the design position; no other link carries any."""
+        if frame not in self.trees:
+            self.trees[frame] = self.built.mbs.AddObject(self._new_tree(frame))
+        return self.trees[frame]
+
+    def _new_tree(self, frame: str) -> Any:
+        vehicle = self.built.vehicle
+        rows, places = joints(vehicle), vehicle.coordinates()
+        parents, offsets = rows[:, 1].astype(int), rows[:, 2:].copy()
+        for i, (name, _) in enumerate(places):
+            carried = frame in vehicle.chain(name)[1:]
+            if not carried or (vehicle.body(name).parent == frame and places[i - 1][0] != name):
+                parents[i], offsets[i] = -1, vehicle.body(name).position
+        count = len(places)
+        return items.ObjectKinematicTree(
+            nodeNumber=self.node,
+            gravity=[0, 0, 0],
+            jointTypes=[JOINTS[freedom] for _, freedom in places],
+            linkParents=parents.tolist(),
+            jointTransformations=lists.Matrix3DList([np.eye(3)] * count),
+            jointOffsets=lists.Vector3DList(list(offsets)),
+            linkInertiasCOM=lists.Matrix3DList([MASS * np.eye(3)] * count),
+            linkCOMs=lists.Vector3DList([np.zeros(3)] * count),
+            linkMasses=[MASS] * count,
+        )

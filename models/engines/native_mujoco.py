@@ -1,0 +1,118 @@
+"""Springs, dampers, mounts and bars of a cut vehicle as MuJoCo's own: fixed tendons and site actuators.
+
+A travel that is a sum of coordinates is the length of a fixed tendon with its own spring and damper. A travel along an
+axis that is fixed in a body is that of a site beside a reference site on this body, exact because the body carries the
+site: MuJoCo leaves out the coordinates that move both. Actuators act there whose force is affine in length and speed;
+a curve has one more for each corner, whose force range cuts it off at 0 on one side.
+
+Names of tendons and actuators end in that of the element. What MuJoCo's compiler would take for something else (a
+spring length below 0, a positive damping for a ratio) is written into the compiled model.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from models.engines.native_parts import AxialTravel, CoordinateTravel, NativePart
+from models.vehicles.cut_vehicle import Element
+from models.vehicles.spatial import Curve, SpatialVehicle
+
+ENDLESS = 1e300
+"""N: a force range that cuts nothing off."""
+BREAK = ": "
+"""Between the number of a tendon or an actuator and its element's name."""
+
+
+class Affine(NamedTuple):
+    """A force constant + slope L + damping L' of a length L (m) and its rate, within a range: N, N/m, N s/m."""
+
+    constant: float = 0.0
+    slope: float = 0.0
+    damping: float = 0.0
+    low: float = -ENDLESS
+    high: float = ENDLESS
+
+
+def ends(parts: Sequence[NativePart]) -> set[str]:
+    """Bodies on which parts have sites: MuJoCo must know them apart from what rides on them."""
+    axial = [part.travel for part in parts if isinstance(part.travel, AxialTravel)]
+    return {name for travel in axial for name in (travel.frame, travel.body)}
+
+
+def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[NativePart]) -> None:
+    """Tendons, sites and actuators into a specification of ``mujoco_tree.spec_of``; ``set_laws`` fills them."""
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    joints = [f"{numbers[body]} {freedom}" for body, freedom in vehicle.coordinates()]
+    for i, part in enumerate(parts):
+        travel, name = part.travel, f"{i}{BREAK}{part.element.name}"
+        if isinstance(travel, CoordinateTravel):
+            tendon = spec.add_tendon(name=name)
+            for coordinate, factor in zip(travel.coordinates, travel.factors, strict=True):
+                tendon.wrap_joint(joints[coordinate], factor)
+            of = {"trntype": mujoco.mjtTrn.mjTRN_TENDON, "target": name}
+        else:
+            for end, body, place in (("foot", travel.frame, travel.foot), ("tip", travel.body, travel.tip)):
+                spec.body(numbers[body]).add_site(name=f"{end} {i}", pos=place - vehicle.body(body).position)
+            of = {"trntype": mujoco.mjtTrn.mjTRN_SITE, "target": f"tip {i}", "refsite": f"foot {i}"}
+            of["gear"] = [*travel.axis, 0.0, 0.0, 0.0]
+        for k, _ in enumerate(affine_forces(part)):
+            actuator = spec.add_actuator(name=f"{i}.{k}{BREAK}{part.element.name}", **of)
+            actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+
+
+def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:
+    """Write stiffness, damping, preload and curves of all parts into the compiled model."""
+    model.actuator_gainprm[:] = 0.0
+    for i, part in enumerate(parts):
+        element = part.element
+        if isinstance(part.travel, CoordinateTravel):
+            tendon = model.tendon(f"{i}{BREAK}{element.name}").id
+            model.tendon_stiffness[tendon], model.tendon_damping[tendon] = element.stiffness, element.damping
+            model.tendon_lengthspring[tendon] = -element.held / element.stiffness if element.stiffness else 0.0
+        for k, force in enumerate(affine_forces(part)):
+            actuator = model.actuator(f"{i}.{k}{BREAK}{element.name}").id
+            model.actuator_biasprm[actuator, :3] = force[:3]
+            model.actuator_forcelimited[actuator] = (force.low, force.high) != (-ENDLESS, ENDLESS)
+            model.actuator_forcerange[actuator] = force.low, force.high
+
+
+def built_elements(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names of the elements that have a tendon or an actuator in a model, each once."""
+    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    actuators = [model.actuator(i).name for i in range(model.nu)]
+    return tuple(dict.fromkeys(name.split(BREAK, 1)[1] for name in (*tendons, *actuators)))
+
+
+def affine_forces(part: NativePart) -> list[Affine]:
+    """Forces on the length L of a part, d = L less its design value, that a tendon's own spring does not have.
+
+    They draw it together: where the element presses with F, they are -F.
+    """
+    axial, e = isinstance(part.travel, AxialTravel), part.element
+    design = part.travel.design if isinstance(part.travel, AxialTravel) else 0.0
+    stiffness, damping = (e.stiffness, e.damping) if axial else (0.0, 0.0)
+    held = e.held if axial or not e.stiffness else 0.0
+    line = np.array([held, stiffness, damping]) + sum(_lines(e), np.zeros(3))
+    forces = [Affine(*-line), *_corners(e.travel_force, 1), *_corners(e.rate_force, 2)]
+    shifted = [force._replace(constant=force.constant - force.slope * design) for force in forces]
+    return [force for force in shifted if any(force[:3])]
+
+
+def _lines(e: Element) -> Iterator[np.ndarray]:
+    """Constant, slope and damping (3,) of the first pieces of both curves."""
+    for curve, place in ((e.travel_force, 1), (e.rate_force, 2)):
+        if curve is not None:
+            line = np.zeros(3)
+            line[[0, place]] = curve.hinges()[:2]
+            yield line
+
+
+def _corners(curve: Curve | None, place: int) -> Iterator[Affine]:
+    """-bend max(x - corner, 0) of every corner of a curve; x is the travel where ``place`` is 1, its rate where 2."""
+    _, _, corners, bends = curve.hinges() if curve else (0.0, 0.0, (), ())
+    for corner, bend in zip(corners, bends, strict=True):
+        low, high = (-ENDLESS, 0.0) if bend > 0.0 else (0.0, ENDLESS)
+        slope, damping = (-bend, 0.0) if place == 1 else (0.0, -bend)
+        yield Affine(bend * corner, slope, damping, low, high)

@@ -1,0 +1,140 @@
+"""What an engine makes of the springs, mounts and bars of a cut vehicle: its own elements, and what is left of them.
+
+A travel d that is a sum of coordinates is one for every engine. So is d = a . (p2 - p1), where the axis a is fixed in
+the body of one end and that body carries the other end. What an engine lacks stays in the compiled forces that act for
+the hubs anyway, ``models.multibody.cut_kernel``: each part of it is named with the reason.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from models.vehicles.cut_vehicle import CutVehicle, Element
+from models.vehicles.spatial import FREEDOMS, SpatialVehicle
+
+CURVES = ("mujoco",)
+"""Engines whose own elements can have a force that is piecewise linear in travel or rate."""
+NO_FRAME = "its axis is fixed in no end of it that carries the other end"
+NO_TRAVEL = "no coordinate moves its ends apart along its axis"
+NO_CURVE = "curve: piecewise linear forces are functions in Exudyn, no elements"
+NO_FRICTION = {
+    "exudyn": "friction: tanh is a function in Exudyn, no element",
+    "mujoco": "friction: MuJoCo's is a constraint, which is no tanh",
+}
+
+
+@dataclass(frozen=True)
+class CoordinateTravel:
+    """d = sum of factor q over some ``coordinates``, numbers in the order of the tree's."""
+
+    coordinates: tuple[int, ...]
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class AxialTravel:
+    """d = axis . (tip - foot) less its design value: the axis (3,) is fixed in ``frame``, as the foot is.
+
+    foot, tip : places (3,) in the design position, m; the tip is on ``body``, which ``frame`` carries.
+    """
+
+    frame: str
+    foot: np.ndarray
+    body: str
+    tip: np.ndarray
+    axis: np.ndarray
+
+    @property
+    def design(self) -> float:
+        """axis . (tip - foot) in the design position."""
+        return float(self.axis @ (self.tip - self.foot))
+
+
+@dataclass(frozen=True)
+class NativePart:
+    """An element, of whose law only what the engine's own has is left, and its travel."""
+
+    element: Element
+    travel: CoordinateTravel | AxialTravel
+
+
+@dataclass(frozen=True)
+class Division:
+    """native : the engine's own; shared : elements with what the compiled forces have of their laws; reasons : of
+    these, by name."""
+
+    native: tuple[NativePart, ...]
+    shared: tuple[Element, ...]
+    reasons: dict[str, str] = field(default_factory=dict)
+
+
+def divide(vehicle: CutVehicle, engine: str) -> Division:
+    """All elements of a vehicle between "exudyn" or "mujoco" and the compiled forces."""
+    native, shared, reasons = list[NativePart](), list[Element](), dict[str, str]()
+    for element in vehicle.elements:
+        travel = travel_of(vehicle.tree, element)
+        still = isinstance(travel, CoordinateTravel) and not travel.coordinates
+        if travel is None or still:
+            shared.append(element)
+            reasons[element.name] = NO_TRAVEL if still else NO_FRAME
+            continue
+        kept, left, why = _divided(element, engine)
+        if kept is not None:
+            native.append(NativePart(kept, travel))
+        if left is not None:
+            shared.append(left)
+            reasons[element.name] = "; ".join(why)
+    return Division(tuple(native), tuple(shared), reasons)
+
+
+def _divided(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
+    """What the engine's element has, what is left, and why; a preload goes with what bears it."""
+    curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
+    left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
+    if curved and engine not in CURVES:
+        why.append(NO_CURVE)
+        element = replace(element, travel_force=None, rate_force=None)
+        if not element.stiffness:
+            left, element = replace(left, held=element.held), replace(element, held=0.0)
+    else:
+        left = replace(left, travel_force=None, rate_force=None)
+    if rough:
+        why.append(NO_FRICTION[engine])
+        element = replace(element, friction=0.0)
+    acts = element.stiffness or element.damping or element.travel_force or element.rate_force
+    return element if acts else None, left if why else None, why
+
+
+def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
+    """The travel of an element as an engine may have it; None where it is neither."""
+    one, two = (_behind(tree, end, element.frame) for end in (element.one, element.two))
+    if one is not None and two is not None and not any(_turns(tree, body) for body in (*one, *two)):
+        return _along_coordinates(tree, element, one, two)
+    if element.frame == element.two and one is not None:
+        return AxialTravel(element.two, element.point_two, element.one, element.point_one, -element.axis)
+    if element.frame == element.one and two is not None:
+        return AxialTravel(element.one, element.point_one, element.two, element.point_two, element.axis)
+    return None
+
+
+def _turns(tree: SpatialVehicle, body: str) -> bool:
+    """Whether a body turns beside what it rides on."""
+    return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
+
+
+def _behind(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | None:
+    """The bodies from one up to that which rides on the frame; None where the frame does not carry it."""
+    chain = tree.chain(body)
+    return chain[: chain.index(frame)] if frame in chain else None
+
+
+def _along_coordinates(
+    tree: SpatialVehicle, element: Element, one: tuple[str, ...], two: tuple[str, ...]
+) -> CoordinateTravel:
+    """Slides of the bodies behind the frame to either end, along its axes; those that move both ends drop out."""
+    factors = dict[int, float]()
+    for number, (body, freedom) in enumerate(tree.coordinates()):
+        ends = int(body in two) - int(body in one)
+        if factor := ends * float(element.axis[FREEDOMS.index(freedom) % 3]):
+            factors[number] = factor
+    return CoordinateTravel(tuple(factors), tuple(factors.values()))

@@ -1,0 +1,97 @@
+"""Hub forces with the engines' own springs, mounts and bars: both engines, compiled forces, written-out equations."""
+
+import time
+from pathlib import Path
+
+from models.engines.cut_vehicle import native_share
+from models.vehicles.cut_vehicle import CutVehicle, cut
+from validation.common.rows import CaseAnswer, Observed, Row, System
+from validation.spatial.cars import r19, rough_car, twin
+from validation.spatial.native_builds import (
+    NATIVE,
+    acceleration_error,
+    equations_error,
+    model,
+    path_error,
+    random_states,
+)
+
+TITLE = "Springs, mounts and bars of the engines' own under hub forces"
+SYSTEM: System = "drift"
+STATES, STEPS = 100, 1000
+QUICK_STATES, QUICK_STEPS = 10, 50
+ROUNDS, TIMED = 5, 1000
+"""Interleaved runs for the ratio of seconds, and the steps of each."""
+
+
+def measure(quick: bool, folder: Path) -> CaseAnswer:
+    """Three cars in full; quick: the shipped one, and a tenth of the states."""
+    cars = {"r19_free": r19()} if quick else {"r19_free": r19(), "twin": cut(twin(), "body"), "rough": rough_car()}
+    rows = [row for name, car in cars.items() for row in _agreement(name, car, quick)]
+    return [*rows, *([] if quick else _seconds(r19()))], {}
+
+
+def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
+    """Accelerations, paths and counts of one car."""
+    states, steps = random_states(car, QUICK_STATES if quick else STATES), QUICK_STEPS if quick else STEPS
+    where = f"{len(states)} states, any heading, roll and pitch to 0.3 rad, {name}"
+    rows = [
+        Observed(
+            f"native_builds.equations_{name}",
+            SYSTEM,
+            f"accelerations by compiled forces beside written-out equations, no hub forces, {where}",
+            equations_error(car, states),
+            "1",
+        ).at_most(1e-12, "of each coordinate's largest; rounding of stiff bushes leaves 6e-14", "native")
+    ]
+    for engine in NATIVE:
+        rows += [
+            Observed(
+                f"native_builds.accelerations_{name}_{engine}",
+                SYSTEM,
+                f"accelerations of {engine} with springs of its own beside compiled forces, {where}",
+                acceleration_error(engine, car, states),
+                "1",
+            ).at_most(1e-12, "of each coordinate's largest; the hub forces alone are shared", "native"),
+            Observed(
+                f"native_builds.path_{name}_{engine}",
+                SYSTEM,
+                f"states of {engine} with springs of its own beside compiled forces, {steps} steps of 1 ms, {name}",
+                path_error(engine, car, steps),
+                "m, rad, 1/s",
+            ).at_most(1e-10, "same tableau, same step", "native"),
+            _counted(name, car, engine),
+        ]
+    return rows
+
+
+def _counted(name: str, car: CutVehicle, engine: str) -> Row:
+    share = native_share(engine, car)
+    shared = "; ".join(f"{element}: {why}" for element, why in share.reasons.items()) or "nothing but hub forces"
+    return Observed(
+        f"native_builds.count_{name}_{engine}",
+        SYSTEM,
+        f"springs, mounts and bars of {name} that the model in {engine} has as its own",
+        len(share.elements),
+        "elements",
+    ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")
+
+
+def _seconds(car: CutVehicle) -> list[Row]:
+    """Seconds of a step by those with compiled forces, least of interleaved runs: told, not judged."""
+    rows = []
+    for engine, usual in (("exudyn", 3.0), ("mujoco", 1.2)):
+        models = {route: model(engine, car, route, TIMED) for route in ("native", "compiled")}
+        best: dict[str, float] = {}
+        for _ in range(ROUNDS):
+            for route, built in models.items():
+                begun = time.process_time()
+                built.run()
+                best[route] = min(best.get(route, float("inf")), time.process_time() - begun)
+        ratio = best["native"] / best["compiled"]
+        quantity = f"seconds of a step in {engine} with springs of its own by those with compiled forces"
+        why = "the machine decides; a second tree for the mounts" if engine == "exudyn" else "the machine decides"
+        rows.append(
+            Observed(f"native_builds.seconds_{engine}", SYSTEM, quantity, ratio, "1").beside(usual, why, "none")
+        )
+    return rows

@@ -1,0 +1,134 @@
+"""Faults in one engine's springs, mounts and bars of a vehicle on hub forces; what sees them.
+
+Both engines are put beside the compiled forces, which take nothing from their builders, at states far from rest.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import Patch, attribute
+from validation.spatial.cars import rough_car
+from validation.spatial.native_builds import acceleration_error, random_states
+
+STATES = 3
+EXUDYN = "models.engines.native_exudyn"
+
+
+def _beside_compiled(engine: str) -> Callable[[], float]:
+    """Largest difference of an engine's accelerations from those by compiled forces."""
+    return lambda: acceleration_error(engine, rough_car(), random_states(rough_car(), STATES))
+
+
+TITLE = "accelerations of {} beside compiled forces"
+CHECKS = {
+    engine: Check(TITLE.format(engine), "of the largest", 1e-12, _beside_compiled(engine))
+    for engine in ("exudyn", "mujoco")
+}
+
+
+def _in_model(change: Callable[[Any], None]) -> Patch:
+    """A change of MuJoCo's compiled model after its laws were written."""
+
+    def set_laws(real: Any) -> Any:
+        def written(model: Any, parts: Any) -> None:
+            real(model, parts)
+            if parts:
+                change(model)
+
+        return written
+
+    return attribute("models.engines.free_vehicle_mujoco:set_laws", set_laws)
+
+
+def _scale(array: str) -> Patch:
+    """The first row of an array of the model, 1 % larger."""
+
+    def change(model: Any) -> None:
+        getattr(model, array)[:1] *= 1.01
+
+    return _in_model(change)
+
+
+def _bar_tendon(model: Any) -> None:
+    """The first coordinate of the first bar counts 1 % more."""
+    bar = next(i for i in range(model.ntendon) if model.tendon(i).name.endswith("bar"))
+    model.wrap_prm[model.tendon_adr[bar]] *= 1.01
+
+
+def _site_actuator(model: Any) -> int:
+    """The first actuator between two sites."""
+    return int(np.argmax(model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE))
+
+
+def _swap_sites(model: Any) -> None:
+    """The reference site sits on the body that is carried: the axis turns with that."""
+    sites = model.actuator_trnid[_site_actuator(model)]
+    sites[:] = sites[::-1].copy()
+
+
+def _mount_preload(model: Any) -> None:
+    sited = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+    actuator = int(np.argmax(sited * (model.actuator_forcelimited == 0) * abs(model.actuator_biasprm[:, 0])))
+    model.actuator_biasprm[actuator, 0] *= 1.01
+
+
+def _corner(model: Any) -> None:
+    """A corner of a curve is not cut off."""
+    model.actuator_forcelimited[int(np.argmax(model.actuator_forcelimited))] = 0
+
+
+def _law(**factors: float) -> Patch:
+    """Stiffness, damping or preload of the first of Exudyn's elements by a factor."""
+
+    def add_parts(real: Any) -> Any:
+        def added(built: Any, node: Any, parts: Any) -> None:
+            first = parts[0].element
+            changed = replace(first, **{name: factor * getattr(first, name) for name, factor in factors.items()})
+            real(built, node, (replace(parts[0], element=changed), *parts[1:]))
+
+        return added
+
+    return attribute("models.engines.free_vehicle_exudyn:add_parts", add_parts)
+
+
+def _bar_factor(real: Any) -> Any:
+    """The first coordinate of a bar counts 1 % more."""
+
+    def add(self: Any, element: Any, travel: Any) -> None:
+        first, *others = travel.factors
+        scaled = replace(travel, factors=(1.01 * first, *others))
+        real(self, element, scaled if element.name.endswith("bar") else travel)
+
+    return add
+
+
+def _in_space(real: Any) -> Any:
+    """Mounts are measured along axes of the space: the connector hangs on the vehicle's tree."""
+
+    def tree(self: Any, frame: str) -> Any:
+        return self.built.links[frame][0]
+
+    return tree
+
+
+FAULTS = (
+    Fault("a stiffness 1 % off", "MuJoCo", _scale("tendon_stiffness")),
+    Fault("a damping 1 % off", "MuJoCo", _scale("tendon_damping")),
+    Fault("a preload 1 % off", "MuJoCo", _scale("tendon_lengthspring")),
+    Fault("a bar's factor 1 % off", "MuJoCo", _in_model(_bar_tendon)),
+    Fault("a mount's axis fixed in the engine", "MuJoCo", _in_model(_swap_sites)),
+    Fault("a mount's preload 1 % off", "MuJoCo", _in_model(_mount_preload)),
+    Fault("a curve without its corner", "MuJoCo", _in_model(_corner)),
+    Fault("a stiffness 1 % off", "Exudyn", _law(stiffness=1.01)),
+    Fault("a damping 1 % off", "Exudyn", _law(damping=1.01)),
+    Fault("a preload 1 % off", "Exudyn", _law(held=1.01)),
+    Fault("a bar's factor 1 % off", "Exudyn", attribute(f"{EXUDYN}:_Coordinates.add", _bar_factor)),
+    Fault("mounts' axes fixed in the space", "Exudyn", attribute(f"{EXUDYN}:_Trees._tree", _in_space)),
+)
+
+CAMPAIGN = Campaign("planted.native", "springs of the engines' own", "drift", CHECKS, FAULTS)

@@ -1,0 +1,73 @@
+"""A cut vehicle whose springs are the engines' own, beside compiled forces and the equations of the whole tree."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.engines.cut_vehicle import HubModel, Route
+from models.engines.spatial_reference import SpatialReference
+from models.multibody.cut_table import Drive
+from models.vehicles.cut_vehicle import GRAVITY, CutVehicle
+from validation.spatial.cars import static
+
+NATIVE = ("exudyn", "mujoco")
+SEED, STEP = 37, 1e-3
+State = tuple[np.ndarray, np.ndarray]
+
+
+def random_states(vehicle: CutVehicle, count: int) -> list[State]:
+    """Coordinates and rates (n,): any heading, roll and pitch to 0.3 rad, other turns to 0.05 rad, slides to 0.08 m."""
+    rng, turns = np.random.default_rng(SEED), np.array([f.startswith("r") for _, f in vehicle.tree.coordinates()])
+    most = np.where(turns, 0.05, 0.08)
+    most[:6] = 5.0, 5.0, 5.0, np.pi, 0.3, 0.3
+    n = vehicle.size
+    return [(most * rng.uniform(-1.0, 1.0, n), rng.uniform(-0.5, 0.5, n)) for _ in range(count)]
+
+
+def shaken_drive(vehicle: CutVehicle, rows: int) -> Drive:
+    """Static wheel loads and a random force and moment on every hub at every half step, in the hubs' axes."""
+    rest = static(vehicle, rows)
+    return replace(rest, hubs=rest.hubs + np.random.default_rng(SEED).normal(0.0, 300.0, rest.hubs.shape))
+
+
+def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> HubModel:
+    """The vehicle on its shaken hubs in an engine."""
+    return HubModel(engine, vehicle, shaken_drive(vehicle, 2 * steps + 1), STEP, steps * STEP, route)
+
+
+def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
+    """Largest difference of a native build's accelerations from compiled forces, by each coordinate's largest."""
+    native, compiled = model(engine, vehicle, "native"), model("mujoco", vehicle, "compiled")
+    return _difference([[each.accelerations(0.0, *state) for state in states] for each in (native, compiled)])
+
+
+def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
+    """The same of compiled forces and of ``SpatialReference``, which share no code, without hub forces."""
+    still = Drive(0.0 * static(vehicle, 3).hubs)
+    compiled, equations = HubModel("reference", vehicle, still, STEP, STEP), written(vehicle)
+    paths = [
+        [compiled.accelerations(0.0, *state) for state in states],
+        [equations.acceleration(*state) for state in states],
+    ]
+    return _difference(paths)
+
+
+def written(vehicle: CutVehicle) -> SpatialReference:
+    """Equations of a cut vehicle without hub forces: its tree with springs and bars, preloads and weight."""
+    whole = vehicle.whole
+    equations = SpatialReference(replace(vehicle.tree, springs=whole.springs, bars=whole.bars, gravity=0.0))
+    equations.vehicle = replace(equations.vehicle, gravity=GRAVITY)
+    equations.held = equations.held._replace(parts={element.name: element.held for element in vehicle.elements})
+    return equations
+
+
+def path_error(engine: str, vehicle: CutVehicle, steps: int) -> float:
+    """Largest difference (m, rad, m/s, rad/s) of a native run's states from one by compiled forces."""
+    native = model(engine, vehicle, "native", steps).run()
+    compiled = model("mujoco", vehicle, "compiled", steps).run()
+    return float(np.abs(native.states - compiled.states).max())
+
+
+def _difference(rows: list[list[np.ndarray]]) -> float:
+    found, wanted = map(np.array, rows)
+    return float((np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())
