@@ -1,0 +1,120 @@
+"""A vehicle that is cut at its wheels, driven by hub forces or by its tyres on a road, in plain numpy.
+
+The laws of ``models.multibody.cut_kernel`` anew: springs and bars from the vehicle that was cut, not from its
+elements; preloads from ``statics``; moments as couples; what enforces roll and pitch from one linear system.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from models.multibody.plain.march import march
+from models.multibody.plain.motion import FIRST, GROUND, PLACE, RATE, Bodies, Motion
+from models.multibody.plain.parts import Parts
+from models.multibody.plain.statics import held_at_rest
+from models.vehicles.cut_vehicle import HEADING, PITCH, ROLL, CutVehicle
+
+if TYPE_CHECKING:
+    from models.multibody.cut_table import Drive
+
+LEANS = [ROLL, PITCH]
+WRENCH = 6
+
+
+class State(NamedTuple):
+    """Accelerations (n,), forces of springs and bars (p,), wrenches (h, 6) in the drive's frame, moments (2,) that
+    hold roll and pitch, at one state."""
+
+    acceleration: np.ndarray
+    inside: np.ndarray
+    wrenches: np.ndarray
+    moments: np.ndarray
+
+
+class PlainHubs:
+    """A driven cut vehicle; ``step`` (s) is that of the rows of its drive, two to a step."""
+
+    def __init__(self, vehicle: CutVehicle, drive: "Drive", step: float) -> None:
+        self.vehicle, self.drive, self.step = vehicle, drive, step
+        self.bodies = Bodies(vehicle.tree)
+        self.parts = Parts(self.bodies, vehicle.whole, vehicle.chassis)
+        self.held, self.loads = held_at_rest(vehicle.whole, vehicle.chassis)
+        self._weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
+        tyres = vehicle.whole.tyres
+        self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in tyres])
+        self._chassis = self.bodies.row[vehicle.chassis]
+        sides = {force.name: force for force in vehicle.whole.side_forces}
+        self._sides = [
+            (sides[t.name].stiffness, sides[t.name].roll_steer) if t.name in sides else (0.0, 0.0) for t in tyres
+        ]
+        frames = {"hub": self._hubs.rows, "body": np.full(len(tyres), self._chassis)}
+        self._frames = frames.get(drive.frame, np.full(len(tyres), GROUND))
+
+    def at(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
+        """Everything at a time (s), coordinates and rates (n,)."""
+        row = min(max(round(2.0 * t / self.step), 0), len(self.drive.hubs) - 1)
+        motion = self.bodies.move(q, v)
+        mass, force = self.bodies.inertia(motion, self._weight)
+        travels = self.parts.travels(motion, q, v)
+        spring, other = self.parts.forces(travels, self.held)
+        inside = spring + other
+        by_hubs, wrenches = self._act(motion, row, q)
+        force += by_hubs - inside @ travels.gradient
+        acceleration, moments = self._hold(mass, force, row, q, v)
+        return State(acceleration, inside, wrenches, moments)
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
+        return self.at(t, q, v).acceleration
+
+    def march(self, q: np.ndarray, v: np.ndarray, steps: int) -> np.ndarray:
+        """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each."""
+        return march(self.acceleration, q, v, steps, self.step)
+
+    def _act(self, motion: Motion, row: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Generalised forces (n,) of all hubs, and their wrenches (h, 6)."""
+        points, total, wrenches = motion.at(self._hubs), np.zeros(self.bodies.size), np.empty((len(self.loads), WRENCH))
+        for i, (point, frame) in enumerate(zip(points, self._frames, strict=True)):
+            axes = motion.axes(int(frame))[PLACE]
+            if self.drive.road:
+                force, moment = self._tyre(i, point, motion, row, q)
+                wrenches[i] = np.concatenate((force @ axes, moment @ axes))
+            else:
+                wrenches[i] = self.drive.hubs[row, WRENCH * i : WRENCH * (i + 1)]
+                force, moment = axes @ wrenches[i, :3], axes @ wrenches[i, 3:]
+            total += point[FIRST:] @ force + motion.by_moment(int(self._hubs.rows[i]), moment)
+        return total, wrenches
+
+    def _tyre(self, i: int, hub: np.ndarray, motion: Motion, row: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (N) and moment (N m) in space at a hub by its tyre on the road."""
+        tyre, (cornering, roll_steer), speed = self.vehicle.whole.tyres[i], self._sides[i], self.drive.speed
+        height, rising = self.drive.hubs[row, i], self.drive.hubs[row, len(self.loads) + i]
+        down = -tyre.point[2] * motion.axes(self._chassis)[PLACE][:, 2]
+        spin = motion.axes(int(self._hubs.rows[i]))
+        sideways = (hub[RATE] + spin[RATE] @ (spin[PLACE].T @ down))[1]
+        elastic, grip = self.loads[i] + tyre.stiffness * (height - (hub[PLACE, 2] - tyre.point[2])), 1.0
+        load = elastic + tyre.damping * (rising - hub[RATE, 2])
+        if tyre.pushes_only:
+            load = max(min(load, 2.0 * elastic), 0.0)
+            grip = load / self.loads[i]
+        side = grip * cornering * (roll_steer * q[ROLL] + q[HEADING] - sideways / speed)
+        return np.array([-load * rising / speed, side, load]), side * np.array([-down[2], 0.0, down[0]])
+
+    def _hold(
+        self, mass: np.ndarray, force: np.ndarray, row: int, q: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Accelerations (n,), and moments (2,) on roll and pitch, N m, that pull or hold the vehicle to its guide."""
+        drive, moments = self.drive, np.zeros(2)
+        if drive.guide is None:
+            return np.linalg.solve(mass, force), moments
+        wanted, rates, accelerations = drive.guide[row].reshape(3, 2)
+        off, late = wanted - q[LEANS], rates - v[LEANS]
+        if drive.pull:
+            moments = np.array(drive.pull[0::2]) * off + np.array(drive.pull[1::2]) * late
+            force[LEANS] += moments
+            return np.linalg.solve(mass, force), moments
+        wanted = accelerations + 2.0 * drive.holding * late + drive.holding**2 * off
+        picks = np.eye(len(force))[LEANS]
+        system = np.block([[mass, -picks.T], [picks, np.zeros((2, 2))]])
+        both = np.linalg.solve(system, np.concatenate((force, wanted)))
+        return both[:-2], both[-2:]

@@ -1,0 +1,27 @@
+"""The classical Runge-Kutta method in plain numpy."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+Acceleration = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
+"""Accelerations (n,) at a time (s), positions and rates (n,)."""
+
+
+def march(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
+    """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each, by steps (s); NaN where it blows up."""
+    states = np.empty((steps + 1, 2 * len(q)))
+    states[0] = np.concatenate((q, v))
+
+    def rate(t: float, state: np.ndarray) -> np.ndarray:
+        position, speed = np.split(state, 2)
+        return np.concatenate((speed, acceleration(t, position, speed)))
+
+    for i in range(steps):
+        t, state = i * step, states[i]
+        one = rate(t, state)
+        two = rate(t + 0.5 * step, state + 0.5 * step * one)
+        three = rate(t + 0.5 * step, state + 0.5 * step * two)
+        four = rate(t + step, state + step * three)
+        states[i + 1] = state + step / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+    return states

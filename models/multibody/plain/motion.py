@@ -1,0 +1,149 @@
+"""Bodies on joints by products of matrices: where they are, how they move, their mass matrix and what inertia asks.
+
+The place of a body is a matrix T (3, 4): rotation and centre. It is the product of its parent's, of the arm to its
+own centre, and of one factor exp(q G) per freedom, G the constant generator of a shift or a turn. The product rule
+gives T's derivative by every coordinate, its rate, and its second rate without any q''. With a body's pseudo-inertia
+P (4, 4), second moments of mass about its centre and its mass,
+
+    M_ij = sum tr(dT/dq_i P dT/dq_j^T),    h_i = sum tr(dT/dq_i P (T'' without q'')^T)
+
+(Lagrange's equations after Uicker, 1965). There is no angular velocity, no vector product and no Euler equation in
+them, which the compiled tree and both engines are made of.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.vehicles.spatial import FREEDOMS, SpatialVehicle, Vector
+
+GROUND = 0
+"""Row of the space among the bodies."""
+PLACE, RATE, REST, FIRST = range(4)
+"""Rows of a body's matrices: T, T', T'' without q'', then dT/dq of every coordinate."""
+
+
+def generator(freedom: str) -> np.ndarray:
+    """G (4, 4) of a freedom: a shift along, or a turn about, an axis."""
+    kind, matrix = FREEDOMS.index(freedom), np.zeros((4, 4))
+    if kind < 3:
+        matrix[kind, 3] = 1.0
+    else:
+        first, second = (kind - 2) % 3, (kind - 1) % 3
+        matrix[second, first], matrix[first, second] = 1.0, -1.0
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of bodies: their rows among the bodies (p,), and where they are from the bodies' centres (p, 4), m, 1."""
+
+    rows: np.ndarray
+    arms: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """All bodies at one state: matrices (bodies + 1, 3 + n, 3, 4), rows as above, the space first."""
+
+    matrices: np.ndarray
+
+    def at(self, points: Points) -> np.ndarray:
+        """(p, 3 + n, 3): place (m), velocity, acceleration without q'', and derivatives by q of points, in space."""
+        rows = self.matrices[points.rows]
+        count = rows.shape[1]
+        return np.matmul(rows.reshape(len(rows), 3 * count, 4), points.arms[:, :, None]).reshape(len(rows), count, 3)
+
+    def axes(self, row: int) -> np.ndarray:
+        """(3 + n, 3, 3): a body's axes as columns, their rates, second rates without q'', derivatives by q."""
+        axes: np.ndarray = self.matrices[row, :, :, :3]
+        return axes
+
+    def turning(self, row: int) -> np.ndarray:
+        """(3,) rad/s: angular velocity of a body in space, half the sum of axis x its rate."""
+        axes = self.axes(row)
+        spin = axes[RATE] @ axes[PLACE].T
+        return np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2.0
+
+    def by_moment(self, row: int, moment: np.ndarray) -> np.ndarray:
+        """Generalised forces (n,) of a moment (N m, in space) on a body: couples of forces M x axis / 2 at its axes."""
+        axes = self.axes(row)
+        x, y, z = moment.tolist()
+        couples = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) @ axes[PLACE] / 2.0
+        return axes[FIRST:].reshape(-1, 9) @ couples.ravel()
+
+
+class Bodies:
+    """The bodies of a vehicle (kg, m, kg m^2) on their joints."""
+
+    def __init__(self, vehicle: SpatialVehicle) -> None:
+        self.places = vehicle.coordinates()
+        self.size = len(self.places)
+        self.row = {body.name: i + 1 for i, body in enumerate(vehicle.bodies)}
+        self.position = {body.name: np.array(body.position, float) for body in vehicle.bodies}
+        self._mass = np.array([body.mass for body in vehicle.bodies])
+        self._parent = [self.row[body.parent] if body.parent else GROUND for body in vehicle.bodies]
+        self._arms = [self._arm(vehicle, body.name) for body in vehicle.bodies]
+        own = [[i for i, (name, _) in enumerate(self.places) if name == body.name] for body in vehicle.bodies]
+        self._own = own
+        self._generators = np.array([generator(freedom) for _, freedom in self.places])
+        self._squares = self._generators @ self._generators
+        self._turns = np.array([freedom.startswith("r") for _, freedom in self.places])
+        self._inertia = np.array([_pseudo_inertia(body.mass, np.array(body.inertia)) for body in vehicle.bodies])
+
+    def _arm(self, vehicle: SpatialVehicle, name: str) -> np.ndarray:
+        """(4, 4): shift from the parent's centre, or from the origin, to a body's own."""
+        parent, arm = vehicle.body(name).parent, np.eye(4)
+        arm[:3, 3] = self.position[name] - (self.position[parent] if parent else 0.0)
+        return arm
+
+    def index(self, body: str, freedom: str) -> int:
+        """Which coordinate it is; -1 if the body does not have it."""
+        place = (body, freedom)
+        return self.places.index(place) if place in self.places else -1
+
+    def points(self, places: list[tuple[str | None, Vector | np.ndarray]]) -> Points:
+        """Points (body, or None for the space; m in the design position) as this vehicle has them."""
+        rows = [self.row[body] if body else GROUND for body, _ in places]
+        arms = [[*np.subtract(point, self.position[body] if body else 0.0), 1.0] for body, point in places]
+        return Points(np.array(rows, int), np.array(arms, float).reshape(-1, 4))
+
+    def move(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """All bodies at coordinates and rates (n,): m, rad, per s."""
+        matrices = np.zeros((len(self._parent) + 1, FIRST + self.size, 3, 4))
+        matrices[GROUND, PLACE, :, :3] = np.eye(3)
+        first, second = np.where(self._turns, np.sin(q), q), np.where(self._turns, 1.0 - np.cos(q), 0.0)
+        steps = np.eye(4) + first[:, None, None] * self._generators + second[:, None, None] * self._squares
+        for i, (parent, arm, own) in enumerate(zip(self._parent, self._arms, self._own, strict=True)):
+            rows = (matrices[parent].reshape(-1, 4) @ arm).reshape(-1, 3, 4)
+            for j in own:
+                rows = self._joint(rows, j, steps[j], float(v[j]))
+            matrices[i + 1] = rows
+        return Motion(matrices)
+
+    def _joint(self, below: np.ndarray, j: int, step: np.ndarray, rate: float) -> np.ndarray:
+        """Rows of matrices behind joint j, by the product rule, from those before it."""
+        rows = (below.reshape(-1, 4) @ step).reshape(-1, 3, 4)
+        turned = (rows[:REST].reshape(-1, 4) @ self._generators[j]).reshape(-1, 3, 4)
+        rows[FIRST + j] = turned[PLACE]
+        rows[RATE] += rate * turned[PLACE]
+        rows[REST] += 2.0 * rate * turned[RATE] + rate * rate * (rows[PLACE] @ self._squares[j])
+        return rows
+
+    def inertia(self, motion: Motion, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mass matrix (n, n), and forces (n,) of weights (gravity (3,), m/s^2) less what inertia asks without q''."""
+        columns = motion.matrices[1:, FIRST:]
+        count = self.size
+        weighted = (columns.reshape(len(columns), -1, 4) @ self._inertia).reshape(columns.shape)
+        flat = weighted.transpose(1, 0, 2, 3).reshape(count, -1)
+        mass = flat @ columns.transpose(1, 0, 2, 3).reshape(count, -1).T
+        weights = np.tensordot(self._mass, columns[:, :, :, 3], 1) @ gravity
+        return mass, weights - flat @ motion.matrices[1:, REST].ravel()
+
+
+def _pseudo_inertia(mass: float, inertia: np.ndarray) -> np.ndarray:
+    """P (4, 4): second moments of mass about the centre (kg m^2), from the inertia tensor, and the mass."""
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    matrix[3, 3] = mass
+    return matrix

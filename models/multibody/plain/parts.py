@@ -1,0 +1,74 @@
+"""Springs, dampers, curves, dry friction and anti-roll bars between the points of a vehicle, from its description.
+
+The travel of a part is one function of all coordinates, d(q) = a(q) . (p2(q) - p1(q)) less its design value, the axis
+a fixed in the part's frame; of a bar a share of the roll coordinate of its body is added, unless that is its frame.
+The force F acts as -F dd/dq on the coordinates: whatever the frame is, there is one formula.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion, Points
+from models.vehicles.spatial import AntiRollBar, Curve, SpatialVehicle, SpringDamper
+
+
+def frame_of(part: SpringDamper | AntiRollBar, default: str | None) -> str | None:
+    """Body in whose axes a part's axis is fixed, None for the space: its own frame, or the system's default."""
+    return getattr(part, "frame", None) or default
+
+
+@dataclass(frozen=True, eq=False)
+class Travels:
+    """Travel (p,), its rate (p,) and its derivatives by the coordinates (p, n): m, or rad of a bar."""
+
+    travel: np.ndarray
+    rate: np.ndarray
+    gradient: np.ndarray
+
+
+class Parts:
+    """The springs, then the bars, of a vehicle on its bodies; ``default`` is the frame of those that name none."""
+
+    def __init__(self, bodies: Bodies, vehicle: SpatialVehicle, default: str | None) -> None:
+        springs, bars = vehicle.springs, vehicle.bars
+        both: tuple[SpringDamper | AntiRollBar, ...] = (*springs, *bars)
+        self.names = tuple(part.name for part in both)
+        self.stiffness, self.damping = (np.array([getattr(p, k) for p in both]) for k in ("stiffness", "damping"))
+        self.friction = np.array([s.friction for s in springs] + [0.0] * len(bars))
+        self.friction_rate = np.array([s.friction_rate for s in springs] + [1.0] * len(bars))
+        self._one = bodies.points([*((s.one, s.point_one) for s in springs), *((b.left, b.point_left) for b in bars)])
+        self._two = bodies.points([*((s.two, s.point_two) for s in springs), *((b.right, b.point_right) for b in bars)])
+        axes = [s.axis for s in springs] + [(0.0, 0.0, 1.0 / bar.track) for bar in bars]
+        frames = [frame_of(part, default) for part in both]
+        rows = [bodies.row[frame] if frame else 0 for frame in frames]
+        self._axes = Points(np.array(rows, int), np.array([[*axis, 0.0] for axis in axes]).reshape(-1, 4))
+        self._rolls = np.zeros((len(both), bodies.size))
+        for i, (bar, frame) in enumerate(zip(bars, frames[len(springs) :], strict=True)):
+            if frame != bar.body:
+                self._rolls[len(springs) + i, bodies.index(bar.body, "rx")] = 1.0
+        self._curves = [_curves(i, s) for i, s in enumerate(springs) if s.travel_force or s.rate_force]
+        still = np.zeros(bodies.size)
+        self._design = np.zeros(len(both))
+        self._design = self.travels(bodies.move(still, still), still, still).travel
+
+    def travels(self, motion: Motion, q: np.ndarray, v: np.ndarray) -> Travels:
+        """Travels at coordinates and rates (n,) in whose motion all bodies are."""
+        axes, apart = motion.at(self._axes), motion.at(self._two) - motion.at(self._one)
+        axis, way = axes[:, PLACE, :, None], apart[:, PLACE, :, None]
+        all_ways = ((apart @ axis) + (axes @ way))[:, :, 0]
+        travel = 0.5 * all_ways[:, PLACE] + self._rolls @ q - self._design
+        return Travels(travel, all_ways[:, RATE] + self._rolls @ v, all_ways[:, FIRST:] + self._rolls)
+
+    def forces(self, travels: Travels, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces (p,) that draw both ends together, N or N m: of springs with preloads ``held`` (p,), and of all
+        else: dampers, friction and curves."""
+        other = self.damping * travels.rate + self.friction * np.tanh(travels.rate / self.friction_rate)
+        for i, on_travel, on_rate in self._curves:
+            other[i] += on_travel(float(travels.travel[i])) if on_travel else 0.0
+            other[i] += on_rate(float(travels.rate[i])) if on_rate else 0.0
+        return held + self.stiffness * travels.travel, other
+
+
+def _curves(i: int, spring: SpringDamper) -> tuple[int, Curve | None, Curve | None]:
+    return i, spring.travel_force, spring.rate_force
