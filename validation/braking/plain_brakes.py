@@ -19,7 +19,7 @@ from models.brake.pressure import Air, Chambers, by_pressures, by_valves, still
 from models.brake.relaxation import lag_on
 from models.brake.surfaces import Road, Stretch, road, under_wheels
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, place, stacked
+from models.tyre.tyre_table import Tables, TyreTable, across, along, place, stacked
 from validation.braking.plain_relaxation import lag_on as plain_lag_on
 
 STATES = 400
@@ -149,4 +149,25 @@ def lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]
         new, given = plain_lag_on(state, time, steer, PLANE.place, slope, length, lag)
         lag_on(state, time, steer, PLANE, slope, length, lag, surface_)
         found[i], plain[i] = np.concatenate((lag, surface_[:, 3])), np.concatenate((new, given))
+    return found, plain
+
+
+def frictions(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
+    """mu_x at the nodes next to a slip, and mu_y (count, 2): of stacked tables by compiled code, and of each table on
+    its nodes by plain code."""
+    random, names = np.random.default_rng(seed), ("dry", "wet", "ice")
+    tyres = [surface("dry"), by_load("wet"), by_load("ice")]
+    packed, plain = stacked(tyres).packed, np.empty((count, 2))
+    angles, slips, loads, mu_x, g, h = packed
+    found = np.empty((count, 2))
+    for i in range(count):
+        which, angle, load = int(random.integers(len(names))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
+        slip, own = random.uniform(), tyres[which]
+        (a, p), (f, q), (s, w) = place(angles, angle), place(loads, load), place(slips, slip)
+        below, above = (along(which, a, p, f, q, k, mu_x) for k in (s, min(s + 1, slips.size - 1)))
+        found[i] = below + w * (above - below), across(which, a, p, f, q, s, w, g, h)
+        alone = Tables(own.angles, own.slips, own.loads, own.mu_x[None], own.g[None], own.h[None])
+        friction = plain_tyre.Friction(alone, plain_tyre.Surface(0, 0, 0.0), angle, load)
+        ahead = friction.ahead()
+        plain[i] = np.interp(slip, ahead.slips, ahead.forces) / load, friction.aside(slip) / load
     return found, plain
