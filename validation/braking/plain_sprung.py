@@ -32,12 +32,12 @@ LEAN = 0.3
 @cache
 def asymmetric() -> Sprung:
     """The twin without any symmetry."""
-    return sprung(replace(twin(), drags=()), SPIN)
+    return sprung(twin(), SPIN)
 
 
 @cache
 def bent() -> Sprung:
-    """The car with stops and dry friction at its wheels."""
+    """The car with stops and dry friction at its wheels, and dampers in its tyres."""
     stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
     damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
     whole: SpatialVehicle = load_vehicle("r19_free")
@@ -46,7 +46,8 @@ def bent() -> Sprung:
         replace(s, travel_force=stop, rate_force=damper, friction=60.0) if wheels & {s.one, s.two} else s
         for s in whole.springs
     )
-    return sprung(replace(whole, drags=(), springs=springs), SPIN)
+    tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(whole.tyres))
+    return sprung(replace(whole, springs=springs, tyres=tyres), SPIN)
 
 
 VEHICLES = {"car": car, "twin": asymmetric, "bent": bent}
@@ -70,7 +71,7 @@ def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
     """(count, n) by plain code."""
     own = Suspension(VEHICLES[vehicle]())
     both, kept = states(own.size, count)
-    return np.array([own.acceleration(*state, one) for state, one in zip(both, kept, strict=True)])
+    return np.array([own.acceleration(q, v, one) for (q, v), one in zip(both, kept, strict=True)])
 
 
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:

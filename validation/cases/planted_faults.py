@@ -7,7 +7,19 @@ other systems, beside all runs without a fault that these need.
 from pathlib import Path
 
 from validation.common.rows import CaseAnswer, Drawn, Row, Saved, Table, at_most
-from validation.faults import advice, braking, choosing, contact, hubs, measuring, pitch_plane, ride, tyres, wheelset
+from validation.faults import (
+    advice,
+    braking,
+    braking_reference,
+    choosing,
+    contact,
+    hubs,
+    measuring,
+    pitch_plane,
+    ride,
+    tyres,
+    wheelset,
+)
 from validation.faults.campaign import SYSTEM
 from validation.faults.planting import CLEAN, DESCRIPTION, EQUATIONS
 
@@ -19,6 +31,7 @@ CAMPAIGNS = (
     tyres.CAMPAIGN,
     hubs.CAMPAIGN,
     braking.CAMPAIGN,
+    braking_reference.CAMPAIGN,
     measuring.CAMPAIGN,
     choosing.CAMPAIGN,
     advice.CAMPAIGN,

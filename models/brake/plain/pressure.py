@@ -14,6 +14,9 @@ from models.brake.brake import Brakes
 from models.brake.controller import APPLY, RELEASE, SLOW
 from models.brake.pressure import Air, Chambers
 
+ROUNDING = 1e-9
+"""Share of a step at its ends in which a command counts as coming with the end."""
+
 
 @dataclass(eq=False)
 class Pressures:
@@ -28,13 +31,12 @@ class Pressures:
     def by_valves(self, valves: np.ndarray, torques: np.ndarray) -> None:
         """Fill ``torques`` (n + 1, W), those at the ends of the n steps of the next sample under valves (W,)."""
         self.commands.append(valves.copy())
-        begin, steps = (len(self.commands) - 1) * self.sample, len(torques) - 1
-        torques[0] = self.air.torque
+        torques[0], steps = self.air.torque, len(torques) - 1
         step = self.sample / steps
         for n in range(steps):
-            cuts = [0.0, *(cut for cut in self._arrivals(begin + n * step) if 0.0 < cut < step), step]
-            for now, then in pairwise(cuts):
-                self._press(self._reached(begin + n * step + 0.5 * (now + then)), then - now)
+            within = [cut for cut in self._arrivals(n * step) if ROUNDING < cut / step < 1.0 - ROUNDING]
+            for now, then in pairwise([0.0, *within, step]):
+                self._press(self._reached(n * step + 0.5 * (now + then)), then - now)
             torques[n + 1] = self.air.torque
 
     def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
@@ -44,11 +46,12 @@ class Pressures:
         torques[:] = self.air.torque
 
     def _arrivals(self, time: float) -> list[float]:
-        """Times (s) from one on at which commands reach the chambers."""
-        return [k * self.sample + self.chambers.delay - time for k in range(len(self.commands))]
+        """Times (s) at which commands reach the chambers, from a time (s) in the latest sample on."""
+        latest = len(self.commands) - 1
+        return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
 
     def _reached(self, time: float) -> np.ndarray:
-        """The command that holds at a time (s)."""
+        """The command that holds at a time (s) in the latest sample."""
         known = [own for own, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 

@@ -57,7 +57,13 @@ class Suspension:
         self._gravity = -free.gravity * UP
         self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
         self._carrier = self.bodies.row[CARRIER]
-        self._chassis = self.bodies.row[chassis_of(vehicle.handling.given).name]
+        given = vehicle.handling.given
+        chassis = chassis_of(given)
+        self._chassis, self._centre = (
+            self.bodies.row[chassis.name],
+            self.bodies.points([(chassis.name, chassis.position)]),
+        )
+        self._drag = 0.5 * given.drags[0].coefficient if given.drags else 0.0
 
     @property
     def size(self) -> int:
@@ -90,8 +96,16 @@ class Suspension:
         mass, force = self.bodies.inertia(motion, self._gravity)
         travels = self.parts.travels(motion, q, v)
         force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
-        accelerations: np.ndarray = np.linalg.solve(mass, force + self._by_tyres(motion, held))
+        force += self._by_tyres(motion, held) + self._by_air(motion)
+        accelerations: np.ndarray = np.linalg.solve(mass, force)
         return accelerations
+
+    def _by_air(self, motion: Motion) -> np.ndarray:
+        """Generalised forces (n,) of drag at the chassis' centre, against its speed where the vehicle heads."""
+        centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
+        speed = float(centre[RATE] @ ahead)
+        forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
+        return forces
 
     def _by_tyres(self, motion: Motion, held: Held) -> np.ndarray:
         """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to the chassis."""
