@@ -70,6 +70,11 @@ def test_accelerations_and_a_piece_of_a_stop_are_those_of_the_engine():
     assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
 
 
+def test_a_steady_circle_is_that_of_the_engine():
+    found, plain = whole.turns(whole.asymmetric())
+    assert found[0] > 0.05 and np.abs(found - plain).max() < 1e-11
+
+
 def test_a_stop_ends_where_that_of_the_engine_ends():
     stops = [whole.run(box(), engine, 1.0, False, 0.3) for engine in ("mujoco", "reference")]
     assert all(stop.stands for stop in stops) and whole.paths_apart(*stops) < 1e-11
@@ -112,7 +117,7 @@ def test_a_scene_is_run_by_the_reference_when_it_is_asked_for():
 @pytest.mark.full
 def test_every_vehicle_in_every_engine_at_a_hundred_states_and_along_a_second(tmp_path):
     rows, _ = case.measure(False, tmp_path)
-    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 2 * 6
+    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 2 * 6 + 3
 
 
 @pytest.mark.full

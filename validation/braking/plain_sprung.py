@@ -13,11 +13,12 @@ from models.brake.plane_vehicle import truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
 from models.brake.sprung_step import HELD_X, HELD_Y, ROW, SPUN, STEER, fill, held
-from models.brake.surfaces import Stretch, road
+from models.brake.surfaces import EVEN, Stretch, road
 from models.engines.braking_sprung import OnSprings
 from models.engines.braking_sprung_plain import PlainOnSprings
 from models.engines.free_vehicle import Driven, free_model
 from models.systems.braking.march import Braked, Path, on_tyres
+from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
@@ -135,3 +136,17 @@ def paths_apart(one: Path, other: Path) -> float:
         return np.inf
     off = max(float(np.abs(one.states - other.states).max()), 0.3 * float(np.abs(one.turning - other.turning).max()))
     return off if np.isfinite(off) else np.inf
+
+
+def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+    """Steady circle (m/s, m), its steer angles, state and turning in one row, by the engine's forces and by plain
+    code; a row of no numbers where there is none."""
+    rows = []
+    for engine in ("mujoco", "reference"):
+        own = vehicle_on(vehicle, engine, False)
+        turn = steady_turn(replace(own, road=EVEN), speed, radius)
+        if turn is None:
+            rows.append(np.full(8 + 2 * vehicle.size, np.nan))
+        else:
+            rows.append(np.concatenate((turn.steer, turn.start.turning, turn.start.state.ravel())))
+    return rows[0], rows[1]

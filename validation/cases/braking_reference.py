@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
 from validation.common.rows import Row, System, at_most
@@ -25,11 +27,12 @@ REASONS = {"tyre": "the compiled mean slip ends a series that leaves up to 1.4e-
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Laws and the car's accelerations in one engine and a piece of a stop; both engines, the twin, the car with curves
-    and friction, and longer stops in the full share."""
+    """Laws and, of the car in one engine, accelerations, a steady circle and a piece of a stop; in the full share both
+    engines, the twin, the car with curves and friction, and longer stops."""
     vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
     rows = [_law_row(name) for name in LAWS]
     rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
+    rows += [_turn_row(vehicle) for vehicle in vehicles]
     rows += [_stop_row(vehicle, engine, SHORT if quick else LONG) for vehicle in vehicles for engine in engines]
     return rows, {}
 
@@ -58,6 +61,20 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
         "by the largest",
         1e-12,
         WHY,
+        "native",
+    )
+
+
+def _turn_row(vehicle: str) -> Row:
+    found, plain = whole.turns(whole.VEHICLES[vehicle]())
+    return at_most(
+        f"braking_reference.turn.{vehicle}",
+        SYSTEM,
+        f"steady circle of the {vehicle}, 30 m at 8 m/s: steer angles, state and turning beside plain code",
+        float(np.nan_to_num(np.abs(found - plain).max(), nan=np.inf)),
+        "rad, m, per s",
+        1e-10,
+        "the same equations, solved to rounding",
         "native",
     )
 
