@@ -12,19 +12,16 @@ from models.brake.controller import APPLY, HOLD, RELEASE, SLOW
 from models.brake.plain import pressure as plain_pressure
 from models.brake.plain import road as plain_road
 from models.brake.plain import tyre as plain_tyre
-from models.brake.plane_step import ALONG, ANGLE, ASIDE, CELL, KNOWN, PART, REPORTED, START, begin
-from models.brake.plane_step import tyre as compiled_tyre
-from models.brake.plane_vehicle import PAPER, Plane, truck
 from models.brake.pressure import Air, Chambers, by_pressures, by_valves, still
-from models.brake.relaxation import lag_on
-from models.brake.surfaces import Road, Stretch, road, under_wheels
+from models.brake.surfaces import Road, Stretch, road
 from models.tyre.magic_formula import surface
-from models.tyre.tyre_table import Tables, TyreTable, across, along, place, stacked
+from models.tyre.tyre_table import Tables, TyreTable, stacked
+from validation.braking import compiled_brakes as compiled
+from validation.braking.compiled_brakes import PLANE
 from validation.braking.plain_relaxation import lag_on as plain_lag_on
 
 STATES = 400
 SEED = 20_26
-PLANE: Plane = truck(PAPER)
 LOADS = np.array([1e3, 4e3, 1e4])
 BY_LOAD = np.array([1.1, 1.0, 0.8])
 """Friction at these loads (N) by that of the surface."""
@@ -52,7 +49,7 @@ def largest(compiled: np.ndarray, plain: np.ndarray) -> float:
 def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Reports (count, 7) of wheels over a step, compiled and plain: rolling, locked, freed, thrown backwards."""
     random, own = np.random.default_rng(seed), tables()
-    found, plain = np.empty((2, count, REPORTED))
+    found, plain = np.empty((2, count, 7))
     for i in range(count):
         u, rate, across = random.uniform(-3.0, 30.0), random.uniform(-9.0, 3.0), random.normal(0.0, 1.0)
         slip = random.choice([0.0, 1.0, random.uniform(-0.3, 1.2), random.uniform(-3.0, 2.0)])
@@ -65,20 +62,8 @@ def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.
         motion = plain_tyre.Motion(u, rate, u + 0.5 * step * rate, across, 0.1)
         braked = plain_tyre.Braked(torques, step, radius, inertia, turning)
         plain[i] = plain_tyre.tyre(own, under, motion, load, braked)
-        known = _known(own, under, motion, braked)
-        compiled_tyre(known, rate, load, *torques, step, own.packed, found[i])
+        found[i] = compiled.tyre(own, under, motion, load, braked)
     return found, plain
-
-
-def _known(own: Tables, under: plain_tyre.Surface, motion: plain_tyre.Motion, of: plain_tyre.Braked) -> np.ndarray:
-    """What the compiled step knows (19,) of a wheel."""
-    one = PLANE._replace(radius=np.array([of.radius]), spin=np.array([of.inertia]))
-    known = np.zeros((1, KNOWN))
-    begin(np.array([of.turning]), np.array([[under.first, under.second, under.share]]), one, known)
-    known[0, START], known[0, ALONG], known[0, ASIDE] = motion.start, motion.forwards, motion.across
-    known[0, ANGLE] = np.arctan2(abs(motion.across), max(motion.forwards, motion.regular))
-    known[0, CELL], known[0, PART] = place(own.angles, known[0, ANGLE])
-    return known[0]
 
 
 def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
@@ -88,17 +73,11 @@ def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndar
     kind = np.array([0, 0, 1, 1])
     for _ in range(count):
         state = np.array([random.uniform(-2.0, 4.0, 3), random.uniform(-30.0, 30.0, 3)]) * [1.0, 0.5, 1.0]
-        step, surface_ = random.choice([5.5e-3, 1e-3]), np.empty((4, 3))
-        under_wheels(state, step, PLANE, kind, own, surface_)
-        found.append(surface_)
-        under = plain_road.under_wheels(own, wheel_ways(state, PLANE.place, step), kind)
+        step = random.choice([5.5e-3, 1e-3])
+        found.append(compiled.under_wheels(own, state, step, kind))
+        under = plain_road.under_wheels(own, plain_road.ways(state[0], state[1], PLANE.place, step), kind)
         plain += [[one.first, one.second, one.share] for one in under]
     return np.concatenate(found), np.array(plain)
-
-
-def wheel_ways(state: np.ndarray, places: np.ndarray, step: float) -> np.ndarray:
-    """(W, 2, 2) m: places of wheels at both ends of a step (s) at the rates of a state (2, 3 or more), straight."""
-    return plain_road.ways(state[0, :3], state[1, :3], places, step)
 
 
 def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
@@ -145,27 +124,21 @@ def lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]
         state[1, :2] *= random.choice([0.0, 0.3, 20.0])
         length, time, slope = random.uniform(0.1, 2.0, 4), random.choice([5.5e-3, 0.5]), random.uniform(5.0, 30.0)
         lag = np.where(random.uniform(size=4) < 0.2, np.nan, random.normal(0.0, 0.1, 4))
-        lag, surface_ = lag if state[1].any() else np.nan_to_num(lag), np.zeros((4, 4))
-        new, given = plain_lag_on(state, time, steer, PLANE.place, slope, length, lag)
-        lag_on(state, time, steer, PLANE, slope, length, lag, surface_)
-        found[i], plain[i] = np.concatenate((lag, surface_[:, 3])), np.concatenate((new, given))
+        lag = lag if state[1].any() else np.nan_to_num(lag)
+        found[i] = np.concatenate(compiled.lag_on(state, time, steer, slope, length, lag))
+        plain[i] = np.concatenate(plain_lag_on(state, time, steer, PLANE.place, slope, length, lag))
     return found, plain
 
 
 def frictions(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
-    """mu_x at the nodes next to a slip, and mu_y (count, 2): of stacked tables by compiled code, and of each table on
+    """mu_x and mu_y (count, 2): of stacked tables by compiled code, and of each table on
     its nodes by plain code."""
-    random, names = np.random.default_rng(seed), ("dry", "wet", "ice")
-    tyres = [surface("dry"), by_load("wet"), by_load("ice")]
-    packed, plain = stacked(tyres).packed, np.empty((count, 2))
-    angles, slips, loads, mu_x, g, h = packed
-    found = np.empty((count, 2))
+    random, tyres = np.random.default_rng(seed), [surface("dry"), by_load("wet"), by_load("ice")]
+    all_tables, (found, plain) = stacked(tyres), np.empty((2, count, 2))
     for i in range(count):
-        which, angle, load = int(random.integers(len(names))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
+        which, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
         slip, own = random.uniform(), tyres[which]
-        (a, p), (f, q), (s, w) = place(angles, angle), place(loads, load), place(slips, slip)
-        below, above = (along(which, a, p, f, q, k, mu_x) for k in (s, min(s + 1, slips.size - 1)))
-        found[i] = below + w * (above - below), across(which, a, p, f, q, s, w, g, h)
+        found[i] = compiled.friction(all_tables, which, angle, load, slip)
         alone = Tables(own.angles, own.slips, own.loads, own.mu_x[None], own.g[None], own.h[None])
         friction = plain_tyre.Friction(alone, plain_tyre.Surface(0, 0, 0.0), angle, load)
         ahead = friction.ahead()

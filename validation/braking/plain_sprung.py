@@ -12,16 +12,15 @@ from models.brake.plain.suspension import Held, Suspension
 from models.brake.plane_vehicle import truck
 from models.brake.pressure import Chambers
 from models.brake.sprung import Sprung, sprung
-from models.brake.sprung_step import HELD_X, HELD_Y, ROW, SPUN, STEER, fill, held
 from models.brake.surfaces import EVEN, Stretch, road
 from models.engines.braking_sprung import OnSprings
 from models.engines.braking_sprung_plain import PlainOnSprings
-from models.engines.free_vehicle import Driven, free_model
 from models.systems.braking.march import Braked, Path, on_tyres
 from models.systems.braking.procedures import steady_turn
 from models.tyre.magic_formula import surface
 from models.vehicles.spatial import Curve, SpatialVehicle
 from models.vehicles.vehicle_file import load_vehicle
+from validation.braking.compiled_brakes import held_in, in_engine
 from validation.braking.sprung_box import SPIN, car, steady
 from validation.spatial.cars import twin
 
@@ -77,13 +76,10 @@ def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
 
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
     """(count, n) by an engine around the compiled forces."""
-    own, size = vehicle.handling, vehicle.size
-    table = np.concatenate((own.numbers, np.zeros(ROW * 4)))
-    driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
-    model = free_model(engine, driven)
-    found, rows = np.empty((count, size)), model.numbers[-ROW * 4 :].reshape(4, ROW)
-    for i, (state, one) in enumerate(zip(*states(size, count), strict=True)):
-        rows[:, STEER], rows[:, HELD_X : HELD_Y + 1], rows[:, SPUN] = one.steer, one.forces, one.spun
+    model, found = in_engine(vehicle, engine), np.empty((count, vehicle.size))
+    rows = held_in(model.numbers)
+    for i, (state, one) in enumerate(zip(*states(vehicle.size, count), strict=True)):
+        rows.steer[:], rows.forces[:], rows.spun[:] = one.steer, one.forces, one.spun
         found[i] = model.acceleration(0.0, *state)
     return found
 

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from models.brake.plane_step import SPIN
-from models.brake.sprung_step import ROW, SPUN
 from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.multibody.parts import DAMPING, FRICTION, ON_TRAVEL, PER_PART, STIFFNESS
@@ -18,6 +16,7 @@ from models.multibody.tree import LOCAL, PER_POINT
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
+from validation.braking.compiled_brakes import held_in
 from validation.faults.campaign import Campaign, Check, Fault
 from validation.faults.patches import Patch, attribute
 
@@ -128,23 +127,29 @@ def _first_larger(values: dict[str, float]) -> dict[str, float]:
     return values | {name: 1.01 * values[name]}
 
 
-def _hold(change: Callable[..., None]) -> Patch:
-    """Holding forces over a step, by which the engine then marches: change(call, numbers, ..., report)."""
-    return attribute("models.brake.sprung_step:hold", lambda real: lambda *given: change(real, *given))
+def _march(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
+    """A step by the engine under the forces that are held: change(step, engine, q, v)."""
+    return attribute("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
 
 
-def _torque_of_the_start(call: Any, numbers: Any, q: Any, v: Any, before: Any, after: Any, *rest: Any) -> None:
-    call(numbers, q, v, before, before, *rest)
+def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
+    """One step by the accelerations at its start."""
+    rates = engine.acceleration(0.0, q, v)
+    q += engine.step * v
+    v += engine.step * rates
+    return True
 
 
-def _forgotten_rates(call: Any, *given: Any) -> None:
-    given[6][:] = 0.0
-    call(*given)
+def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
+    held_in(engine.numbers).spun[:] *= 1.01
+    return march(engine, *state)
 
 
-def _spun_more(call: Any, numbers: np.ndarray, *rest: Any) -> None:
-    call(numbers, *rest)
-    numbers[-4 * ROW :].reshape(4, ROW)[:, SPUN] *= 1.01
+def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
+    """Of the front wheels."""
+    forces = held_in(engine.numbers).forces
+    forces[:2] = forces[1::-1].copy()
+    return march(engine, *state)
 
 
 def _stacked(**factors: float) -> Patch:
@@ -172,21 +177,19 @@ def _late_load(real: Any) -> Any:
 
 def _heavy_wheel(real: Any) -> Any:
     """A wheel whose inertia is 1 % too large."""
-
-    def tyre(known: np.ndarray, *rest: Any) -> None:
-        known[SPIN] *= 1.01
-        real(known, *rest)
-
-    return tyre
+    return lambda tables, under, motion, load, of: real(
+        tables, under, motion, load, replace(of, inertia=1.01 * of.inertia)
+    )
 
 
 def _other_share(real: Any) -> Any:
     """The share of the first stretch in the place of that of the second."""
 
-    def under(state: Any, step: Any, plane: Any, kind: Any, road: Any, surface: np.ndarray) -> None:
-        real(state, step, plane, kind, road, surface)
+    def under(*given: Any) -> np.ndarray:
+        surface: np.ndarray = real(*given)
         mixed = surface[:, 0] != surface[:, 1]
         surface[mixed, 2] = 1.0 - surface[mixed, 2]
+        return surface
 
     return under
 
@@ -197,6 +200,16 @@ def _more_torque(real: Any) -> Any:
     def valves(*given: Any) -> None:
         real(*given)
         given[-1][:] *= 1.01
+
+    return valves
+
+
+def _late_torque(real: Any) -> Any:
+    """Torques of the start of each step at its end."""
+
+    def valves(*given: Any) -> None:
+        real(*given)
+        given[-1][1:] = given[-1][:-1].copy()
 
     return valves
 
@@ -213,12 +226,10 @@ def _quick_valves(real: Any) -> Any:
 
 def _longer(real: Any) -> Any:
     """Relaxation lengths 1 % too long."""
-    return lambda state, time, steer, plane, slope, length, *rest: real(
-        state, time, steer, plane, slope, 1.01 * length, *rest
-    )
+    return lambda state, time, steer, slope, length, lag: real(state, time, steer, slope, 1.01 * length, lag)
 
 
-BENCH = "validation.braking.plain_brakes"
+BENCH, COMPILED = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
 FAULTS = (
     Fault(
         "preload of a spring 1 % too large", "vehicle", _preloads(lambda p: p._replace(parts=_first_larger(p.parts)))
@@ -235,17 +246,18 @@ FAULTS = (
     Fault("drag twice as large", "table", _table(_dragged)),
     Fault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
     Fault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
-    Fault("brake torque of the step's start", "step", _hold(_torque_of_the_start)),
-    Fault("change of the wheels' speeds forgotten", "step", _hold(_forgotten_rates)),
-    Fault("moment on turning wheels 1 % too large", "step", _hold(_spun_more)),
+    Fault("brake torque of the step's start", "step", attribute("models.brake.samples:by_valves", _late_torque)),
+    Fault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
+    Fault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
+    Fault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
     Fault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
     Fault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
     Fault("cornering stiffness 30 % too large", "tyre", _stacked(h=1.3)),
     Fault("friction along the wheel 1 % too large", "tyre", _stacked(mu_x=1.01)),
     Fault("loads packed one node late", "tyre", attribute(f"{BENCH}:stacked", _late_load)),
-    Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{BENCH}:compiled_tyre", _heavy_wheel)),
-    Fault("shares of two stretches exchanged", "road", attribute(f"{BENCH}:under_wheels", _other_share)),
-    Fault("relaxation length 1 % too long", "tyre", attribute(f"{BENCH}:lag_on", _longer)),
+    Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
+    Fault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
+    Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer)),
 )
 
 CAMPAIGN = Campaign("planted.braking_reference", "braking on the suspension", "anti-lock", CHECKS, FAULTS)
