@@ -14,6 +14,7 @@ from models.systems.braking.run import run as drive
 from models.systems.braking.scene import build
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
+from validation.braking.plain_relaxation import turn_apart
 from validation.braking.sprung_box import box, car
 from validation.cases import braking_reference as case
 from validation.faults import braking_reference as faults
@@ -69,6 +70,11 @@ def test_accelerations_and_a_piece_of_a_stop_are_those_of_the_engine():
     assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
 
 
+def test_a_turn_on_relaxing_tyres_tends_to_its_written_equations_by_order_two():
+    errors = [turn_apart(0.6, substeps) for substeps in (1, 2)]
+    assert 3.5 < errors[0] / errors[1] < 4.5 and errors[1] < 2e-4  # m, of 26 m
+
+
 def test_a_steady_circle_is_that_of_the_engine():
     found, plain = whole.turns(whole.asymmetric())
     assert found[0] > 0.05 and np.abs(found - plain).max() < 1e-11
@@ -116,7 +122,7 @@ def test_a_scene_is_run_by_the_reference_when_it_is_asked_for():
 @pytest.mark.full
 def test_every_vehicle_in_every_engine_at_a_hundred_states_and_along_a_second(tmp_path):
     rows, _ = case.measure(False, tmp_path)
-    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 2 * 6 + 3
+    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 1 + 3 + 2 * 6
 
 
 @pytest.mark.full

@@ -4,11 +4,22 @@ The lag solves a linear equation of constant coefficients, whose solution is an 
 """
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
+
+from models.brake.brake import Brake, of_wheels
+from models.brake.plane_vehicle import PAPER, truck
+from models.brake.pressure import Chambers
+from models.systems.braking.march import on_tyres
+from models.tyre.magic_formula import surface
+from validation.braking.sprung_box import GRADIENT, steady
+from validation.braking.truck_equations import turned
 
 GRAVITY = 9.81
 SLOW, DAMPING, SLOWEST = 1.0, 0.7, 1e-9
 """Speed (m/s) below which the damper fades in, its damping ratio at rest, speed (m/s) that counts as rest."""
+SPEED, UNTIL, STEER = 11.11, 9.0, 0.03
+"""Speeds (m/s) from which and to which the truck turns, and its steer angle (rad)."""
 
 
 def lag_on(
@@ -46,3 +57,20 @@ def rotation(angle: float) -> np.ndarray:
     """(2, 2) turning by an angle (rad)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
+
+
+def turn_apart(length: float, substeps: int = 4) -> float:
+    """How far (m) a braked turn of the truck on tyres that relax over a length (m) ends from its written equations."""
+    tyre, torques = surface("ice"), (300.0, 200.0)
+    end = turned(PAPER, tyre, STEER, torques, SPEED, UNTIL, length)
+    path = on_tyres(
+        truck(PAPER),
+        [tyre],
+        of_wheels(*4 * (Brake(push_out=0.0, release=0.0, rising=GRADIENT, falling=GRADIENT),)),
+        Chambers(np.zeros(4), np.zeros(4), 6.0),
+        steer=np.array([STEER, STEER, 0.0, 0.0]),
+        substeps=substeps,
+        relaxation=np.full(4, length),
+    ).run(steady(*np.repeat(torques, 2)), SPEED, end.time)
+    places = CubicHermiteSpline(path.times, path.states[:, 0, :2], path.states[:, 1, :2])
+    return float(np.hypot(*(places(end.time) - (end.x, end.y))))
