@@ -13,6 +13,7 @@ from models.multibody import forces as at
 from models.multibody.numbers import Handling
 from models.multibody.parts import DAMPING, FRICTION, ON_TRAVEL, PER_PART, STIFFNESS
 from models.multibody.tree import LOCAL, PER_POINT
+from models.tyre.tyre_table import Tables
 from models.vehicles.spatial_linear import Preloads
 from validation.braking import plain_brakes as laws
 from validation.braking import plain_sprung as whole
@@ -152,27 +153,18 @@ def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
     return march(engine, *state)
 
 
-def _stacked(**factors: float) -> Patch:
-    """Tables multiplied where they are stacked for compiled code."""
+def _stacked(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
+    """Tables as they are stacked for compiled code, with other mu_x and h."""
 
-    def change(real: Any) -> Any:
-        def stack(tyres: Any) -> Any:
-            tables = real(tyres)
-            return replace(tables, **{name: factor * getattr(tables, name) for name, factor in factors.items()})
+    def stack(real: Any) -> Any:
+        return lambda tyres: _with_friction(real(tyres), change)
 
-        return stack
-
-    return attribute("validation.braking.plain_brakes:stacked", change)
+    return attribute("validation.braking.plain_brakes:stacked", stack)
 
 
-def _late_load(real: Any) -> Any:
-    """Tables whose loads are packed one node late."""
-
-    def stack(tyres: Any) -> Any:
-        tables = real(tyres)
-        return replace(tables, h=np.ascontiguousarray(np.roll(tables.h, 1, axis=2)))
-
-    return stack
+def _with_friction(of: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
+    mu_x, h = change(of)
+    return Tables(of.angles, of.slips, of.loads, np.ascontiguousarray(mu_x), of.g, np.ascontiguousarray(h))
 
 
 def _heavy_wheel(real: Any) -> Any:
@@ -252,9 +244,9 @@ FAULTS = (
     Fault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
     Fault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
     Fault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
-    Fault("cornering stiffness 30 % too large", "tyre", _stacked(h=1.3)),
-    Fault("friction along the wheel 1 % too large", "tyre", _stacked(mu_x=1.01)),
-    Fault("loads packed one node late", "tyre", attribute(f"{BENCH}:stacked", _late_load)),
+    Fault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),
+    Fault("friction along the wheel 1 % too large", "tyre", _stacked(lambda t: (1.01 * t.mu_x, t.h))),
+    Fault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
     Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
     Fault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
     Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer)),
