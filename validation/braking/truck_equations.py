@@ -26,14 +26,22 @@ class Turned(NamedTuple):
 
 
 def turned(
-    vehicle: Truck, tyre: TyreTable, steer: float, torques: tuple[float, float], speed: float, until: float
+    vehicle: Truck,
+    tyre: TyreTable,
+    steer: float,
+    torques: tuple[float, float],
+    speed: float,
+    until: float,
+    length: float = 0.0,
 ) -> Turned:
     """From steady rolling at a speed to another one (m/s), front wheels steered (rad), torques of the axles (N m).
 
-    The tyre's friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
+    length : over which tyres relax (m); 0 for none. Above 1 m/s only they have no damper of their own. The tyre's
+    friction must not depend on the load. Raises RunFailed if the vehicle does not slow down in 200 s.
     """
-    equations = _Equations(vehicle, tyre, steer, np.repeat(torques, 2))
-    start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius))
+    equations = _Equations(vehicle, tyre, steer, np.repeat(torques, 2), length)
+    lags = np.zeros(4 if length else 0)
+    start = np.concatenate(([0.0, 0.0, 0.0, speed, 0.0, 0.0], speed / equations.radius, lags))
 
     def slow(_: float, state: np.ndarray) -> float:
         return float(np.hypot(state[3], state[4]) - until)
@@ -47,10 +55,11 @@ def turned(
 
 
 class _Equations:
-    """Derivative of x, y, heading, speeds along and across, yaw rate and the speeds of the four wheels."""
+    """Derivative of x, y, heading, speeds along and across, yaw rate, the speeds of the four wheels, and with a length
+    of relaxation the tan of their lagging slip angles."""
 
-    def __init__(self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray) -> None:
-        self.vehicle, self.tyre, self.torques = vehicle, tyre, torques
+    def __init__(self, vehicle: Truck, tyre: TyreTable, steer: float, torques: np.ndarray, length: float = 0.0) -> None:
+        self.vehicle, self.tyre, self.torques, self.length = vehicle, tyre, torques, length
         axles, sides = (vehicle.front, vehicle.front, vehicle.rear, vehicle.rear), np.array([1.0, -1.0, 1.0, -1.0])
         self.x = np.array([axle.x for axle in axles])
         self.y = sides * [axle.track / 2.0 for axle in axles]
@@ -63,11 +72,12 @@ class _Equations:
         self.by_y = -sides * m * h * [axle.roll_share / axle.track for axle in axles]
 
     def __call__(self, _: float, state: np.ndarray) -> np.ndarray:
-        psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:]
+        psi, u, v, r, turning = state[2], state[3], state[4], state[5], state[6:10]
         vx, vy = u - r * self.y, v + r * self.x
         along, aside = self.c * vx + self.s * vy, self.c * vy - self.s * vx
-        mu_x, mu_y = self._friction(1.0 - self.radius * turning / along, np.arctan2(np.abs(aside), along))
-        mu_y = -np.sign(aside) * mu_y
+        slope = state[10:] if self.length else aside / along
+        mu_x, mu_y = self._friction(1.0 - self.radius * turning / along, np.arctan(np.abs(slope)))
+        mu_y = -np.sign(slope) * mu_y
         ahead, left = -self.c * mu_x - self.s * mu_y, -self.s * mu_x + self.c * mu_y
         m = self.vehicle.mass
         system = np.array([[m - ahead @ self.by_x, -ahead @ self.by_y], [-left @ self.by_x, m - left @ self.by_y]])
@@ -76,7 +86,8 @@ class _Equations:
         yaw = (self.x * left - self.y * ahead) @ loads / self.vehicle.yaw_inertia
         wheels = (self.radius * mu_x * loads - self.torques) / self.inertia
         moved = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r, ax + v * r, ay - u * r, yaw]
-        return np.concatenate((moved, wheels))
+        lags = (aside - np.abs(along) * slope) / self.length if self.length else np.zeros(0)
+        return np.concatenate((moved, wheels, lags))
 
     def _friction(self, slips: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """mu_x with the sign of the slip, and mu_y."""

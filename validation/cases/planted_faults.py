@@ -10,6 +10,7 @@ from validation.common.rows import CaseAnswer, Drawn, Observed, Row, Saved, Tabl
 from validation.faults import (
     advice,
     braking,
+    braking_reference,
     choosing,
     contact,
     hubs,
@@ -34,6 +35,7 @@ CAMPAIGNS = (
     written.CAMPAIGN,
     native.CAMPAIGN,
     braking.CAMPAIGN,
+    braking_reference.CAMPAIGN,
     measuring.CAMPAIGN,
     choosing.CAMPAIGN,
     advice.CAMPAIGN,

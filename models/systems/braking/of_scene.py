@@ -79,7 +79,11 @@ def sprung_of(scene: BrakingScene) -> Any:
 
 
 def on_springs(engine: str, vehicle: Any) -> Any:
-    """A vehicle on its suspension in an engine."""
+    """A vehicle on its suspension in an engine, or by the independent reference."""
+    if engine == "reference":
+        from models.engines.braking_sprung_plain import PlainOnSprings
+
+        return PlainOnSprings(vehicle)
     from models.engines.braking_sprung import OnSprings
 
     return OnSprings(engine, vehicle)

@@ -68,7 +68,10 @@ def step_steer(scene: BrakingScene, name: str) -> Response | None:
 
 
 def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
-    """Engines that were asked for, of several those that have such a vehicle; where none were, the usual one."""
+    """Engines that were asked for; where none were, the usual one.
+
+    On a suspension the reference, which takes minutes for a stop, is used only where nothing else was asked for.
+    """
     if scene.vehicle.file is None:
         return asked or ("reference",)
     return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
@@ -78,8 +81,6 @@ def check_engine(scene: BrakingScene, engine: str) -> None:
     """Refuse an engine that would leave an effect of the scene out."""
     if scene.relaxation is not None and engine != "reference":
         raise Refused(engine, "the lag of tyres is not in its steps: use --engine reference", scene.file)
-    if scene.vehicle.file is not None and engine == "reference":
-        raise Refused(engine, "it has no suspension, roll and pitch: use --engine mujoco or exudyn", scene.file)
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:

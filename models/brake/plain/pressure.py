@@ -1,0 +1,77 @@
+"""Pressures and torques of the brakes along the whole of a run's commands, in plain code.
+
+The commands of all samples are kept with the times at which they reach the chambers. A step is cut where one does, and
+within a cut each chamber follows p' = (p_to - p) / tau, so that no pressure turns back. See ``models.brake.pressure``
+for the rule; there only the commands that are still on their way are kept.
+"""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from models.brake.brake import Brakes
+from models.brake.controller import APPLY, RELEASE, SLOW
+from models.brake.pressure import Air, Chambers
+
+ROUNDING = 1e-9
+"""Share of a step at its ends in which a command counts as coming with the end."""
+
+
+@dataclass(eq=False)
+class Pressures:
+    """All that was commanded, and what ``air`` holds meanwhile, moved in place; sample (s)."""
+
+    chambers: Chambers
+    brakes: Brakes
+    sample: float
+    air: Air
+    commands: list[np.ndarray] = field(default_factory=list)
+
+    def by_valves(self, valves: np.ndarray, torques: np.ndarray) -> None:
+        """Fill ``torques`` (n + 1, W), those at the ends of the n steps of the next sample under valves (W,)."""
+        self.commands.append(valves.copy())
+        torques[0], steps = self.air.torque, len(torques) - 1
+        step = self.sample / steps
+        for n in range(steps):
+            within = [cut for cut in self._arrivals(n * step) if ROUNDING < cut / step < 1.0 - ROUNDING]
+            for now, then in pairwise([0.0, *within, step]):
+                self._press(self._reached(n * step + 0.5 * (now + then)), then - now)
+            torques[n + 1] = self.air.torque
+
+    def by_pressures(self, pressures: np.ndarray, torques: np.ndarray) -> None:
+        """Pressures (W,) in bar at once, for the next sample."""
+        self.air.pressure[:] = pressures
+        self._follow()
+        torques[:] = self.air.torque
+
+    def _arrivals(self, time: float) -> list[float]:
+        """Times (s) at which commands reach the chambers, from a time (s) in the latest sample on."""
+        latest = len(self.commands) - 1
+        return [(k - latest) * self.sample + self.chambers.delay - time for k in range(latest + 1)]
+
+    def _reached(self, time: float) -> np.ndarray:
+        """The command that holds at a time (s) in the latest sample."""
+        known = [own for own, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
+        return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
+
+    def _press(self, valves: np.ndarray, time: float) -> None:
+        """Go on for a time (s) with valves (W,) as they are."""
+        chambers, supply, before = self.chambers, float(self.air.supply[0]), self.air.pressure.copy()
+        fills = valves >= APPLY
+        to = np.where(fills, supply, np.where(valves == RELEASE, 0.0, before))
+        slow = chambers.slow if chambers.slow.size else chambers.fill
+        constants = np.where(valves == RELEASE, chambers.empty, np.where(valves == SLOW, slow, chambers.fill))
+        left = np.exp(-time / np.where(constants > 0.0, constants, 1.0)) * (constants > 0.0)
+        self.air.pressure[:] = to + (before - to) * left
+        self._follow()
+        if np.isfinite(chambers.reservoir):
+            taken = float(chambers.volumes @ ((self.air.pressure - before) * fills))
+            self.air.supply[0] -= max(taken, 0.0) / chambers.reservoir
+
+    def _follow(self) -> None:
+        """Torques stay between the line on which they rise and that on which they fall."""
+        pressure, brakes = self.air.pressure, self.brakes
+        rising = brakes.rising * np.maximum(pressure - brakes.push_out, 0.0)
+        falling = brakes.falling * np.maximum(pressure - brakes.release, 0.0)
+        self.air.torque[:] = np.clip(self.air.torque, rising, falling)

@@ -1,0 +1,43 @@
+"""Which tables hold under the wheels over a step, in plain code: see ``models.brake.surfaces`` for the rule."""
+
+import numpy as np
+
+from models.brake.plain.tyre import Surface
+from models.brake.surfaces import Road
+
+
+def under_wheels(road: Road, ways: np.ndarray, kinds: np.ndarray) -> list[Surface]:
+    """Surface under each wheel; ways (W, 2, 2) : x, y (m) at the start and at the end of the step, straight between;
+    kinds (W,) : of tyres."""
+    return [_under(road, way, int(kind)) for way, kind in zip(ways, kinds, strict=True)]
+
+
+def _under(road: Road, way: np.ndarray, kind: int) -> Surface:
+    (behind, ahead), (right, left) = np.sort(way[:, 0]), np.sort(way[:, 1])
+    first, last = _stretch(road, behind), _stretch(road, ahead)
+    if last > first:
+        on_left = way[:, 1].mean() >= road.line
+        sides = [int((road.left if on_left else road.right)[k]) for k in (first, last)]
+        share = (ahead - road.starts[last]) / (ahead - behind)
+    elif right < road.line <= left:
+        sides, share = [int(road.right[first]), int(road.left[first])], (left - road.line) / (left - right)
+    else:
+        sides, share = 2 * [int((road.left if right >= road.line else road.right)[first])], 0.0
+    one, other = (side * road.kinds + kind for side in sides)
+    return Surface(one, other, float(share) if one != other else 0.0)
+
+
+def _stretch(road: Road, x: float) -> int:
+    """Number of the stretch at x (m): the last that begins at or before it."""
+    return max(sum(bool(start <= x) for start in road.starts) - 1, 0)
+
+
+def ways(place: np.ndarray, rates: np.ndarray, points: np.ndarray, step: float) -> np.ndarray:
+    """(W, 2, 2) m: where points of a vehicle are on the ground at both ends of a step (s), if each goes straight on.
+
+    place, rates (3,) : x, y and heading, and their rates; points (W, 2) : along and across the vehicle (m).
+    """
+    complex_points = points @ (1.0, 1.0j) * np.exp(1j * place[2])
+    begin = place[0] + 1j * place[1] + complex_points
+    end = begin + step * (rates[0] + 1j * rates[1] + 1j * rates[2] * complex_points)
+    return np.stack([np.column_stack((ends.real, ends.imag)) for ends in (begin, end)], axis=1)

@@ -1,0 +1,129 @@
+"""Steps of a braked vehicle on its suspension in plain code: see ``models.brake.sprung_step`` for the scheme.
+
+Half a step by the accelerations at its start leads to its middle, where loads, slip angles and the changes of the
+wheels' speeds are read; the mean forces of the whole step follow, and Runge and Kutta's method marches under them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.advance import AT_REST, FINE
+from models.brake.plain.road import under_wheels, ways
+from models.brake.plain.suspension import Contact, Held, Suspension
+from models.brake.plain.tyre import Braked, Motion, Surface, tyre
+from models.brake.surfaces import OnRoad
+from models.multibody.plain.march import march
+
+SPINS, LEANS, UPRIGHT, OVER = 6, slice(4, 6), 0.5, 6
+"""Column of a wheel's report with its turning; places of roll and pitch; where they turn the vehicle over (rad), and
+the status of that."""
+BLINK = 1e-5
+"""s: time over which wheels that only roll are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What a vehicle runs on: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below which
+    slip angles are those at it."""
+
+    on: OnRoad
+    steer: np.ndarray
+    regular: float
+
+
+@dataclass(eq=False)
+class Moving:
+    """A vehicle on its way, all moved in place: state (2, n), turning (W,) in rad/s, changes (W,) of the speeds along
+    the wheels (m/s^2), reports (W, 7), and accelerations (3,) of the first coordinates."""
+
+    state: np.ndarray
+    turning: np.ndarray
+    changes: np.ndarray
+    report: np.ndarray
+    found: np.ndarray
+
+
+class Steps:
+    """Steps (s) of a vehicle on its suspension along a course."""
+
+    def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
+        self.vehicle, self.course, self.step = vehicle, course, step
+
+    def on(self, own: Moving, torques: np.ndarray) -> tuple[int, float]:
+        """One step from torques (2, W) at its start to those at its end (N m): how it ended and the time (s)."""
+        half, (q, v) = 0.5 * self.step, own.state
+        under, middle = self._under(own.state, self.step), np.array([torques[0], torques.mean(axis=0)])
+        contacts = self._contacts(q, v)
+        starts = speeds(contacts)
+        held = self._hold(own, contacts, starts, under, middle, half)
+        rates = self.vehicle.acceleration(q, v, held)
+        own.found[:] = rates[: own.found.size]
+        rest = self.rests(own)
+        if rest is not None:
+            own.state[0] += rest * v + 0.5 * rest**2 * rates
+            own.state[1, : own.found.size], own.turning[:] = 0.0, 0.0
+            return (AT_REST, rest) if rest < self.step else (self._upright(own), self.step)
+        contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
+        own.changes[:] = (speeds(contacts) - starts) / half
+        held = self._hold(own, contacts, starts, under, torques, self.step)
+        after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
+        own.state[:], own.turning[:] = after.reshape(2, -1), own.report[:, SPINS]
+        return self._upright(own), self.step
+
+    def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
+        starts = speeds(contacts)
+        none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
+        own = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(3))
+        under = self._under(state, 0.0)
+        held = self._hold(own, contacts, starts, under, none, self.step)
+        return self.vehicle.acceleration(state[0], state[1], held), own.turning
+
+    def _upright(self, own: Moving) -> int:
+        return FINE if np.abs(own.state[0, LEANS]).max() <= UPRIGHT else OVER
+
+    def _under(self, state: np.ndarray, time: float) -> list[Surface]:
+        """Surfaces under the wheels, which go straight on for a time (s)."""
+        places = self.course.on.plane.place
+        return under_wheels(self.course.on.road, ways(state[0, :3], state[1, :3], places, time), self.course.on.kind)
+
+    def _contacts(self, q: np.ndarray, v: np.ndarray) -> list[Contact]:
+        return self.vehicle.contacts(self.vehicle.bodies.move(q, v), self.course.steer)
+
+    def _hold(
+        self,
+        own: Moving,
+        contacts: list[Contact],
+        starts: np.ndarray,
+        under: list[Surface],
+        torques: np.ndarray,
+        time: float,
+    ) -> Held:
+        """Forces over a time (s) by loads and motion at contacts; the reports are filled."""
+        course = self.course
+        for i, contact in enumerate(contacts):
+            motion = Motion(starts[i], own.changes[i], contact.passing, contact.sliding, course.regular)
+            radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
+            braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, own.turning[i])
+            own.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)
+        spun = course.on.plane.spin * (own.report[:, SPINS] - own.turning) / time
+        return Held(course.steer, own.report[:, :2].copy(), spun)
+
+    def rests(self, own: Moving) -> float | None:
+        """Time (s) within the step at which the plane motion has least energy, where it was about to end in it."""
+        plane, v, a = self.course.on.plane, own.state[1, :3], own.found
+        weights = np.array([plane.masses.sum(), plane.masses.sum(), plane.inertias[0]])
+        speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
+        if speed == 0.0 and not own.turning.any():
+            return 0.0
+        if rate == 0.0 or falling <= 0.0:
+            return None
+        stands = falling / rate
+        return stands if stands <= self.step and speed <= (1.5 * self.step) ** 2 * rate else None
+
+
+def speeds(contacts: list[Contact]) -> np.ndarray:
+    """Speeds (W,) of the wheels' centres along them (m/s)."""
+    return np.array([contact.passing for contact in contacts])

@@ -1,0 +1,130 @@
+"""Bodies, springs and contacts of a braked vehicle on its suspension, in plain code.
+
+Bodies and springs are those of the independent reference, ``models.multibody.plain``. Here its tyres stand on a flat
+road: discs about axles that keep to the carrier's heading, turned by the steering, with loads along the vertical at the
+wheels' centres and held forces at the contacts. See ``models.brake.sprung_step`` for what is held.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.sprung import Sprung
+from models.multibody.plain.motion import FIRST, PLACE, RATE, Bodies, Motion
+from models.multibody.plain.parts import Parts
+from models.multibody.plain.statics import held_at_rest
+from models.vehicles.free_vehicle import CARRIER, chassis_of
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def round_the_vertical(vector: np.ndarray) -> np.ndarray:
+    """(3,) the upward unit vector x a vector."""
+    return np.array([-vector[1], vector[0], 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Where a tyre touches the road: level axes along and across the wheel, the latter its axle, in space; how far its
+    centre is above the road (m), its load (N), and speeds (m/s) of the centre along and of the contact across."""
+
+    along: np.ndarray
+    axle: np.ndarray
+    height: float
+    load: float
+    passing: float
+    sliding: float
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What stays over a step, of each wheel: steer angles (rad), mean forces (W, 2) on the tyres along and across (N),
+    and the mean moments (N m) that speed up their turning."""
+
+    steer: np.ndarray
+    forces: np.ndarray
+    spun: np.ndarray
+
+
+class Suspension:
+    """A vehicle on its springs and tyres."""
+
+    def __init__(self, vehicle: Sprung) -> None:
+        free = vehicle.handling.vehicle
+        self.bodies, self.tyres = Bodies(free), free.tyres
+        self.parts = Parts(self.bodies, free, CARRIER)
+        self.held, self.loads = held_at_rest(free, CARRIER)
+        self._gravity = -free.gravity * UP
+        self._hubs = self.bodies.points([(tyre.body, tyre.point) for tyre in free.tyres])
+        self._carrier = self.bodies.row[CARRIER]
+        given = vehicle.handling.given
+        chassis = chassis_of(given)
+        self._chassis, self._centre = (
+            self.bodies.row[chassis.name],
+            self.bodies.points([(chassis.name, chassis.position)]),
+        )
+        self._drag = 0.5 * given.drags[0].coefficient if given.drags else 0.0
+
+    @property
+    def size(self) -> int:
+        """How many coordinates there are."""
+        return self.bodies.size
+
+    def contacts(self, motion: Motion, steer: np.ndarray) -> list[Contact]:
+        """Contact of every tyre, whose wheels are steered (W,) in rad."""
+        hubs, heading = motion.at(self._hubs), motion.axes(self._carrier)[PLACE]
+        return [self._contact(i, hub, motion, heading, float(steer[i])) for i, hub in enumerate(hubs)]
+
+    def _contact(self, i: int, hub: np.ndarray, motion: Motion, heading: np.ndarray, steer: float) -> Contact:
+        axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
+        along = heading @ (np.cos(steer), np.sin(steer), 0.0)
+        height = max(float(hub[PLACE, 2]), 0.0)
+        own, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._chassis)
+        turning = own + axle * (axle @ (carrying - own))  # the rim does not turn beside the chassis about its axle
+        sliding = hub[RATE] + height * round_the_vertical(turning)
+        return Contact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
+
+    def _load(self, i: int, hub: np.ndarray) -> float:
+        """Load (N) of a tyre that never pulls, neither by its spring nor by its damper."""
+        tyre = self.tyres[i]
+        elastic = self.loads[i] - tyre.stiffness * (hub[PLACE, 2] - tyre.point[2])
+        return float(max(elastic - tyre.damping * hub[RATE, 2], 0.0)) if elastic > 0.0 else 0.0
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, held: Held) -> np.ndarray:
+        """Accelerations (n,) at coordinates and rates (n,)."""
+        motion = self.bodies.move(q, v)
+        mass, force = self.bodies.inertia(motion, self._gravity)
+        travels = self.parts.travels(motion, q, v)
+        force -= sum(self.parts.forces(travels, self.held)) @ travels.gradient
+        force += self._by_tyres(motion, held) + self._by_air(motion)
+        accelerations: np.ndarray = np.linalg.solve(mass, force)
+        return accelerations
+
+    def _by_air(self, motion: Motion) -> np.ndarray:
+        """Generalised forces (n,) of drag at the chassis' centre, against its speed where the vehicle heads."""
+        centre, ahead = motion.at(self._centre)[0], motion.axes(self._carrier)[PLACE][:, 0]
+        speed = float(centre[RATE] @ ahead)
+        forces: np.ndarray = centre[FIRST:] @ (-self._drag * abs(speed) * speed * ahead)
+        return forces
+
+    def _by_tyres(self, motion: Motion, held: Held) -> np.ndarray:
+        """Generalised forces (n,) of all tyres; brakes and locked wheels hold on to the chassis."""
+        hubs, total = motion.at(self._hubs), np.zeros(self.size)
+        for i, contact in enumerate(self.contacts(motion, held.steer)):
+            creep = contact.along * held.forces[i, 0] + contact.axle * held.forces[i, 1]
+            moment = -contact.height * round_the_vertical(creep)
+            rolling = contact.axle * (contact.axle @ moment)
+            total += hubs[i, FIRST:] @ (creep + contact.load * UP)
+            total += motion.by_moment(int(self._hubs.rows[i]), moment - rolling)
+            total += motion.by_moment(self._chassis, rolling - contact.axle * held.spun[i])
+        return total
+
+    def liveliness(self) -> float:
+        """Largest rate (m/s^2) at which side forces of slope 1 at a speed of 1 m/s damp a motion in the design
+        position."""
+        still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
+        motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
+        across = np.array([[own.sliding for own in self.contacts(motion, straight)] for motion in motions])
+        mass, _ = self.bodies.inertia(motions[0], self._gravity)
+        damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
+        return float(np.linalg.eigvals(damping).real.max())

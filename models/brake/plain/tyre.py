@@ -1,0 +1,130 @@
+"""Friction of a tyre by its tables, and the forces on one wheel over a step, in plain code.
+
+Each table is linear in every variable between its nodes and constant beyond: a sum over the nodes, each with a weight
+that is 1 there and 0 at the next. See ``models.tyre.tyre_table`` and ``models.brake.plane_step`` for the laws.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.brake.plain.wheel import Force, WheelStep, wheel_step
+from models.tyre.tyre_table import Tables
+
+NEARLY = 0.98
+"""Slip from which on the force turns to that of a locked tyre, against the way in which it slides."""
+
+
+def weights(nodes: np.ndarray, value: float) -> np.ndarray:
+    """Weight (n,) of each node at a value, the end's one beyond it."""
+    inside = float(np.clip(value, nodes[0], nodes[-1]))
+    high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
+    found = np.zeros(nodes.size)
+    if nodes.size == 1:
+        found[0] = 1.0
+        return found
+    found[high] = (inside - nodes[high - 1]) / (nodes[high] - nodes[high - 1])
+    found[high - 1] = 1.0 - found[high]
+    return found
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Under one wheel: numbers of two tables, and the share of the second."""
+
+    first: int
+    second: int
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """A tyre at one slip angle (rad, from 0) and load (N) on a surface."""
+
+    tables: Tables
+    under: Surface
+    angle: float
+    load: float
+
+    def mixed(self, values: np.ndarray) -> np.ndarray:
+        """Of values (t, ...) of all tables those of the surface."""
+        share = self.under.share
+        mixed: np.ndarray = (1.0 - share) * values[self.under.first] + share * values[self.under.second]
+        return mixed
+
+    def ahead(self) -> Force:
+        """Force along the wheel by slip."""
+        t = self.tables
+        mu = np.einsum("a,f,tafs->ts", weights(t.angles, self.angle), weights(t.loads, self.load), t.mu_x)
+        return Force(t.slips, self.load * self.mixed(mu))
+
+    def aside(self, slip: float) -> float:
+        """Size (N) of the force across the wheel at a slip."""
+        t, by_angle = self.tables, weights(self.tables.angles, self.angle)
+        g = np.einsum("a,s,tas->t", by_angle, weights(t.slips, abs(slip)), t.g)
+        h = np.einsum("a,f,taf->t", by_angle, weights(t.loads, self.load), t.h)
+        return self.load * float(self.mixed(g * h))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Of one wheel's centre: speed along it at the start of a step and its mean change (m/s, m/s^2), speeds along and
+    across where slip angles are taken (m/s), the speed ``regular`` (m/s) below which slip angles are those at it."""
+
+    start: float
+    rate: float
+    along: float
+    across: float
+    regular: float
+
+    @property
+    def sense(self) -> float:
+        """1 forwards, -1 backwards."""
+        return 1.0 if self.start >= 0.0 else -1.0
+
+    @property
+    def forwards(self) -> float:
+        """Speed (m/s) in the sense in which it started, at least 0."""
+        return max(self.sense * self.along, 0.0)
+
+    @property
+    def angle(self) -> float:
+        """Size (rad) of the slip angle."""
+        return math.atan2(abs(self.across), max(self.forwards, self.regular))
+
+
+@dataclass(frozen=True)
+class Braked:
+    """Of one wheel over a step: torques of its brake (N m) at both ends, the step (s), radius (m), inertia (kg m^2),
+    and the turning at the start (rad/s)."""
+
+    torques: tuple[float, float]
+    step: float
+    radius: float
+    inertia: float
+    turning: float
+
+
+def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked) -> np.ndarray:
+    """(7,) mean forces along and across (N), load (N), mean slip, slip angle (rad), time locked (s), turning (rad/s)
+    at the end: the columns of ``plane_step``."""
+    friction, sense = Friction(tables, under, motion.angle, load), motion.sense
+    speeds = sense * motion.start, sense * (motion.start + of.step * motion.rate)
+    wheel = WheelStep(speeds, of.torques, of.step, of.radius, of.inertia)
+    turning, ahead, slip, locked = wheel_step(wheel, sense * of.turning, friction.ahead())
+    forces = _turned_to_sliding(np.array([ahead, friction.aside(slip)]), slip, motion)
+    side = -math.copysign(forces[1], motion.across) if motion.across else 0.0
+    angle = math.copysign(motion.angle, motion.across)
+    return np.array([-sense * forces[0], side, load, slip, angle, locked, sense * turning])
+
+
+def _turned_to_sliding(forces: np.ndarray, slip: float, motion: Motion) -> np.ndarray:
+    """Sizes (2,) of the forces along and across, turned against the sliding of a wheel that is nearly locked."""
+    sliding = np.array([motion.forwards, abs(motion.across)])
+    speed = float(np.hypot(*sliding))
+    if slip <= NEARLY or speed == 0.0:
+        return forces
+    share = min((slip - NEARLY) / (1.0 - NEARLY), 1.0)
+    turned: np.ndarray = (1.0 - share) * forces + share * float(np.hypot(*forces)) * sliding / speed
+    return turned

@@ -1,0 +1,203 @@
+"""One wheel through one step, in plain code: see ``models.brake.wheel_step`` for the scheme, not for the algorithm.
+
+The slip s obeys s' = g(s) = kappa (T / r - F(s)) + (1 - s) u' / u with kappa = r^2 / (J u), u at its mean. F is linear
+between nodes, and so is g: it never changes its sign on the way, a way from s0 to s1 takes (s1 - s0) over the
+logarithmic mean of g(s0) and g(s1), and the slip moves by t g(s0) phi_1(g' t), phi_1(z) = (exp(z) - 1) / z.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+SLOWEST = 1e-9
+"""Speed (m/s) below which a wheel's centre is taken to have this one."""
+SERIES = 1e-3
+"""Argument below which a difference is summed as a series, to rounding in five terms."""
+LOCKED = 1.0
+"""Slip of a wheel that stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """Tyre force by slip: slips (s,) from 0 to 1 and forces (s,) in N there; odd in the slip."""
+
+    slips: np.ndarray
+    forces: np.ndarray
+
+    @property
+    def sliding(self) -> float:
+        """Force (N) at slip 1."""
+        return float(self.forces[-1])
+
+    def both_ways(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slips from -1 to 1 and the forces (N) there."""
+        return np.concatenate((-self.slips[:0:-1], self.slips)), np.concatenate((-self.forces[:0:-1], self.forces))
+
+
+@dataclass(frozen=True)
+class WheelStep:
+    """What moves a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
+    on, linear in time) at both ends, step (s), radius (m), inertia (kg m^2)."""
+
+    speeds: tuple[float, float]
+    torques: tuple[float, float]
+    step: float
+    radius: float
+    inertia: float
+
+    def speed(self, time: float) -> float:
+        """Speed (m/s) of the centre at a time (s)."""
+        u0, u1 = max(self.speeds[0], SLOWEST), max(self.speeds[1], 0.0)
+        return u0 + (u1 - u0) * time / self.step
+
+    def torque(self, time: float) -> float:
+        """Torque (N m) at a time (s)."""
+        return self.torques[0] + (self.torques[1] - self.torques[0]) * time / self.step
+
+    def mean_torque(self, time: float) -> float:
+        """Mean torque (N m) from a time (s) to the end."""
+        return 0.5 * (self.torque(time) + self.torques[1])
+
+    @property
+    def mean_speed(self) -> float:
+        """Mean speed (m/s), above 0."""
+        return max(0.5 * (self.speed(0.0) + self.speed(self.step)), SLOWEST)
+
+    @property
+    def gain(self) -> float:
+        """Change of the speed of the centre (m/s^2)."""
+        return (self.speed(self.step) - self.speed(0.0)) / self.step
+
+
+@dataclass
+class Progress:
+    """How far a wheel has come within its step: time (s), slip, impulse of the road on the vehicle (N s), integral of
+    the slip (s), time locked (s), and whether it has just been freed."""
+
+    time: float
+    slip: float
+    impulse: float = 0.0
+    area: float = 0.0
+    locked: float = 0.0
+    freed: bool = False
+
+
+def wheel_step(of: WheelStep, turning: float, force: Force) -> tuple[float, float, float, float]:
+    """Speed of turning (rad/s) at the end of a step, mean force (N), mean slip and time locked (s).
+
+    turning : at the start (rad/s), below 0 where it is against the direction of the speeds.
+    """
+    slip = 1.0 - of.radius * turning / of.speed(0.0)
+    at = Progress(0.0, slip)
+    if slip > LOCKED:
+        stopping = force.sliding * of.radius + of.mean_torque(0.0)
+        if stopping * of.step <= -of.inertia * turning:
+            return turning + stopping * of.step / of.inertia, force.sliding, slip, 0.0
+        _pass(at, -of.inertia * turning / stopping, force.sliding, LOCKED)
+    while at.time < of.step:
+        if _stays_locked(of, at, force):
+            _lock(of, at, force)
+        elif _spins(of, at, force):
+            turned = _spin(of, at, force)
+            if at.time >= of.step:
+                return turned, at.impulse / of.step, at.area / of.step, at.locked
+        else:
+            _roll(of, at, force)
+    return of.speed(of.step) * (1.0 - at.slip) / of.radius, at.impulse / of.step, at.area / of.step, at.locked
+
+
+def _pass(at: Progress, time: float, force: float, slip: float) -> None:
+    """Let a time (s) pass at a constant force (N) and slip."""
+    at.time, at.slip = at.time + time, slip
+    at.impulse, at.area = at.impulse + force * time, at.area + slip * time
+
+
+def _stays_locked(of: WheelStep, at: Progress, force: Force) -> bool:
+    """Whether the brake holds a wheel that stands, now or on the mean of what is left."""
+    holds = max(of.torque(at.time), of.mean_torque(at.time)) / of.radius >= force.sliding
+    return at.slip >= LOCKED and not at.freed and holds
+
+
+def _lock(of: WheelStep, at: Progress, force: Force) -> None:
+    """A wheel stands until the torque falls below what the road turns it with."""
+    needed, time = force.sliding * of.radius, of.step - at.time
+    if of.torques[1] < needed:
+        time = (needed - of.torque(at.time)) * of.step / (of.torques[1] - of.torques[0])
+    _pass(at, time, force.sliding, LOCKED)
+    at.locked, at.freed = at.locked + time, True
+
+
+def _excess(of: WheelStep, at: Progress, force: Force) -> float:
+    """Rate (m/s^2) at which the rim gains on twice the speed of the centre while the road slows it by sliding."""
+    return -of.radius * (of.radius * force.sliding + of.mean_torque(at.time)) / of.inertia - 2.0 * of.gain
+
+
+def _spins(of: WheelStep, at: Progress, force: Force) -> bool:
+    """Whether the rim is, and stays, more than twice as fast as the centre."""
+    return at.slip < -1.0 or (at.slip == -1.0 and _excess(of, at, force) > 0.0)
+
+
+def _spin(of: WheelStep, at: Progress, force: Force) -> float:
+    """A wheel slides at a slip that counts as -1, to the step's end or until it has this slip; its turning then."""
+    turning, excess = of.speed(at.time) * (1.0 - at.slip) / of.radius, _excess(of, at, force)
+    ahead, time = of.radius * turning - 2.0 * of.speed(at.time), of.step - at.time
+    slowing = (of.radius * force.sliding + of.mean_torque(at.time)) / of.inertia
+    if excess < 0.0:
+        time = min(time, -ahead / excess)
+    _pass(at, time, -force.sliding, -1.0)
+    at.freed = False
+    return turning - slowing * time
+
+
+def _roll(of: WheelStep, at: Progress, force: Force) -> None:
+    """A wheel turns at a slip between -1 and 1, to the step's end or until it has one of both; momentum gives the mean
+    force."""
+    before, mean, slip = at.time, of.mean_torque(at.time), min(at.slip, LOCKED)
+    nodes, forces = force.both_ways()
+    kappa = of.radius**2 / (of.inertia * of.mean_speed)
+    rates = kappa * (mean / of.radius - forces) + (1.0 - nodes) * of.gain / of.mean_speed
+    time, at.slip, area = along_nodes(slip, nodes, rates, of.step - before)
+    if time == 0.0:  # by rounding it stands on the edge, where neither state takes it
+        time = of.step - before
+    at.time, at.freed = before + time, False
+    if math.isclose(at.time, of.step, rel_tol=1e-15):
+        at.time = of.step
+    turning = [of.speed(t) * (1.0 - s) / of.radius for t, s in ((before, slip), (at.time, at.slip))]
+    at.impulse += of.inertia * (turning[1] - turning[0]) / of.radius + mean / of.radius * time
+    at.area += area
+
+
+def along_nodes(slip: float, nodes: np.ndarray, rates: np.ndarray, left: float) -> tuple[float, float, float]:
+    """Time (s) that passes, slip then and integral of the slip (s), for ``left`` seconds or until the last node.
+
+    nodes, rates (k,) : the rate (1/s) of the slip is linear between the nodes.
+    """
+    rate, time, area = float(np.interp(slip, nodes, rates)), 0.0, 0.0
+    if rate == 0.0:
+        return left, slip, slip * left
+    ahead = np.flatnonzero(nodes > slip) if rate > 0.0 else np.flatnonzero(nodes < slip)[::-1]
+    for k in ahead:
+        way, ratio = float(nodes[k]) - slip, float(rates[k]) / rate
+        grows = (ratio - 1.0) * rate / way
+        needed = way / rate * _log_over(ratio - 1.0) if ratio > 0.0 else math.inf
+        if time + needed >= left:
+            rest = left - time
+            z = grows * rest
+            moved = slip + rest * rate * _phi(1, z)
+            return left, moved, area + slip * rest + rate * rest**2 * _phi(2, z)
+        area += slip * needed + rate * needed**2 * _phi(2, grows * needed)
+        time, slip, rate = time + needed, float(nodes[k]), float(rates[k])
+    return time, slip, area
+
+
+def _log_over(x: float) -> float:
+    """log(1 + x) / x."""
+    return math.log1p(x) / x if abs(x) > SERIES else math.fsum((-x) ** k / (k + 1) for k in range(6))
+
+
+def _phi(order: int, z: float) -> float:
+    """phi_1(z) = (exp(z) - 1) / z or phi_2(z) = (exp(z) - 1 - z) / z^2."""
+    if abs(z) <= SERIES:
+        return math.fsum(z**k / math.factorial(k + order) for k in range(6))
+    return math.expm1(z) / z if order == 1 else (math.expm1(z) - z) / z**2

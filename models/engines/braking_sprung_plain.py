@@ -1,0 +1,91 @@
+"""A braked vehicle on its suspension by the independent reference: no engine and no compiled code in its steps.
+
+It stands where ``models.engines.braking_sprung.OnSprings`` stands, with the same start, controller and samples.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from models.brake.advance import AT_REST, FINE
+from models.brake.plain.pressure import Pressures
+from models.brake.plain.step import BLINK, OVER, UPRIGHT, Course, Moving, Steps
+from models.brake.plain.suspension import Suspension
+from models.brake.plane_records import Motion
+from models.brake.samples import Braking, Kept, Told
+from models.brake.sprung import Sprung
+from models.brake.surfaces import OnRoad
+from models.core.errors import RunFailed
+from models.engines.assembly import Settings
+from models.engines.spatial_protocol import INTEGRATORS, check_modes
+from models.engines.stability import LONG_RUN
+from models.vehicles.spatial_linear import linearise
+
+NAME = "reference"
+
+
+class PlainOnSprings:
+    """The vehicle by plain code; ``advance`` and ``moving`` as those of ``OnSprings``."""
+
+    def __init__(self, vehicle: Sprung) -> None:
+        self.vehicle, self.size, self.suspension = vehicle, vehicle.size, Suspension(vehicle)
+        self.liveliness = self.suspension.liveliness()
+        self._changes = np.zeros(len(self.suspension.tyres))
+
+    def advance(
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
+    ) -> tuple[int, float]:
+        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+
+        A run begins with accelerations of zero. Raises RunFailed where the vehicle turns over.
+        """
+        if not motion.accelerations.any():
+            self._changes[:] = 0.0
+        course = Course(vehicle, steer, vehicle.slope * self.liveliness * step)
+        steps, moving, time = Steps(self.suspension, course, step), self._moving(motion), 0.0
+        for ends in pairwise(torques):
+            status, used = steps.on(moving, np.array(ends))
+            time += used
+            if status == OVER:
+                raise RunFailed(NAME, f"the vehicle turns over: it leans by more than {UPRIGHT} rad", time)
+            if status == AT_REST:
+                return AT_REST, time
+        return FINE, time
+
+    def _moving(self, motion: Motion) -> Moving:
+        """The same arrays as plain code reads them: a row of the report for each wheel."""
+        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3])
+
+    def moving(
+        self, told: Told, kept: Kept, sample: float, braking: Braking, motion: Motion, vehicle: OnRoad
+    ) -> Iterator[tuple[int, float, float, float]]:
+        """As ``models.brake.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
+        torques, time, status = braking.torques, 0.0, FINE
+        step = sample / (len(torques) - 1)
+        self.check_step(step)
+        pressures = Pressures(braking.chambers, braking.brakes, sample, braking.air)
+        while True:
+            yield status, time, float(np.hypot(*motion.state[1, :2])), float(braking.air.supply[0])
+            for _ in range(int(told.samples[0])):
+                if math.isnan(told.pressures[0]):
+                    pressures.by_valves(told.valves, torques)
+                else:
+                    pressures.by_pressures(told.pressures, torques)
+                status, used = self.advance(motion, torques, step, told.steer, vehicle)
+                time += used
+                kept.now[0] = time
+                kept.rows[kept.left[0]] = kept.now
+                kept.left[0] += 1
+                if status == AT_REST or time >= kept.until:
+                    break
+
+    def check_step(self, step: float) -> None:
+        """Refuse a step (s) at which a mode of the vehicle on its springs and tyres would grow."""
+        settings = Settings(INTEGRATORS["mujoco"], step, LONG_RUN * step)
+        check_modes(NAME, linearise(self.vehicle.handling.vehicle), settings)
+
+    def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
+        """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
+        return Steps(self.suspension, Course(vehicle, steer, 0.0), BLINK).rolling(state)

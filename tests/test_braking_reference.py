@@ -1,0 +1,141 @@
+"""The independent reference of braking on the suspension: its laws, its accelerations, its stops, and its limits."""
+
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.brake import plain
+from models.brake.plain.suspension import Suspension
+from models.brake.plain.wheel import Force, WheelStep, along_nodes, wheel_step
+from models.brake.plane_vehicle import truck
+from models.core.errors import Refused, RunFailed
+from models.systems.braking.plan import check
+from models.systems.braking.run import run as drive
+from models.systems.braking.scene import build
+from validation.braking import plain_brakes as laws
+from validation.braking import plain_sprung as whole
+from validation.braking.plain_relaxation import turn_apart
+from validation.braking.sprung_box import box, car
+from validation.cases import braking_reference as case
+from validation.faults import braking_reference as faults
+
+
+@pytest.mark.parametrize("name", case.LAWS)
+def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
+    both, bound, _ = case.LAWS[name]
+    assert laws.largest(*both(60, seed=5)) < bound
+
+
+def test_the_states_of_the_wheel_reach_every_branch():
+    _, plain = laws.tyre_reports(100)
+    slip, locked, turning = plain[:, 3], plain[:, 5], plain[:, 6]
+    assert (locked > 0.0).sum() > 5 and (slip < -0.5).sum() > 5 and (slip > 1.0).sum() > 2
+    assert ((turning == 0.0) & (locked > 0.0)).any() and ((turning != 0.0) & (locked > 0.0)).any()
+
+
+def test_slip_between_nodes_follows_its_differential_equation():
+    nodes, rates = np.array([0.0, 0.1, 0.4, 1.0]), np.array([3.0, 2.0, 2.0, 0.5])
+    times = np.linspace(0.0, 0.2, 201)
+    slips, areas = np.array([along_nodes(0.02, nodes, rates, time)[1:] for time in times[1:]]).T
+    slopes = np.gradient(np.concatenate(([0.02], slips)), times)[1:-1]
+    assert slopes == pytest.approx(np.interp(slips[:-1], nodes, rates), rel=2e-2)  # central differences at corners
+    assert areas[-1] == pytest.approx(np.trapezoid(np.concatenate(([0.02], slips)), times), rel=1e-5)
+    time, slip, _ = along_nodes(0.02, nodes, rates, 1e3)
+    assert slip == 1.0 and time < 1e3
+
+
+def test_a_wheel_keeps_its_momentum_whatever_it_does():
+    force = Force(np.array([0.0, 0.1, 1.0]), np.array([0.0, 5e3, 4e3]))
+    for torques, turning in (((800.0, 900.0), 30.0), ((2e4, 2e4), 0.0), ((0.0, 0.0), 0.0), ((5e3, 100.0), 0.0)):
+        of = WheelStep((10.0, 9.95), torques, 5.5e-3, 0.33, 1.7)
+        turned, mean, _, locked = wheel_step(of, turning, force)
+        if locked == 0.0:
+            braked = 0.5 * sum(torques) * of.step
+            assert of.inertia * (turned - turning) == pytest.approx(0.33 * mean * of.step - braked, abs=1e-10)
+        else:
+            assert mean <= 5e3 and turned * 0.33 <= 9.95
+
+
+def test_loads_at_rest_are_those_of_levers():
+    for own in (box(), car()):
+        assert Suspension(own).loads == pytest.approx(truck(own.plane).static, rel=1e-9)
+
+
+def test_accelerations_and_a_piece_of_a_stop_are_those_of_the_engine():
+    for name in ("twin", "bent"):
+        own, count = whole.VEHICLES[name](), 5
+        found = whole.accelerations(own, "mujoco", count)
+        assert whole.apart(found, whole.plain_accelerations(name, count)) < 1e-12
+    own = whole.asymmetric()
+    assert whole.paths_apart(whole.run(own, "mujoco", 0.03), whole.plain_run("twin", 0.03)) < 1e-11
+
+
+def test_a_turn_on_relaxing_tyres_tends_to_its_written_equations_by_order_two():
+    errors = [turn_apart(0.6, substeps) for substeps in (1, 2)]
+    assert 3.5 < errors[0] / errors[1] < 4.5 and errors[1] < 2e-4  # m, of some 60 m
+
+
+def test_a_steady_circle_is_that_of_the_engine():
+    found, plain = whole.turns(whole.asymmetric())
+    assert found[0] > 0.05 and np.abs(found - plain).max() < 1e-11
+
+
+def test_a_stop_ends_where_that_of_the_engine_ends():
+    stops = [whole.run(box(), engine, 1.0, False, 0.3) for engine in ("mujoco", "reference")]
+    assert all(stop.stands for stop in stops) and whole.paths_apart(*stops) < 1e-11
+
+
+def test_what_turns_over_and_what_is_too_stiff_is_told():
+    vehicle = whole.vehicle_on(car(), "reference", False)
+    start = vehicle.rolling(10.0)
+    start.state[0, 4], start.state[1, 4] = 0.49, 5.0
+    with pytest.raises(RunFailed, match="turns over"):
+        vehicle.run(whole.controller(False), start, 0.1)
+    with pytest.raises(Refused, match="at most"):
+        replace(whole.vehicle_on(box(100.0), "reference", False), substeps=1).run(whole.controller(False), 2.0, 0.1)
+
+
+def scene(**run):
+    return build(
+        {
+            "title": "car",
+            "system": "braking",
+            "vehicle": {"file": "r19_free", "spin_inertia": 1.7},
+            "road": {"stretches": [{"left": "wet"}]},
+            "brakes": {"front": {"gradient": 300.0}, "rear": {"gradient": 100.0}, "supply": 2.0},
+            "run": run,
+            "procedures": {"straight": {"speed": 6.0}, "turn": {"kind": "turn", "speed": 6.0, "radius": 40.0}},
+        },
+        "scene.toml",
+    )
+
+
+def test_a_scene_is_run_by_the_reference_when_it_is_asked_for():
+    own = scene(duration=0.05)
+    check(own, ("reference",))
+    for name in own.procedures:
+        found, plain = (drive(own, engine, procedure=name) for engine in ("mujoco", "reference"))
+        assert plain.data.attrs["engine"] == "reference" and whole.paths_apart(found.detail, plain.detail) < 1e-11
+        assert float(plain.data["load"][-1].min()) > 1e3
+
+
+def test_the_plain_code_holds_no_compiled_function():
+    names = [f"models.brake.plain.{path.stem}" for path in Path(plain.__file__).parent.glob("*.py")]
+    for name in (*names, "models.engines.braking_sprung_plain"):
+        assert not [key for key, value in vars(import_module(name)).items() if hasattr(value, "py_func")], name
+
+
+@pytest.mark.full
+def test_every_vehicle_in_every_engine_at_a_hundred_states_and_along_a_second(tmp_path):
+    rows, _ = case.measure(False, tmp_path)
+    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 1 + 3 + 2 * 6
+
+
+@pytest.mark.full
+def test_every_planted_fault_is_seen_and_nothing_without_a_fault():
+    clean, *planted = faults.CAMPAIGN.measure()
+    assert max(clean["ratios"].values()) < 1.0
+    assert not [own["fault"] for own in planted if max(own["ratios"].values()) <= 1.0]

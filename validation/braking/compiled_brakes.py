@@ -1,0 +1,73 @@
+"""Laws of the braked wheel by compiled code, each called alone: what the plain ones are compared with."""
+
+import numpy as np
+
+from models.brake.plain.suspension import Held
+from models.brake.plain.tyre import Braked, Motion, Surface
+from models.brake.plane_records import KNOWN, REPORTED, Report, Wheels
+from models.brake.plane_step import slide
+from models.brake.plane_step import tyre as compiled_tyre
+from models.brake.plane_vehicle import PAPER, Plane, truck
+from models.brake.relaxation import Lag
+from models.brake.relaxation import lag_on as compiled_lag_on
+from models.brake.sprung import Sprung
+from models.brake.sprung_step import HELD, fill, held
+from models.brake.surfaces import EVEN, OnRoad, Road, surfaces
+from models.brake.surfaces import under_wheels as compiled_under_wheels
+from models.brake.wheel_step import StepInput, Wheel
+from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.tyre.magic_formula import surface
+from models.tyre.tyre_table import Cells, Tables, across, along, place, stacked
+
+PLANE: Plane = truck(PAPER)
+DRY = stacked([surface("dry")])
+
+
+def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked) -> np.ndarray:
+    """(7,) as ``models.brake.plain.tyre.tyre``."""
+    wheels, report, below = Wheels(*np.zeros((KNOWN, 1))), np.empty((REPORTED, 1)), surfaces(1)
+    below.first[0], below.second[0], below.share[0] = under.first, under.second, under.share
+    wheels.start[0], wheels.load[0] = motion.start, load
+    ahead = motion.forwards if motion.start >= 0.0 else -motion.forwards
+    slide(0, ahead, motion.across, motion.regular, tables.angles, wheels)
+    given = StepInput(motion.start, motion.start + of.step * motion.rate, *of.torques, of.step)
+    compiled_tyre(0, given, Wheel(of.radius, of.inertia, of.turning), tables, wheels, below, Report(*report))
+    return report[:, 0]
+
+
+def friction(tables: Tables, which: int, angle: float, load: float, slip: float) -> tuple[float, float]:
+    """mu_x and mu_y of one of the tables at a slip angle (rad), a load (N) and a slip."""
+    cells, (s, w) = Cells(*place(tables.angles, angle), *place(tables.loads, load)), place(tables.slips, slip)
+    below, above = (along(which, cells, k, tables.mu_x) for k in (s, min(s + 1, tables.slips.size - 1)))
+    return below + w * (above - below), across(which, cells, s, w, tables.g, tables.h)
+
+
+def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) -> np.ndarray:
+    """Tables and share of the second (4, 3) under the wheels of the truck at a state (2, 3), over a step (s)."""
+    below = surfaces(4)
+    compiled_under_wheels(state, step, OnRoad(PLANE, kinds, 0.0, DRY, road), below)
+    return np.column_stack((below.first, below.second, below.share))
+
+
+def lag_on(
+    state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, lag: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As ``validation.braking.plain_relaxation.lag_on``, of the truck's wheels."""
+    after, lagging = lag.copy(), np.zeros(4)
+    truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, EVEN)
+    compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
+    return after, lagging
+
+
+def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
+    """A vehicle on its suspension in an engine, around the compiled forces; ``held_in`` its table is what its wheels
+    hold."""
+    own = vehicle.handling
+    table = np.concatenate((own.numbers, np.zeros(HELD * len(own.vehicle.tyres))))
+    return free_model(engine, Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table)))
+
+
+def held_in(numbers: np.ndarray) -> Held:
+    """What four wheels hold by a table of numbers: views, to read and to write."""
+    rows = numbers[-4 * HELD :].reshape(HELD, 4)
+    return Held(rows[0], rows[1:3].T, rows[3])

@@ -1,0 +1,148 @@
+"""The braked vehicle on its suspension by an engine and by plain code: accelerations at states, and runs."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from models.brake.brake import Brake, of_wheels
+from models.brake.controller import Controller
+from models.brake.controllers.slip import SlipBangBang
+from models.brake.plain.suspension import Held, Suspension
+from models.brake.plane_vehicle import truck
+from models.brake.pressure import Chambers
+from models.brake.sprung import Sprung, sprung
+from models.brake.surfaces import EVEN, Stretch, road
+from models.engines.braking_sprung import OnSprings
+from models.engines.braking_sprung_plain import PlainOnSprings
+from models.systems.braking.march import Braked, Path, on_tyres
+from models.systems.braking.procedures import steady_turn
+from models.tyre.magic_formula import surface
+from models.vehicles.spatial import Curve, SpatialVehicle
+from models.vehicles.vehicle_file import load_vehicle
+from validation.braking.compiled_brakes import held_in, in_engine
+from validation.braking.sprung_box import SPIN, car, steady
+from validation.spatial.cars import twin
+
+STATES, SEED = 100, 22
+LEAN = 0.3
+"""rad: largest roll and pitch of the states."""
+
+
+@cache
+def asymmetric() -> Sprung:
+    """The twin without any symmetry."""
+    return sprung(twin(), SPIN)
+
+
+@cache
+def bent() -> Sprung:
+    """The car with stops and dry friction at its wheels, and dampers in its tyres."""
+    stop = Curve((-0.06, -0.03, 0.0, 0.03, 0.06), (-4e3, -500.0, 0.0, 300.0, 3e3))
+    damper = Curve((-1.0, -0.1, 0.0, 0.2, 1.0), (-900.0, -200.0, 0.0, 150.0, 400.0))
+    whole: SpatialVehicle = load_vehicle("r19_free")
+    wheels = {tyre.body for tyre in whole.tyres}
+    springs = tuple(
+        replace(s, travel_force=stop, rate_force=damper, friction=60.0) if wheels & {s.one, s.two} else s
+        for s in whole.springs
+    )
+    tyres = tuple(replace(tyre, damping=80.0 + 10.0 * i) for i, tyre in enumerate(whole.tyres))
+    return sprung(replace(whole, springs=springs, tyres=tyres), SPIN)
+
+
+VEHICLES = {"car": car, "twin": asymmetric, "bent": bent}
+
+
+def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, list[Held]]:
+    """Random coordinates and rates (count, 2, size) at any heading, and what is held at their wheels."""
+    random = np.random.default_rng(seed)
+    both = random.normal(0.0, 1.0, (count, 2, size)) * np.array([[0.02], [0.3]])
+    both[:, 0, :2], both[:, 0, 2] = random.uniform(-50.0, 50.0, (count, 2)), random.uniform(-np.pi, np.pi, count)
+    both[:, 0, 4:6], both[:, 1, :2] = random.uniform(-LEAN, LEAN, (count, 2)), random.normal(0.0, 15.0, (count, 2))
+    kept = [
+        Held(random.normal(0.0, 0.2, 4), random.normal(0.0, 3e3, (4, 2)), random.normal(0.0, 300.0, 4))
+        for _ in range(count)
+    ]
+    return both, kept
+
+
+@cache
+def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
+    """(count, n) by plain code."""
+    own = Suspension(VEHICLES[vehicle]())
+    both, kept = states(own.size, count)
+    return np.array([own.acceleration(q, v, one) for (q, v), one in zip(both, kept, strict=True)])
+
+
+def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
+    """(count, n) by an engine around the compiled forces."""
+    model, found = in_engine(vehicle, engine), np.empty((count, vehicle.size))
+    rows = held_in(model.numbers)
+    for i, (state, one) in enumerate(zip(*states(vehicle.size, count), strict=True)):
+        rows.steer[:], rows.forces[:], rows.spun[:] = one.steer, one.forces, one.spun
+        found[i] = model.acceleration(0.0, *state)
+    return found
+
+
+def apart(compiled: np.ndarray, plain: np.ndarray) -> float:
+    """Largest difference by the largest acceleration of each state; infinite where one is no number."""
+    off = float(np.max(np.abs(compiled - plain).max(axis=1) / np.abs(plain).max(axis=1)))
+    return off if np.isfinite(off) else np.inf
+
+
+def vehicle_on(vehicle: Sprung, engine: str, valves: bool) -> Braked:
+    """On wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis."""
+    front, rear = (
+        Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
+        for level in ((150.0, 50.0) if valves else (3e2, 1e2))
+    )
+    four = np.ones(4)
+    return on_tyres(
+        truck(vehicle.plane),
+        [surface(name) for name in ("wet", "dry", "ice")],
+        of_wheels(front, front, rear, rear),
+        Chambers(0.05 * four, 0.04 * four, 6.0, 0.5 * four, 200.0, 3e-3),
+        road([Stretch(0.0, 1, 0), Stretch(3.0, 2, 2)], 0.2),
+        steer=np.array([0.05, 0.05, 0.0, 0.0]),
+        substeps=2,
+        engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
+        sprung=vehicle,
+    )
+
+
+def controller(valves: bool) -> Controller:
+    """Valves that a slip controller sets, or pressures that stay."""
+    return SlipBangBang(wheels=4) if valves else steady(*4 * (4e4,))
+
+
+def run(vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0) -> Path:
+    """So many seconds of a stop from a speed (m/s)."""
+    return vehicle_on(vehicle, engine, valves).run(controller(valves), speed, duration)
+
+
+@cache
+def plain_run(vehicle: str, duration: float, valves: bool = True, speed: float = 10.0) -> Path:
+    """``run`` by plain code."""
+    return run(VEHICLES[vehicle](), "reference", duration, valves, speed)
+
+
+def paths_apart(one: Path, other: Path) -> float:
+    """Largest difference of positions, rates and rims (m, rad, per s) at common times; infinite if one ended early."""
+    if len(one.times) != len(other.times):
+        return np.inf
+    off = max(float(np.abs(one.states - other.states).max()), 0.3 * float(np.abs(one.turning - other.turning).max()))
+    return off if np.isfinite(off) else np.inf
+
+
+def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+    """Steady circle (m/s, m), its steer angles, state and turning in one row, by the engine's forces and by plain
+    code; a row of no numbers where there is none."""
+    rows = []
+    for engine in ("mujoco", "reference"):
+        own = vehicle_on(vehicle, engine, False)
+        turn = steady_turn(replace(own, road=EVEN), speed, radius)
+        if turn is None:
+            rows.append(np.full(8 + 2 * vehicle.size, np.nan))
+        else:
+            rows.append(np.concatenate((turn.steer, turn.start.turning, turn.start.state.ravel())))
+    return rows[0], rows[1]

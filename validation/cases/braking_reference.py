@@ -1,0 +1,91 @@
+"""A braked vehicle on its suspension beside the independent reference: every law, accelerations, and stops."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validation.braking import plain_brakes as laws
+from validation.braking import plain_sprung as whole
+from validation.braking.plain_relaxation import turn_apart
+from validation.common.rows import Observed, Row, System
+
+TITLE = "Braking beside the independent reference"
+SYSTEM: System = "anti-lock"
+ENGINES = ("mujoco", "exudyn")
+SHORT, LONG = 0.05, 1.0
+"""s of a stop, in the quick share and in the full one."""
+LAWS = {
+    "friction": (laws.frictions, 1e-12, "friction by stacked tables beside each table on its nodes"),
+    "tyre": (laws.tyre_reports, 1e-10, "forces, slips and turning of a braked wheel over a step"),
+    "road": (laws.surfaces, 1e-12, "surfaces under wheels that pass seams and lines, and their shares"),
+    "pressure": (laws.torques_by_commands, 1e-12, "pressures, torques and supply along random commands"),
+    "relaxation": (laws.lags, 1e-12, "slip angles that lag by a relaxation length"),
+}
+"""Both sides at random states, the bound, and what it is."""
+WHY = "another algorithm in plain code; they differ by rounding"
+REASONS = {"tyre": "the compiled mean slip ends a series that leaves up to 1.4e-9 of the slip's change in a piece"}
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Laws and, of the car in one engine, accelerations, a steady circle and a piece of a stop; in the full share both
+    engines, the twin, the car with curves and friction, and longer stops."""
+    vehicles, engines = (("car",), ENGINES[:1]) if quick else (tuple(whole.VEHICLES), ENGINES)
+    rows = [_law_row(name) for name in LAWS]
+    rows += [_acceleration_row(vehicle, engine) for vehicle in vehicles for engine in engines]
+    rows += [_relaxing_row(), *(_turn_row(vehicle) for vehicle in vehicles)]
+    rows += [_stop_row(vehicle, engine, SHORT if quick else LONG) for vehicle in vehicles for engine in engines]
+    return rows, {}
+
+
+def _law_row(name: str) -> Row:
+    both, bound, what = LAWS[name]
+    return Observed(f"braking_reference.{name}", SYSTEM, what, laws.largest(*both()), "by the largest").at_most(
+        bound, REASONS.get(name, WHY), "native"
+    )
+
+
+def _acceleration_row(vehicle: str, engine: str) -> Row:
+    found = whole.accelerations(whole.VEHICLES[vehicle](), engine)
+    return Observed(
+        f"braking_reference.accelerations.{vehicle}.{engine}",
+        SYSTEM,
+        f"accelerations of the {vehicle} in {engine} at {whole.STATES} states of any heading beside plain code",
+        whole.apart(found, whole.plain_accelerations(vehicle)),
+        "by the largest",
+    ).at_most(1e-12, WHY, "native")
+
+
+def _relaxing_row() -> Row:
+    return Observed(
+        "braking_reference.relaxing_turn",
+        SYSTEM,
+        "end of a braked turn of the truck on ice, tyres that relax over 0.3 m, 8 steps in a sample, beside Newton's "
+        "and Euler's equations with the lags as states",
+        turn_apart(0.3, 8),
+        "m",
+    ).at_most(
+        3e-5, "order two: 47 and 11 micrometres at 4 and 8 steps; a length 1 % wrong moves the law's row", "native"
+    )
+
+
+def _turn_row(vehicle: str) -> Row:
+    found, plain = whole.turns(whole.VEHICLES[vehicle]())
+    return Observed(
+        f"braking_reference.turn.{vehicle}",
+        SYSTEM,
+        f"steady circle of the {vehicle}, 30 m at 8 m/s: steer angles, state and turning beside plain code",
+        float(np.nan_to_num(np.abs(found - plain).max(), nan=np.inf)),
+        "rad, m, per s",
+    ).at_most(1e-10, "the same equations, solved to rounding", "native")
+
+
+def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
+    found = whole.run(whole.VEHICLES[vehicle](), engine, duration)
+    return Observed(
+        f"braking_reference.stop.{vehicle}.{engine}",
+        SYSTEM,
+        f"{duration:g} s of a stop of the {vehicle} in {engine} under a slip controller on split and changing friction",
+        whole.paths_apart(found, whole.plain_run(vehicle, duration)),
+        "m, rad, per s",
+    ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")

@@ -1,0 +1,255 @@
+"""Faults planted in what the compiled step of braking on the suspension is given, noticed by the independent reference.
+
+Agreement of the engines sees none of them: both march the same compiled forces.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from models.multibody import forces as at
+from models.multibody.numbers import Handling
+from models.multibody.parts import DAMPING, FRICTION, ON_TRAVEL, PER_PART, STIFFNESS
+from models.multibody.tree import LOCAL, PER_POINT
+from models.tyre.tyre_table import Tables
+from models.vehicles.spatial_linear import Preloads
+from validation.braking import plain_brakes as laws
+from validation.braking import plain_sprung as whole
+from validation.braking.compiled_brakes import held_in
+from validation.faults.campaign import Campaign, Check, Fault
+from validation.faults.patches import Patch, attribute
+
+ENGINE, COUNT, DURATION = "exudyn", 20, 0.05
+"""Engine, whose steps Python calls, so that they can be patched; states; s of a stop."""
+BOUND = 1e-10
+
+
+def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60) -> Callable[[], float]:
+    """Compiled beside plain at so many states."""
+    return lambda: laws.largest(*sides(count))
+
+
+def _accelerations() -> float:
+    """Of a vehicle that is built anew, with the fault."""
+    found = whole.accelerations(whole.bent.__wrapped__(), ENGINE, COUNT)
+    return whole.apart(found, whole.plain_accelerations("bent", COUNT))
+
+
+def _stop() -> float:
+    return whole.paths_apart(whole.run(whole.bent.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION))
+
+
+CHECKS = {
+    "accelerations": Check("accelerations at random states beside plain code", "by the largest", 1e-12, _accelerations),
+    "stop": Check("a piece of a stop beside plain code", "m, rad, per s", BOUND, _stop),
+    "friction": Check("friction by stacked tables", "by the largest", 1e-12, _law(laws.frictions)),
+    "tyre": Check("a braked wheel over a step", "by the largest", BOUND, _law(laws.tyre_reports)),
+    "road": Check("surfaces under the wheels", "by the largest", 1e-12, _law(laws.surfaces)),
+    "pressure": Check(
+        "pressures and torques along commands", "by the largest", 1e-12, _law(laws.torques_by_commands, 20)
+    ),
+    "relaxation": Check("slip angles that lag", "by the largest", 1e-12, _law(laws.lags)),
+}
+
+
+def _table(change: Callable[[Handling], None]) -> Patch:
+    """The car's table of numbers changed after it was packed."""
+
+    def packed(real: Any) -> Any:
+        def make(*given: Any) -> Handling:
+            handling: Handling = real(*given)
+            change(handling)
+            return handling
+
+        return make
+
+    return attribute("models.brake.sprung:Handling", packed)
+
+
+def _rows(handling: Handling, first: int, count: int, width: int) -> np.ndarray:
+    """Rows (count, width) of a section, as they stand in the table; FIRST and COUNT name their places in its head."""
+    begin, rows = int(handling.numbers[first]), int(handling.numbers[count])
+    return handling.numbers[begin : begin + width * rows].reshape(rows, width)
+
+
+def _parts(handling: Handling) -> np.ndarray:
+    return _rows(handling, at.OF_PARTS, at.PARTS, PER_PART)
+
+
+def _exchanged(handling: Handling) -> None:
+    """Stiffness and damping of the first spring."""
+    first = _parts(handling)[0]
+    first[[STIFFNESS, DAMPING]] = first[[DAMPING, STIFFNESS]]
+
+
+def _without_bars(handling: Handling) -> None:
+    _parts(handling)[len(handling.vehicle.springs) :, STIFFNESS] = 0.0
+
+
+def _neighbour(handling: Handling) -> None:
+    """Parts read from one row too late."""
+    parts = _parts(handling)
+    parts[:, STIFFNESS] = np.roll(parts[:, STIFFNESS], 1)
+
+
+def _moved_point(handling: Handling) -> None:
+    _rows(handling, at.OF_POINTS, at.POINTS, PER_POINT)[0, LOCAL] += 0.01
+
+
+def _softer_tyre(handling: Handling) -> None:
+    handling.tyre_numbers(1)[at.VERTICAL] *= 0.99
+
+
+def _damped_tyre(handling: Handling) -> None:
+    handling.tyre_numbers(1)[at.VISCOUS] *= 1.3
+
+
+def _smooth(handling: Handling) -> None:
+    _parts(handling)[:, FRICTION] = 0.0
+
+
+def _straight(handling: Handling) -> None:
+    _parts(handling)[:, ON_TRAVEL] = 0.0
+
+
+def _dragged(handling: Handling) -> None:
+    handling.numbers[at.DRAG] *= 2.0
+
+
+def _preloads(change: Callable[[Preloads], Preloads]) -> Patch:
+    return attribute("models.multibody.numbers:preloads", lambda real: lambda vehicle: change(real(vehicle)))
+
+
+def _first_larger(values: dict[str, float]) -> dict[str, float]:
+    """The first value 1 % larger."""
+    name = next(iter(values))
+    return values | {name: 1.01 * values[name]}
+
+
+def _march(change: Callable[[Any, Any, np.ndarray, np.ndarray], Any]) -> Patch:
+    """A step by the engine under the forces that are held: change(step, engine, q, v)."""
+    return attribute("models.brake.sprung_step:march", lambda real: lambda *given: change(real, *given))
+
+
+def _euler(march: Any, engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
+    """One step by the accelerations at its start."""
+    rates = engine.acceleration(0.0, q, v)
+    q += engine.step * v
+    v += engine.step * rates
+    return True
+
+
+def _spun_more(march: Any, engine: Any, *state: np.ndarray) -> Any:
+    held_in(engine.numbers).spun[:] *= 1.01
+    return march(engine, *state)
+
+
+def _forces_exchanged(march: Any, engine: Any, *state: np.ndarray) -> Any:
+    """Of the front wheels."""
+    forces = held_in(engine.numbers).forces
+    forces[:2] = forces[1::-1].copy()
+    return march(engine, *state)
+
+
+def _stacked(change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Patch:
+    """Tables as they are stacked for compiled code, with other mu_x and h."""
+
+    def stack(real: Any) -> Any:
+        return lambda tyres: _with_friction(real(tyres), change)
+
+    return attribute("validation.braking.plain_brakes:stacked", stack)
+
+
+def _with_friction(of: Tables, change: Callable[[Tables], tuple[np.ndarray, np.ndarray]]) -> Tables:
+    mu_x, h = change(of)
+    return Tables(of.angles, of.slips, of.loads, np.ascontiguousarray(mu_x), of.g, np.ascontiguousarray(h))
+
+
+def _heavy_wheel(real: Any) -> Any:
+    """A wheel whose inertia is 1 % too large."""
+    return lambda tables, under, motion, load, of: real(
+        tables, under, motion, load, replace(of, inertia=1.01 * of.inertia)
+    )
+
+
+def _other_share(real: Any) -> Any:
+    """The share of the first stretch in the place of that of the second."""
+
+    def under(*given: Any) -> np.ndarray:
+        surface: np.ndarray = real(*given)
+        mixed = surface[:, 0] != surface[:, 1]
+        surface[mixed, 2] = 1.0 - surface[mixed, 2]
+        return surface
+
+    return under
+
+
+def _more_torque(real: Any) -> Any:
+    """Torques 1 % too large."""
+
+    def valves(*given: Any) -> None:
+        real(*given)
+        given[-1][:] *= 1.01
+
+    return valves
+
+
+def _late_torque(real: Any) -> Any:
+    """Torques of the start of each step at its end."""
+
+    def valves(*given: Any) -> None:
+        real(*given)
+        given[-1][1:] = given[-1][:-1].copy()
+
+    return valves
+
+
+def _quick_valves(real: Any) -> Any:
+    """Valves without their delay within a sample."""
+
+    def valves(states: Any, sample: Any, air: Any, chambers: Any, *rest: Any) -> None:
+        whole_samples = sample * int(chambers.delay / sample)
+        real(states, sample, air, chambers._replace(delay=whole_samples), *rest)
+
+    return valves
+
+
+def _longer(real: Any) -> Any:
+    """Relaxation lengths 1 % too long."""
+    return lambda state, time, steer, slope, length, lag: real(state, time, steer, slope, 1.01 * length, lag)
+
+
+BENCH, COMPILED = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
+FAULTS = (
+    Fault(
+        "preload of a spring 1 % too large", "vehicle", _preloads(lambda p: p._replace(parts=_first_larger(p.parts)))
+    ),
+    Fault(
+        "static load of a tyre 1 % too large", "vehicle", _preloads(lambda p: p._replace(tyres=_first_larger(p.tyres)))
+    ),
+    Fault("stiffness and damping of a spring exchanged", "table", _table(_exchanged)),
+    Fault("stiffness of a spring's neighbour", "table", _table(_neighbour)),
+    Fault("anti-roll bars without stiffness", "table", _table(_without_bars)),
+    Fault("a spring's point 10 mm ahead", "table", _table(_moved_point)),
+    Fault("springs without dry friction", "table", _table(_smooth)),
+    Fault("springs without curves of travel", "table", _table(_straight)),
+    Fault("drag twice as large", "table", _table(_dragged)),
+    Fault("damping of a tyre 30 % too large", "table", _table(_damped_tyre)),
+    Fault("stiffness of a tyre 1 % too small", "table", _table(_softer_tyre)),
+    Fault("brake torque of the step's start", "step", attribute("models.brake.samples:by_valves", _late_torque)),
+    Fault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
+    Fault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
+    Fault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
+    Fault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
+    Fault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
+    Fault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),
+    Fault("friction along the wheel 1 % too large", "tyre", _stacked(lambda t: (1.01 * t.mu_x, t.h))),
+    Fault("loads packed one node late", "tyre", _stacked(lambda t: (t.mu_x, np.roll(t.h, 1, axis=2)))),
+    Fault("inertia of a wheel 1 % too large", "wheel", attribute(f"{COMPILED}:tyre", _heavy_wheel)),
+    Fault("shares of two stretches exchanged", "road", attribute(f"{COMPILED}:under_wheels", _other_share)),
+    Fault("relaxation length 1 % too long", "tyre", attribute(f"{COMPILED}:lag_on", _longer)),
+)
+
+CAMPAIGN = Campaign("planted.braking_reference", "braking on the suspension", "anti-lock", CHECKS, FAULTS)
