@@ -21,7 +21,7 @@ from validation.blind_spots import planting
 from validation.blind_spots.probe import label_of
 from validation.blind_spots.rewriting import ROOT
 from validation.blind_spots.shared import shared_functions
-from validation.blind_spots.table import JOINED, Line, is_independent, read, write
+from validation.blind_spots.table import JOINED, Line, is_independent, read, uncovered, write
 from validation.cases import CASES
 
 STARTUP = Path(__file__).with_name("startup")
@@ -49,20 +49,29 @@ class Traced:
         return sorted(names, key=lambda name: (self.items[name]["seconds"], name))
 
 
-def audit(folder: Path, progress: Callable[[int, int], None], wanted: list[str] | None = None) -> list[Line]:
+def audit(folder: Path, progress: Callable[[str, float], None], wanted: list[str] | None = None) -> list[Line]:
     """Lines of all shared functions, or of the wanted; those that ``folder`` holds already are not run again."""
     folder.mkdir(parents=True, exist_ok=True)
     traced = trace(folder)
     done = {line.function: line for line in read(folder / TABLE)}
     left = [name for name in wanted or shared_functions(traced.numbers) if name not in done]
+    total = len(done) + len(left)
     commit = str(provenance("")["commit"])
     with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
         for future in as_completed([pool.submit(line_of, name, traced, commit) for name in left]):
             line = future.result()
             done[line.function] = line
             write(done.values(), folder / TABLE)
-            progress(len(done), len(done) + len(left))
+            progress(line.function, len(done) / total)
     return list(done.values())
+
+
+def summary(lines: list[Line], folder: Path) -> list[str]:
+    """What the command prints: counts, then each function that nothing independent notices."""
+    text = [f"{len(lines)} functions, {sum(line.is_covered for line in lines)} noticed by something independent"]
+    for kind, names in uncovered(lines, [line.function for line in lines]).items():
+        text += [f"{kind}:", *(f"  {name}" for name in names)]
+    return [*text, f"table: {folder / TABLE}"]
 
 
 def judged_cases() -> list[str]:

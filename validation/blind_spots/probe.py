@@ -27,7 +27,7 @@ class Told:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.uncompiled = False
+        self.uncompiled, self.numbers = False, set[str]()
         self.order = json.loads(os.environ.get(planting.VARIABLE, "{}"))
 
     def begin(self, label: str) -> None:
@@ -39,7 +39,9 @@ class Told:
     def end(self, line: dict[str, Any]) -> None:
         """A case or test has ended."""
         if planting.recorder is not None:
-            line |= {"names": sorted(planting.recorder.names)}
+            new = planting.recorder.numbers - self.numbers
+            self.numbers |= new
+            line |= {"names": sorted(planting.recorder.names), "numbers": sorted(new)}
         line |= {"uncompiled": self.uncompiled}
         with self.out.open("a") as file:
             file.write(json.dumps(line) + "\n")
@@ -107,8 +109,6 @@ def main(job: dict[str, Any]) -> None:
         run_case(name, told)
     if job["tests"]:
         pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
-    if planting.recorder is not None:
-        told.end({"numbers": sorted(planting.recorder.numbers)})
 
 
 if __name__ == "__main__":

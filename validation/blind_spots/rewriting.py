@@ -1,16 +1,17 @@
 """The source of a module with one function spoiled: what it returns, yields or writes into its arguments.
 
-Numbers that it puts into an argument, or into a part of one, are spoiled as they are put there. An argument that only
-the functions which it calls write into is spoiled as a whole where it ends.
+Numbers that it puts into an argument, or into a part of one, are spoiled as they are put there. An array that functions
+which it calls write into is spoiled as a whole instead, where it ends.
 """
 
 import ast
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
-SPOILED, SCALED = "_spoiled_by_audit", "_scaled_by_audit"
+SPOILED, SCALED, PUT = "_spoiled_by_audit", "_scaled_by_audit", "_put_by_audit"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 VIEWS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "reshape", "ravel")
 """Functions that give a view of their first argument: those of ``models.machine.stack``, and numpy's."""
@@ -21,11 +22,17 @@ class NoSuchFunction(Exception):
 
 
 @cache
-def tree(module: str) -> ast.Module:
-    """The parsed source of a module of the project."""
+def text(module: str) -> str:
+    """The source of a module of the project."""
     path = ROOT.joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return ast.parse(file.read_text(encoding="utf-8"))
+    return file.read_text(encoding="utf-8")
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """The parsed source of a module of the project."""
+    return ast.parse(text(module))
 
 
 def function_of(parsed: ast.AST, name: str) -> Function:
@@ -112,11 +119,11 @@ def written(module: str, name: str) -> frozenset[str]:
         function = function_of(tree(module), name)
     except (NoSuchFunction, OSError):
         return frozenset()
-    known, found = roots(function), set[str]()
+    known, touched = roots(function), set[str]()
     for node in _inside(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            found |= {known_root for known_root in _handed(module, name, node, known) if known_root}
-    return frozenset(found)
+            touched |= {known_root for known_root in _handed(module, name, node, known) if known_root}
+    return frozenset(touched)
 
 
 def _handed(module: str, name: str, call: ast.Call, known: dict[str, str]) -> Iterator[str]:
@@ -156,13 +163,19 @@ class _Spoil(ast.NodeTransformer):
         return ast.Yield(_call(SPOILED, node.value)) if node.value else node
 
     def visit_Assign(self, node: ast.Assign) -> ast.Assign:
-        if _stores(node, self.known):
-            node.value = _call(SPOILED, node.value)
-        return node
+        return self._put(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AugAssign:
-        if _stores(node, self.known):
+        return self._put(node)
+
+    def _put(self, node: Any) -> Any:
+        """The assignment with what it puts into an argument spoiled, unless that is spoiled as a whole."""
+        into = sorted(_stores(node, self.known))
+        if into and not set(into) & set(self.last):
             node.value = _call(SPOILED, node.value)
+        elif into:
+            whole = next(name for name in into if name in self.last)
+            node.value = ast.Call(ast.Name(PUT, ast.Load()), [node.value, ast.Name(whole, ast.Load())], [])
         return node
 
 
@@ -180,17 +193,15 @@ def rewritten(source: str, module: str, name: str) -> ast.Module:
     parsed = ast.parse(source)
     function = function_of(parsed, name)
     known = roots(function)
-    direct = set[str]().union(*(_stores(node, known) for node in _inside(function)))
-    last = sorted(written(module, name) - direct)
+    last = sorted(written(module, name))
     spoil = _Spoil(known, last)
     body: list[ast.stmt] = []
     for statement in function.body:
         new = spoil.visit(statement)
         body += new if isinstance(new, list) else [new]
     function.body = body if isinstance(body[-1], ast.Return) else [*body, *endings(last)]
-    helper = ast.ImportFrom(
-        "validation.blind_spots.spoiling", [ast.alias("spoiled", SPOILED), ast.alias("scaled", SCALED)], 0
-    )
+    names = [ast.alias("spoiled", SPOILED), ast.alias("scaled", SCALED), ast.alias("put", PUT)]
+    helper = ast.ImportFrom("validation.blind_spots.spoiling", names, 0)
     docstring = isinstance(parsed.body[0], ast.Expr) and isinstance(parsed.body[0].value, ast.Constant)
     parsed.body.insert(1 if docstring else 0, ast.copy_location(helper, parsed.body[0]))
     return ast.fix_missing_locations(parsed)

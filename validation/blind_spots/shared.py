@@ -10,15 +10,19 @@ numbers, but for those in the folders of ``MACHINERY``; all other folders of ``m
 """
 
 import ast
+import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 
-from validation.blind_spots.rewriting import ROOT, Function, tree
+from validation.blind_spots.rewriting import ROOT, Function, text, tree
 
 ENGINES = ("exudyn", "mujoco")
 SYSTEMS = "models.systems."
 MACHINERY = ("advice", "core", "drawing", "ensemble", "machine")
 """Folders that hold no law of a vehicle: scene files, results, prices, workers, pictures."""
+IMPORT = re.compile(
+    r"^ *(?:import (\S.*)|from ((?:models|exudyn|mujoco)[.\w]*) import (?:\(([^)]*)\)|(.*)))", re.MULTILINE
+)
 COMPILING = ("njit", "compiled", "lean", "inlined", "register_jitable", "cfunc")
 """Decorators of functions that numba compiles."""
 
@@ -34,13 +38,10 @@ def modules() -> frozenset[str]:
 def imports(module: str) -> frozenset[str]:
     """Modules that one imports, anywhere in its text: those of ``models``, and engines."""
     names = set[str]()
-    for node in ast.walk(tree(module)):
-        if isinstance(node, ast.Import):
-            names |= {each.name for each in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names |= {node.module, *(f"{node.module}.{each.name}" for each in node.names)}
-    roots = {name.partition(".")[0] for name in names}
-    return frozenset(name for name in names if name in modules()) | (roots & set(ENGINES))
+    for whole, package, inside, line in IMPORT.findall(text(module)):
+        parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
+        names |= {whole.split()[0]} if whole else {package, *(f"{package}.{part}" for part in parts)}
+    return frozenset((names & modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
 
 
 def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
@@ -69,11 +70,11 @@ def definitions(module: str) -> Iterator[tuple[str, Function]]:
     """Qualified names and definitions of all functions of a module."""
 
     def inside(node: ast.AST, prefix: str) -> Iterator[tuple[str, Function]]:
-        for child in ast.iter_child_nodes(node):
+        for child in (*getattr(node, "body", ()), *getattr(node, "orelse", ())):
             if isinstance(child, Function):
                 yield prefix + child.name, child
                 yield from inside(child, f"{prefix}{child.name}.<locals>.")
-            else:
+            elif isinstance(child, ast.stmt):
                 yield from inside(child, f"{prefix}{child.name}." if isinstance(child, ast.ClassDef) else prefix)
 
     return inside(tree(module), "")
@@ -85,11 +86,11 @@ def is_compiled(function: Function) -> bool:
     return any(name in COMPILING for name in names)
 
 
+@cache
 def compiled_functions() -> list[str]:
     """``module:name`` of every compiled function of the shared modules."""
-    return [
-        f"{module}:{name}" for module in shared_modules() for name, each in definitions(module) if is_compiled(each)
-    ]
+    compiling = [module for module in shared_modules() if re.search(r"\bnumba\b|machine\.compiled", text(module))]
+    return [f"{module}:{name}" for module in compiling for name, each in definitions(module) if is_compiled(each)]
 
 
 def shared_functions(numbers: Iterable[str]) -> list[str]:

@@ -19,7 +19,7 @@ FACTOR = 1.01
 def spoiled(value: Any) -> Any:
     """A new value whose numbers are 1 % off; the value itself where it holds none."""
     if isinstance(value, float | complex | np.floating | np.complexfloating):
-        return type(value)(FACTOR * value)
+        return type(value)(FACTOR * value)  # type: ignore[arg-type]
     if isinstance(value, np.ndarray):
         return _array(value)
     if isinstance(value, tuple):
@@ -57,6 +57,11 @@ def scaled(values: Any) -> None:
         values[...] = _array(values)
 
 
+def put(value: Any, place: Any) -> Any:
+    """``spoiled``, but the value itself where it goes into an array, which is ``scaled`` at the end."""
+    return value if isinstance(place, np.ndarray) else spoiled(value)
+
+
 @overload(spoiled)
 def _spoiled(value):
     """``spoiled`` in compiled code; an array stays where the function may not make one (``lean``)."""
@@ -90,3 +95,11 @@ def _scaled(values):
             values[place] *= FACTOR
 
     return whole
+
+
+@overload(put)
+def _put(value, place):
+    """``put`` in compiled code."""
+    if isinstance(place, types.Array):
+        return lambda value, place: value
+    return lambda value, place: spoiled(value)

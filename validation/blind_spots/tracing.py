@@ -114,10 +114,11 @@ class Recorder:
 
 def _watch_compiled(recorder: Recorder) -> None:
     """Tell calls of compiled functions and addresses of callbacks; compiling itself is not profiled, which is slow."""
-    from numba.core.ccallback import CFunc
-    from numba.core.dispatcher import Dispatcher, _DispatcherBase
+    from numba.core import ccallback, dispatcher
 
-    call, make, address = _DispatcherBase.__call__, Dispatcher.compile, CFunc.address
+    Dispatcher: Any = dispatcher.Dispatcher
+    CFunc: Any = ccallback.CFunc
+    call, make, address = Dispatcher.__call__, Dispatcher.compile, CFunc.address
 
     def watched(self: Any, *arguments: Any, **options: Any) -> Any:
         recorder.compiled(self.py_func)
@@ -140,10 +141,10 @@ def _watch_compiled(recorder: Recorder) -> None:
 
     def as_ctypes(self: Any) -> Any:
         recorder.compiled(self._pyfunc)
-        if "_own_ctypes" not in self.__dict__:
-            self._own_ctypes = made.func(self)
-        return self._own_ctypes
+        if "_made_ctypes" not in self.__dict__:
+            self._made_ctypes = made.func(self)
+        return self._made_ctypes
 
     made = CFunc.__dict__["ctypes"]
-    Dispatcher.__call__, Dispatcher.compile = watched, quiet  # type: ignore[method-assign]
-    CFunc.address, CFunc.ctypes = property(told), property(as_ctypes)  # type: ignore[assignment, method-assign]
+    Dispatcher.__call__, Dispatcher.compile = watched, quiet
+    CFunc.address, CFunc.ctypes = property(told), property(as_ctypes)
