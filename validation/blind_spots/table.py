@@ -3,9 +3,12 @@
 Independent are rows whose other side does not share the function: an exact answer, a published figure, or force laws of
 its own (``validation.common.rows.Independence``); of tests, those that name such grounds by the mark ``grounds``.
 Rows of planted faults are none: they judge checks, not values.
+
+``python -m validation.blind_spots.table FOLDER`` keeps the table of an audit in the sources.
 """
 
 import csv
+import sys
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -86,3 +89,7 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
             some = line.noticed or line.ended != "whole"
             gaps["noticed by nothing independent" if some else "noticed by nothing"].append(name)
     return {kind: names for kind, names in gaps.items() if names}
+
+
+if __name__ == "__main__":
+    write(read(Path(sys.argv[1]) / KEPT.name), KEPT)
