@@ -19,7 +19,7 @@ from typing import Any
 from models.core.result import provenance
 from validation.blind_spots import planting
 from validation.blind_spots.probe import label_of
-from validation.blind_spots.rewriting import ROOT
+from validation.blind_spots.rewriting import ROOT, can_be_spoiled
 from validation.blind_spots.shared import shared_functions
 from validation.blind_spots.table import JOINED, Line, is_independent, read, uncovered, write
 from validation.cases import CASES
@@ -30,7 +30,8 @@ UNJUDGED = ("cost", "effects")
 """Systems whose cases judge effort and choices: what they see of a value, the others see before."""
 WORKERS = 2
 BUDGET = 40.0
-"""Seconds, as traced, of the cases and tests that are run for one function, the quickest first; the rest is told."""
+"""Seconds, as traced and without compiling, of the cases, and of the tests, that are run for one function, the quickest
+first; how many are left is told."""
 PATIENCE = 600.0
 """Seconds after which a spoiled process has lost its way, as a search that never ends."""
 Told = dict[str, Any]
@@ -146,8 +147,9 @@ def line_of(function: str, traced: Traced, commit: str) -> Line:
     callers = traced.callers(function)
     cases = within_budget([name for name in callers if name in CASES], traced)
     tests = within_budget([name for name in callers if name not in CASES], traced)
-    if not callers:
-        return Line(function, "whole", 0, 0, "", "", "", commit)
+    if not callers or not can_be_spoiled(*function.split(":")):
+        ended = "not spoiled" if callers else "whole"
+        return Line(function, ended, len(callers), len(callers), "", "", "", commit)
     with TemporaryDirectory() as place:
         out = Path(place) / "told.jsonl"
         ended = run({"spoil": function}, cases, tests, out, PATIENCE)

@@ -27,14 +27,19 @@ class Told:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.uncompiled, self.numbers = False, set[str]()
+        self.uncompiled, self.numbers, self.start = False, set[str](), 0.0
         self.order = json.loads(os.environ.get(planting.VARIABLE, "{}"))
 
     def begin(self, label: str) -> None:
         """A case or test begins."""
+        self.start = time.perf_counter() - self.compiling()
         if planting.recorder is not None:
             planting.recorder.reset()
             os.environ[planting.VARIABLE] = json.dumps(self.order | {"label": label})
+
+    def compiling(self) -> float:
+        """Seconds that numba took so far, where this process traces; they are not told again."""
+        return 0.0 if planting.recorder is None else float(planting.recorder.compiling)
 
     def end(self, line: dict[str, Any]) -> None:
         """A case or test has ended."""
@@ -42,6 +47,7 @@ class Told:
             new = planting.recorder.numbers - self.numbers
             self.numbers |= new
             line |= {"names": sorted(planting.recorder.names), "numbers": sorted(new)}
+        line |= {"seconds": time.perf_counter() - self.compiling() - self.start}
         line |= {"uncompiled": self.uncompiled}
         with self.out.open("a") as file:
             file.write(json.dumps(line) + "\n")
@@ -54,7 +60,6 @@ def run_case(name: str, told: Told) -> None:
     from validation.run import rested
 
     told.begin(label_of(name))
-    start = time.perf_counter()
     try:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -63,7 +68,7 @@ def run_case(name: str, told: Told) -> None:
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
         told.uncompiled |= is_of_numba(error)
-    told.end({"case": name, "rows": lines, "seconds": time.perf_counter() - start})
+    told.end({"case": name, "rows": lines})
 
 
 def is_of_numba(error: BaseException) -> bool:
@@ -75,11 +80,11 @@ class Watching:
     """Plug-in of pytest: tells how each test ended."""
 
     def __init__(self, told: Told) -> None:
-        self.told, self.failed, self.start = told, False, 0.0
+        self.told, self.failed = told, False
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         """A test begins."""
-        self.failed, self.start = False, time.perf_counter()
+        self.failed = False
         self.told.begin(label_of(nodeid))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -87,8 +92,7 @@ class Watching:
         self.failed |= report.failed
         if report.when == "teardown":
             marked = dict(report.user_properties).get("grounds", "")
-            seconds = time.perf_counter() - self.start
-            self.told.end({"test": report.nodeid, "failed": self.failed, "grounds": marked, "seconds": seconds})
+            self.told.end({"test": report.nodeid, "failed": self.failed, "grounds": marked})
 
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo) -> None:
         """Note that numba refused a function."""

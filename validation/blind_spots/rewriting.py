@@ -1,7 +1,8 @@
 """The source of a module with one function spoiled: what it returns, yields or writes into its arguments.
 
 Numbers that it puts into an argument, or into a part of one, are spoiled as they are put there. An array that functions
-which it calls write into is spoiled as a whole instead, where it ends.
+which it calls write into is spoiled as a whole instead, where it ends; behind a pointer, whose length nobody knows, the
+numbers are that those functions are given.
 """
 
 import ast
@@ -122,29 +123,28 @@ def written(module: str, name: str) -> frozenset[str]:
     known, touched = roots(function), set[str]()
     for node in _inside(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            touched |= {known_root for known_root in _handed(module, name, node, known) if known_root}
+            touched |= handed((module, name), node, known)
     return frozenset(touched)
 
 
-def _handed(module: str, name: str, call: ast.Call, known: dict[str, str]) -> Iterator[str]:
-    """Arguments of the caller that a call writes into."""
-    place = _imported(module, getattr(call.func, "id", ""))
-    if place is None or place == (module, name):
-        return
+def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
+    """Arguments of the caller (module, name) that a call hands to a function which writes into them."""
+    place = _imported(caller[0], getattr(call.func, "id", ""))
+    if place is None or place == caller:
+        return set()
     try:
         callee = function_of(tree(place[0]), place[1])
     except (NoSuchFunction, OSError):
-        return
+        return set()
     inner = roots(callee)
     touched = set().union(*(_stores(node, inner) for node in _inside(callee))) | written(*place)
-    for given, parameter in zip(call.args, parameters(callee), strict=False):
-        if parameter in touched:
-            yield root_of(given, known)
+    pairs = zip(call.args, parameters(callee), strict=False)
+    return {root_of(given, known) for given, parameter in pairs if parameter in touched} - {""}
 
 
 class _Spoil(ast.NodeTransformer):
-    def __init__(self, known: dict[str, str], last: list[str]) -> None:
-        self.known, self.last = known, last
+    def __init__(self, caller: tuple[str, str], known: dict[str, str], last: list[str]) -> None:
+        self.caller, self.known, self.last = caller, known, last
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         return node
@@ -162,6 +162,14 @@ class _Spoil(ast.NodeTransformer):
     def visit_Yield(self, node: ast.Yield) -> ast.Yield:
         return ast.Yield(_call(SPOILED, node.value)) if node.value else node
 
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr:
+        """What a call hands over to be written behind a pointer is spoiled before; an array is at the end."""
+        if isinstance(node.value, ast.Call):
+            for root in sorted(handed(self.caller, node.value, self.known))[:1]:
+                given = [each if root_of(each, self.known) else _put(each, root) for each in node.value.args]
+                node.value.args = given
+        return node
+
     def visit_Assign(self, node: ast.Assign) -> ast.Assign:
         return self._put(node)
 
@@ -175,12 +183,16 @@ class _Spoil(ast.NodeTransformer):
             node.value = _call(SPOILED, node.value)
         elif into:
             whole = next(name for name in into if name in self.last)
-            node.value = ast.Call(ast.Name(PUT, ast.Load()), [node.value, ast.Name(whole, ast.Load())], [])
+            node.value = _put(node.value, whole)
         return node
 
 
 def _call(name: str, value: ast.expr) -> ast.Call:
     return ast.Call(ast.Name(name, ast.Load()), [value], [])
+
+
+def _put(value: ast.expr, place: str) -> ast.Call:
+    return ast.Call(ast.Name(PUT, ast.Load()), [value, ast.Name(place, ast.Load())], [])
 
 
 def endings(names: list[str]) -> list[ast.stmt]:
@@ -194,7 +206,7 @@ def rewritten(source: str, module: str, name: str) -> ast.Module:
     function = function_of(parsed, name)
     known = roots(function)
     last = sorted(written(module, name))
-    spoil = _Spoil(known, last)
+    spoil = _Spoil((module, name), known, last)
     body: list[ast.stmt] = []
     for statement in function.body:
         new = spoil.visit(statement)
@@ -205,3 +217,12 @@ def rewritten(source: str, module: str, name: str) -> ast.Module:
     docstring = isinstance(parsed.body[0], ast.Expr) and isinstance(parsed.body[0].value, ast.Constant)
     parsed.body.insert(1 if docstring else 0, ast.copy_location(helper, parsed.body[0]))
     return ast.fix_missing_locations(parsed)
+
+
+def can_be_spoiled(module: str, name: str) -> bool:
+    """Whether rewriting finds anything that a function gives back or writes."""
+    function = function_of(rewritten(text(module), module, name), name)
+    named = {
+        node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    return bool(named & {SPOILED, SCALED, PUT})

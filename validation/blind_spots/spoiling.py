@@ -100,6 +100,6 @@ def _scaled(values):
 @overload(put)
 def _put(value, place):
     """``put`` in compiled code."""
-    if isinstance(place, types.Array):
+    if isinstance(place, types.Array) or not isinstance(value, types.Float | types.BaseTuple):
         return lambda value, place: value
     return lambda value, place: spoiled(value)

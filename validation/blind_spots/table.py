@@ -26,7 +26,7 @@ class Line:
     """What notices one function: ids of rows and tests, which of them are independent, and what was not run.
 
     ended : "whole", or why not: "crashed", "out of time", "not compiled" (numba refused the spoiled function, so that
-    what failed says nothing); calling : how many cases and tests call it; left : how many
+    what failed says nothing), "not spoiled" (rewriting sees nothing that it gives back or writes); calling : how many cases and tests call it; left : how many
     of these were not run, for want of time; commit : that the line belongs to.
     """
 
@@ -83,7 +83,7 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
     gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": [], "not audited": []}
     for name in functions:
         line = known.get(name)
-        if line is None:
+        if line is None or line.ended in ("not spoiled", "not compiled"):
             gaps["not audited"].append(name)
         elif not line.is_covered:
             some = line.noticed or line.ended != "whole"

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from time import perf_counter
 from types import CodeType, FrameType, FunctionType, ModuleType
 from typing import Any
 
@@ -72,10 +73,14 @@ def numeric(value: Any) -> bool:
 
 
 class Recorder:
-    """Names of the functions called after ``reset``; in ``numbers``, those that are compiled or gave numbers."""
+    """Names of the functions called after ``reset``; in ``numbers``, those that are compiled or gave numbers.
+
+    compiling : seconds that numba took so far.
+    """
 
     def __init__(self) -> None:
         self.names, self.numbers = set[str](), set[str]()
+        self.compiling = 0.0
         self._seen: dict[CodeType, str] = {}
         self._compiled: dict[CodeType, set[str]] = {}
 
@@ -128,11 +133,12 @@ def _watch_compiled(recorder: Recorder) -> None:
         return call(self, *arguments, **options)
 
     def quiet(self: Any, signature: Any) -> Any:
-        profiler = sys.getprofile()
+        profiler, start = sys.getprofile(), perf_counter()
         sys.setprofile(None)
         try:
             return make(self, signature)
         finally:
+            recorder.compiling += perf_counter() - start if profiler else 0.0  # not within another compilation
             sys.setprofile(profiler)
 
     def told(self: Any) -> Any:
