@@ -26,8 +26,8 @@ class Line:
     """What notices one function: ids of rows and tests, which of them are independent, and what was not run.
 
     ended : "whole", or why not: "crashed", "out of time", "not compiled" (numba refused the spoiled function, so that
-    what failed says nothing), "not spoiled" (rewriting sees nothing that it gives back or writes); calling : how many cases and tests call it; left : how many
-    of these were not run, for want of time; commit : that the line belongs to.
+    what failed says nothing), "not spoiled" (rewriting sees nothing that it gives back or writes); calling : how many
+    cases and tests call it; left : how many of these were not run, for want of time; commit : that the line belongs to.
     """
 
     function: str
