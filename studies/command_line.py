@@ -248,12 +248,17 @@ def validate(
     engine: Annotated[
         str | None, typer.Option(metavar="MODULE:CLASS", help="Judge an engine or integrator of your own instead.")
     ] = None,
+    blind_spots: Annotated[
+        bool, typer.Option("--blind-spots", help="Which rows and tests notice each shared function 1 % off (hours).")
+    ] = False,
     out: Out = None,
     resume: Resume = None,
 ) -> None:
     """Run the validation cases and write report.html, results.json and results.csv."""
     if engine is not None:
-        return _conformity(engine, quick or against is not None or resume is not None, out)
+        return _conformity(engine, quick or blind_spots or against is not None or resume is not None, out)
+    if blind_spots:
+        return _blind_spots(quick or against is not None, out, resume)
     from validation.common.changes import read
     from validation.run import KEPT
     from validation.run import validate as run_all
@@ -265,6 +270,21 @@ def validate(
     except KeyboardInterrupt:
         _end(f"interrupted; finished cases are kept: twinrig validate --resume {folder}", 130)
     sys.exit(1 if failed else 0)
+
+
+def _blind_spots(more: bool, out: Path | None, resume: Path | None) -> None:
+    """Audit all shared functions; raises InputError for options that go with a report."""
+    if more:
+        raise InputError("--blind-spots", "", True, "goes without --quick and --against")
+    from validation.blind_spots.audit import CHILDREN, audit, summary
+
+    folder = _folder("blind-spots", CHILDREN, "", out, resume)
+    try:
+        with _progress(False) as progress:
+            lines = audit(folder, progress)
+    except KeyboardInterrupt:
+        _end(f"interrupted; finished functions are kept: twinrig validate --blind-spots --resume {folder}", 130)
+    print("\n".join(summary(lines, folder)))
 
 
 def _finish(

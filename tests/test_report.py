@@ -326,3 +326,24 @@ def test_rows_that_an_older_report_called_passed_without_judging_them_are_report
     (folder / "old.json").write_text(json.dumps(found))
     assert changes(read_earlier(folder / "old.json")["rows"], {row.id: row.as_dict() for row in rows()}) == []
     assert report.read(folder / "old.json")["rows"] == [row.as_dict() for row in rows()]
+
+
+def test_what_nothing_independent_notices_stands_under_what_is_not_covered_by_name(folder, tmp_path, monkeypatch):
+    from functools import partial
+
+    from validation.blind_spots.table import Line, write
+    from validation.report.blind_spots import blind_spots
+
+    seen = Line("models.tyre.bristles:_mix", "whole", 3, 0, "handling.a", "", "handling.a", "abc1234")
+    unseen = Line(
+        "models.tyre.bristles:tyre_forces", "whole", 3, 1, "handling.b", "tests/test_a.py::test_b", "", "abc1234"
+    )
+    write([seen, unseen], tmp_path / "table.csv")
+    monkeypatch.setattr(report, "blind_spots", partial(blind_spots, tmp_path / "table.csv"))
+    page = report.write(folder).read_text(encoding="utf-8")
+    gaps = page[page.index('id="gaps"') : page.index('id="system-')]
+    independent, unaudited = gaps.split("noticed by nothing independent")[1].split("not audited")
+    assert "models.tyre.bristles:tyre_forces" in independent and "models.tyre.bristles:_mix" not in gaps
+    assert "models.tyre.bristles:_creepages" in unaudited
+    section = page[page.index('<section id="blind-spots">') : page.index('<section id="assumptions">')]
+    assert "commit abc1234" in section and "test_a.py::test_b" in section and "2 of 3" in section

@@ -18,6 +18,7 @@ from typing import Any, get_args
 from models.core.errors import InputError
 from models.core.whole_files import write_whole
 from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
+from validation.report.blind_spots import blind_spots
 from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
 from validation.report.shares import case_of, shares
 from validation.report.shown import shown
@@ -203,6 +204,7 @@ def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -
         shares=shares(results),
         independence=independence(results, drawn),
         allowances=allowances(results["rows"]),
+        blind=blind_spots(),
         conventions=conventions(),
         parameters=parameter_tables(),
         provenance=results["provenance"],

@@ -1,0 +1,101 @@
+"""The functions that more than one side of a comparison shares, by rule from the imports.
+
+An engine's side is every module that imports the engine, and all that these import. ``systems`` are the third side:
+they run every engine and read what it gives. A module belongs to one engine alone where it imports that engine, or
+where only that engine's side imports it. Every other module is shared: both engines call it, or it works on the runs of
+both, or it is found by listing a folder, where no import names it.
+
+Of a shared module every compiled function counts, by its decorator. So does every Python function that was seen to give
+numbers, but for those in the folders of ``MACHINERY``; all other folders of ``models`` count, new ones too.
+"""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache
+
+from validation.blind_spots.rewriting import ROOT, Function, text, tree
+
+ENGINES = ("exudyn", "mujoco")
+SYSTEMS = "models.systems."
+MACHINERY = ("advice", "core", "drawing", "ensemble", "machine")
+"""Folders that hold no law of a vehicle: scene files, results, prices, workers, pictures."""
+IMPORT = re.compile(
+    r"^ *(?:import (\S.*)|from ((?:models|exudyn|mujoco)[.\w]*) import (?:\(([^)]*)\)|(.*)))", re.MULTILINE
+)
+COMPILING = ("njit", "compiled", "lean", "inlined", "register_jitable", "cfunc")
+"""Decorators of functions that numba compiles."""
+
+
+@cache
+def modules() -> frozenset[str]:
+    """All modules of ``models``, by name."""
+    paths = (path.relative_to(ROOT).with_suffix("") for path in sorted((ROOT / "models").rglob("*.py")))
+    return frozenset(".".join(path.parts).removesuffix(".__init__") for path in paths)
+
+
+@cache
+def imports(module: str) -> frozenset[str]:
+    """Modules that one imports, anywhere in its text: those of ``models``, and engines."""
+    names = set[str]()
+    for whole, package, inside, line in IMPORT.findall(text(module)):
+        parts = (part.split()[0] for part in (inside or line).split(",") if part.strip())
+        names |= {whole.split()[0]} if whole else {package, *(f"{package}.{part}" for part in parts)}
+    return frozenset((names & modules()) | ({name.partition(".")[0] for name in names} & set(ENGINES)))
+
+
+def side(begin: Iterable[str], without: frozenset[str] = frozenset()) -> set[str]:
+    """Modules and all that they import, not going through some."""
+    reached, left = set[str](), [name for name in begin if name not in without]
+    while left:
+        name = left.pop()
+        if name not in reached:
+            reached.add(name)
+            left += [each for each in imports(name) if each not in ENGINES and each not in without]
+    return reached
+
+
+@cache
+def shared_modules() -> tuple[str, ...]:
+    """Modules that more than one side shares, sorted."""
+    of = [{name for name in modules() if engine in imports(name)} for engine in ENGINES]
+    engines = frozenset[str]().union(*of)
+    first, second = (side(names) for names in of)
+    systems = side((name for name in modules() if name.startswith(SYSTEMS)), engines)
+    alone = (first ^ second) - systems
+    return tuple(sorted(modules() - engines - alone - {"models"}))
+
+
+def definitions(module: str) -> Iterator[tuple[str, Function]]:
+    """Qualified names and definitions of all functions of a module."""
+
+    def inside(node: ast.AST, prefix: str) -> Iterator[tuple[str, Function]]:
+        for child in (*getattr(node, "body", ()), *getattr(node, "orelse", ())):
+            if isinstance(child, Function):
+                yield prefix + child.name, child
+                yield from inside(child, f"{prefix}{child.name}.<locals>.")
+            elif isinstance(child, ast.stmt):
+                yield from inside(child, f"{prefix}{child.name}." if isinstance(child, ast.ClassDef) else prefix)
+
+    return inside(tree(module), "")
+
+
+def is_compiled(function: Function) -> bool:
+    """Whether a decorator says that numba compiles it."""
+    names = (ast.unparse(each).partition("(")[0].rpartition(".")[2] for each in function.decorator_list)
+    return any(name in COMPILING for name in names)
+
+
+@cache
+def compiled_functions() -> list[str]:
+    """``module:name`` of every compiled function of the shared modules."""
+    compiling = [module for module in shared_modules() if re.search(r"\bnumba\b|machine\.compiled", text(module))]
+    return [f"{module}:{name}" for module in compiling for name, each in definitions(module) if is_compiled(each)]
+
+
+def shared_functions(numbers: Iterable[str]) -> list[str]:
+    """``module:name`` of all shared functions, compiled ones first; numbers : those that were seen to give numbers."""
+    compiled, known = compiled_functions(), set(numbers)
+    laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY]
+    others = (f"{module}:{name}" for module in laws for name, _ in definitions(module))
+    return list(dict.fromkeys((*compiled, *(name for name in others if name in known))))

@@ -1,0 +1,95 @@
+"""The kept table of the audit: for each shared function, which rows and tests notice that it is 1 % off.
+
+Independent are rows whose other side does not share the function: an exact answer, a published figure, or force laws of
+its own (``validation.common.rows.Independence``); of tests, those that name such grounds by the mark ``grounds``.
+Rows of planted faults are none: they judge checks, not values.
+
+``python -m validation.blind_spots.table FOLDER`` keeps the table of an audit in the sources.
+"""
+
+import csv
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from models.core.whole_files import whole_file
+
+KEPT = Path(__file__).with_name("blind_spots.csv")
+INDEPENDENT = ("closed form", "published", "native", "written equations", "plain counterpart")
+CHECKS_OF_CHECKS = "planted."
+JOINED = "; "
+
+
+@dataclass(frozen=True)
+class Line:
+    """What notices one function: ids of rows and tests, which of them are independent, and what was not run.
+
+    ended : "whole", or why not: "crashed", "out of time", "not compiled" (numba refused the spoiled function, so that
+    what failed says nothing), "not spoiled" (rewriting sees nothing that it gives back or writes); calling : how many
+    cases and tests call it; left : how many of these were not run, for want of time; commit : that the line belongs to.
+    """
+
+    function: str
+    ended: str
+    calling: int
+    left: int
+    rows: str
+    tests: str
+    independent: str
+    commit: str
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether something independent notices."""
+        return bool(self.independent) and self.ended != "not compiled"
+
+    @property
+    def noticed(self) -> int:
+        """How many rows and tests notice."""
+        return sum(len(text.split(JOINED)) for text in (self.rows, self.tests) if text)
+
+
+def read(path: Path = KEPT) -> list[Line]:
+    """The lines of a table; none where there is no file."""
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Line(**{**each, "calling": int(each["calling"]), "left": int(each["left"])})  # type: ignore[arg-type]
+            for each in csv.DictReader(file)
+        ]
+
+
+def write(lines: Iterable[Line], path: Path) -> None:
+    """Keep a table, functions in the order of their names."""
+    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Line)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(line) for line in sorted(lines, key=lambda line: line.function))
+
+
+def is_independent(id: str, grounds: str) -> bool:
+    """Whether a row or test with this id on these grounds counts as independent."""
+    return grounds in INDEPENDENT and not id.startswith(CHECKS_OF_CHECKS)
+
+
+def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list[str]]:
+    """Functions that nothing independent notices, by what there is instead.
+
+    functions : all that are shared now; those that have no line are "not audited".
+    """
+    known = {line.function: line for line in lines}
+    gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": [], "not audited": []}
+    for name in functions:
+        line = known.get(name)
+        if line is None or line.ended in ("not spoiled", "not compiled"):
+            gaps["not audited"].append(name)
+        elif not line.is_covered:
+            some = line.noticed or line.ended != "whole"
+            gaps["noticed by nothing independent" if some else "noticed by nothing"].append(name)
+    return {kind: names for kind, names in gaps.items() if names}
+
+
+if __name__ == "__main__":
+    write(read(Path(sys.argv[1]) / KEPT.name), KEPT)

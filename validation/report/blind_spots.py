@@ -1,0 +1,52 @@
+"""What the report tells of the kept blind-spot audit: what notices each shared function, and what none notices."""
+
+from collections import Counter
+from pathlib import Path
+
+from validation.blind_spots.shared import compiled_functions
+from validation.blind_spots.table import JOINED, KEPT, Line, read, uncovered
+from validation.common.rows import Saved
+
+SHOWN = 3
+"""Ids of rows and of tests that a line names; of the others it tells how many they are."""
+
+
+def blind_spots(path: Path = KEPT) -> Saved:
+    """Lines of the kept table, counts by module, commits, and functions that are not covered, by what there is instead.
+
+    A compiled function that the sources share now and that has no line is not covered: it was not audited.
+    """
+    lines = read(path)
+    names = dict.fromkeys((*(line.function for line in lines), *compiled_functions()))
+    return {
+        "lines": [_told(line) for line in lines],
+        "modules": _modules(lines),
+        "commits": [commit for commit, _ in Counter(line.commit for line in lines).most_common()],
+        "uncovered": uncovered(lines, names),
+    }
+
+
+def _told(line: Line) -> Saved:
+    rows, tests = (text.split(JOINED) if text else [] for text in (line.rows, line.tests))
+    return {
+        "function": line.function.replace(".<locals>", ""),
+        "independent": line.is_covered,
+        "rows": rows[:SHOWN],
+        "more_rows": len(rows[SHOWN:]),
+        "tests": [test.rpartition("/")[2] for test in tests[:SHOWN]],
+        "more_tests": len(tests[SHOWN:]),
+        "ended": line.ended,
+        "calling": line.calling,
+        "left": line.left,
+    }
+
+
+def _modules(lines: list[Line]) -> list[tuple[str, int, int, int]]:
+    """Of each module: functions, those that something independent notices, those that anything does."""
+    of: dict[str, list[Line]] = {}
+    for line in lines:
+        of.setdefault(line.function.partition(":")[0], []).append(line)
+    return [
+        (module, len(same), sum(line.is_covered for line in same), sum(line.noticed > 0 for line in same))
+        for module, same in sorted(of.items())
+    ]
