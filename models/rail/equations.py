@@ -56,6 +56,8 @@ LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
 DEEPEST = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
+UNREPORTED = np.empty(0, REPORT)
+"""Contacts of which nobody asks; to make those that are asked for takes longer than the rates."""
 
 
 Along = tuple[float, float, float]
@@ -255,7 +257,7 @@ class Equations:
     def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
         out = np.empty(STATES)
-        rates(np.asarray(state, float), *self.parameters, out, self.blank())
+        rates(np.asarray(state, float), *self.parameters, out, UNREPORTED)
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:
