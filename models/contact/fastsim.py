@@ -144,12 +144,11 @@ class Ellipse:
         check_choices(cells, bound, flexibilities, march)
         self.ratio = number("ratio", ratio, "a ratio a/b of semi-axes from 1e-6 to 1e6", 1e-6, 1e6)
         self.net: Grid = grid(cells, int(strips_of(np.array(self.ratio), cells)), bound)
-        unit, size = np.zeros(1, CONTACT), 1e-3
-        unit["a"], unit["b"] = 1.0, 1.0 / self.ratio
-        for name, value in zip(FLEXIBILITIES, linear_flexibilities(size, size / self.ratio, pair), strict=True):
-            unit[name] = float(value) / size
-        net = self.net
-        self._fixed = unit, net.strips, net.cells, net.middle, KINDS[flexibilities], MARCHES[march]
+        size = 1e-3
+        flexible = linear_flexibilities(size, size / self.ratio, pair)
+        unit = (1.0 / self.ratio, *(float(value) / size for value in flexible))
+        choices = self.net.middle, KINDS[flexibilities], MARCHES[march]
+        self._fixed = unit, self.net.strips, self.net.cells, choices
 
     def __call__(
         self, a: float, load: float, mu: float, xi_x: float, xi_y: float, spin: float

@@ -214,20 +214,21 @@ def strip_tractions(slip, cells, march, left, answers):
 
 
 @compiled
-def point(given, unit, strips, cells, peak, kind, march):
+def point(given, unit, strips, cells, choices):
     """fx, fy, mz of one ellipse of the shape of ``unit``, NaN for bad input.
 
-    given : a (m), load, mu, xi_x, xi_y, spin; unit : CONTACT (1,) of the axes and flexibilities of a = 1 m; strips,
-    cells, peak : a net's tables, as Python hands plain arrays over in a fraction of a record's time.
+    given : a (m), load, mu, xi_x, xi_y, spin; unit : b, l1, l2, l3 at a = 1 m; strips, cells : a net's tables;
+    choices : the net's peak, kind of flexibility, march. Python hands plain arrays and numbers over in a fraction of
+    the time of records.
     """
-    a, load, mu, xi_x, xi_y, spin = given
+    (a, load, mu, xi_x, xi_y, spin), (peak, kind, march) = given, choices
     if not (mu >= 0.0 and (a > 0.0 or load <= 0.0)):
         return math.nan, math.nan, math.nan
     contacts, answers = np.empty(1, CONTACT), np.empty(1, FORCES)
     contact, answer = contacts[0], answers[0]
-    contact.a, contact.b, contact.load, contact.mu = a, a * unit[0].b, load, mu
+    contact.a, contact.b, contact.load, contact.mu = a, a * unit[0], load, mu
     contact.xi_x, contact.xi_y, contact.spin = xi_x, xi_y, spin
-    contact.l1, contact.l2, contact.l3 = a * unit[0].l1, a * unit[0].l2, a * unit[0].l3
+    contact.l1, contact.l2, contact.l3 = a * unit[1], a * unit[2], a * unit[3]
     forces(contacts, strips_in(strips), cells_in(cells, peak), kind, march, answers)
     bad = 0.0 * (load + mu + xi_x + xi_y + spin)  # zero, or NaN where one of them is not finite
     return answer.fx + bad, answer.fy + bad, answer.mz + bad

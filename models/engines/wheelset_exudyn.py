@@ -68,7 +68,7 @@ class ExudynWheelset(EngineWheelset):
         """System and the sensors of positions and of rates."""
         mbs = exu.SystemContainer().AddSystem()
         node = add_node(mbs, JOINTS)
-        suspension(mbs, tree(mbs, node, table(*self.parameters), self.body), self.body)
+        suspension(mbs, tree(mbs, node, table(float(self.speed), self.rails), self.body), self.body)
         kinds = exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t
         sensors = [
             mbs.AddSensor(

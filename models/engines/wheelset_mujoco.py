@@ -59,7 +59,7 @@ class MujocoWheelset(EngineWheelset):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The model; without ``rail_law`` installed, it has no rails."""
-        return model(table(*self.parameters), self.body)
+        return model(table(float(self.speed), self.rails), self.body)
 
     @cached_property
     def _data(self) -> mujoco.MjData:

@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, root
@@ -31,7 +31,18 @@ from models.core.steps import divides
 from models.core.trajectory import Trajectory
 from models.machine.compiled import inlined, lean, njit
 from models.rail.profile_contact import Pose
-from models.rail.wheel_forces import LAWS, REPORT, Rails, carries, patches, rails_of, room_for, wheel_forces
+from models.rail.wheel_forces import (
+    LAWS,
+    REPORT,
+    Rails,
+    carries,
+    patches,
+    plain,
+    rails_in,
+    rails_of,
+    room_for,
+    wheel_forces,
+)
 from models.rail.wheelset import GRAVITY, Wheelset
 
 STATES = 10
@@ -46,6 +57,8 @@ LIMIT = 0.3
 """Yaw and roll (rad) and displacement (m) beyond which a path is no wheelset's on a track."""
 DEEPEST = 5e-3
 """Height (m) above which the rails carry every load that is allowed."""
+UNREPORTED = np.empty(0, REPORT)
+"""Contacts of which nobody asks; to make those that are asked for takes longer than the rates."""
 
 
 Along = tuple[float, float, float]
@@ -80,8 +93,12 @@ class Stages(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def rates(state, speed, body, rails, out, report):
-    """Fill ``out`` with the rates of a state (10,), and ``report``, REPORT (patches,), with the contacts."""
-    set_rates(state, speed, body, rails, out, report, room_for(rails.profile))
+    """Fill ``out`` with the rates of a state (10,), and ``report``, REPORT (patches,), with the contacts.
+
+    speed, body, rails : ``parameters`` of ``Equations``.
+    """
+    made = rails_in(rails)
+    set_rates(state, speed, Body(*body), made, out, report, room_for(made.profile))
 
 
 @inlined
@@ -144,7 +161,9 @@ def march(state, parameters, steps, path, reports):
     reports.
     """
     stages = Stages(np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(0, REPORT))
-    return _march(state, parameters, steps, path, reports, room_for(parameters[2].profile), stages)
+    speed, body, rails = parameters
+    made = rails_in(rails)
+    return _march(state, (speed, Body(*body), made), steps, path, reports, room_for(made.profile), stages)
 
 
 @lean
@@ -218,18 +237,26 @@ class Equations:
         return Body(*inertia, w.half_spacing, stiffness, damping, carried, sunk, float(self.lean), held)
 
     @cached_property
-    def parameters(self) -> tuple[float, Body, Rails]:
-        """What the compiled functions take after the state: speed, body and rails."""
-        return float(self.speed), self.body, rails_of(self.wheelset, self.law, self.cells)
+    def rails(self) -> Rails:
+        """What the wheels roll on."""
+        return rails_of(self.wheelset, self.law, self.cells)
+
+    @cached_property
+    def parameters(self) -> tuple[float, tuple[Any, ...], tuple[Any, ...]]:
+        """What the compiled functions take after the state: speed, body and rails.
+
+        The last two as plain tuples: numba asks Python for the type of a NamedTuple, in three times a call's own time.
+        """
+        return float(self.speed), tuple(self.body), plain(self.rails)
 
     def blank(self, *shape: int) -> Array:
         """Contacts, REPORT (*shape, patches), that are not known yet."""
-        return np.full((*shape, patches(self.parameters[2].profile)), np.nan, REPORT)
+        return np.full((*shape, patches(self.rails.profile)), np.nan, REPORT)
 
     def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
         out = np.empty(STATES)
-        rates(np.asarray(state, float), *self.parameters, out, self.blank())
+        rates(np.asarray(state, float), *self.parameters, out, UNREPORTED)
         return out
 
     def at(self, states: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from models.contact.inputs import Array
 from models.machine.compiled import inlined, njit
 from models.machine.records import record, records, size_of
 from models.machine.stack import array, at, beyond
-from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Body, Y, Z
+from models.rail.equations import ANGLE, LIMIT, ROLL, ROLL_RATE, SPIN, STATES, Y_RATE, YAW, YAW_RATE, Z_RATE, Y, Z
 from models.rail.profile_contact import KNOT, NODE, PROFILE, LaidProfile, Pose
 from models.rail.wheel_forces import REPORT, WHEELS, Rails, room_for, wheel_forces
 
@@ -29,8 +29,8 @@ PER_STRIP, PER_CELL = 4, 5
 _POSITIONS, _RATES = [Y, Z, YAW, ROLL, ANGLE], [Y_RATE, Z_RATE, YAW_RATE, ROLL_RATE, SPIN]
 
 
-def table(speed: float, body: Body, rails: Rails) -> Array:
-    """What the compiled functions read, from ``Equations.parameters``."""
+def table(speed: float, rails: Rails) -> Array:
+    """What the compiled functions read."""
     strips, cells, (profile, nodes, knots) = rails.strips, rails.cells, rails.profile
     head = [speed, rails.law, rails.middle, nodes.size, knots.size, strips.shape[1], cells.shape[1]]
     parts = (rails.wheels, profile, nodes, knots)

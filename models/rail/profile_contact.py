@@ -88,13 +88,13 @@ def profile_on_rail(side, pose, profile, modulus, touches):
     seen = _seen(side * y, z + head.level, side * roll, side * yaw)  # the left wheel is the right one in a mirror
     knot, before = 0, -1.0
     for j in range(0, int(head.nodes), COARSE):
-        node = _node(j, seen, profile, knot)
+        node = _node(profile.nodes[j], seen, head, profile.knots, knot)
         knot = node[-1]
         if max(before, node[0]) > -MARGIN:
             for i in range(max(0, j - COARSE), j):
-                fine = _node(i, seen, profile, knot)
+                fine = _node(profile.nodes[i], seen, head, profile.knots, knot)
                 if fine[0] > 0.0:
-                    _add(i, fine, profile, sums)
+                    _add(profile.nodes[i], fine, i * head.spacing, sums)
         before = node[0]
     together = 0
     for zone in range(len(sums)):
@@ -114,10 +114,9 @@ def _seen(y, z, roll, yaw):
 
 
 @lean
-def _node(j, seen, profile, knot):
+def _node(node, seen, head, knots, knot):
     """Depth of a node's circle along the rail's normal (m), place x, y, z from the centre, slope of the rail, knot."""
     y, z, cr, sr, cy, sy, lead, level, steer = seen
-    head, node, knots = profile.head[0], profile.nodes[j], profile.knots
     sine = min(1.0, max(-1.0, -node.slope * steer))
     cosine = math.sqrt(1.0 - sine * sine)
     ahead = node.radius * (sine - cosine * lead) * level
@@ -142,10 +141,11 @@ def _node(j, seen, profile, knot):
 
 
 @lean
-def _add(j, at, profile, sums):
-    """Add a node in contact to the sums of its zone, or of the two that pass into each other there."""
+def _add(node, at, length, sums):
+    """Add a node in contact, at a length (m) along the contour, to the sums of its zone, or of the two that pass into
+    each other there."""
     depth, place_x, place_y, place_z, slope, _ = at
-    node, length, upright = profile.nodes[j], j * profile.head[0].spacing, 1.0 / math.sqrt(1.0 + slope * slope)
+    upright = 1.0 / math.sqrt(1.0 + slope * slope)
     zone = int(node.zone)
     share = node.zone - zone
     for part in range(2):

@@ -18,7 +18,7 @@ Flange
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,6 +151,18 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
     net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
     own = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
     return Rails(wheels, own, net.strips, net.cells, net.middle, LAWS[law])
+
+
+def plain(rails: Rails) -> tuple[Any, ...]:
+    """``Rails`` as plain tuples, for functions that Python calls."""
+    return tuple(tuple(part) if isinstance(part, LaidProfile) else part for part in rails)
+
+
+@inlined
+def rails_in(parts):
+    """``Rails`` of plain tuples."""
+    wheels, (head, nodes, knots), strips, cells, middle, law = parts
+    return Rails(wheels, LaidProfile(head, nodes, knots), strips, cells, middle, law)
 
 
 @lean

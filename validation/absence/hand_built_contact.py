@@ -26,20 +26,19 @@ CALLS = 200
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def forces(contact, creep, flexible, halves, shares, bound):
-    """fx, fy (N) of a contact of two equal semi-axes.
+def forces(axis, limit, along, across, halves, shares, bound):
+    """fx, fy (N) of a contact of two equal semi-axes (m).
 
-    contact : semi-axis (m), load (N), coefficient of friction; creep, flexible : creepages and flexibilities (m^3/N)
-    along and across; halves, shares (n,) : half length of a strip by the axis, share of the load; bound (cells,) :
-    traction that a cell may bear by that in the strip's middle
+    limit : friction by load (N); along, across : creepages by their flexibilities (N/m^3); halves, shares (n,) : half
+    length of a strip by the axis, share of the load; bound (cells,) : traction that a cell may bear by that in the
+    strip's middle
     """
-    axis, load, friction = contact
     cells, count, fx, fy = bound.size, halves.size, 0.0, 0.0
     for k in range(count):
         half, share = halves[k], shares[k]
-        middle = friction * load * share / half * cells * count / (4.0 * axis * axis)
+        middle = limit * share / half * cells * count / (4.0 * axis * axis)
         step = 2.0 * axis * half / cells / middle
-        u, v, x, y, sum_x, sum_y = step * creep[0] / flexible[0], step * creep[1] / flexible[1], 0.0, 0.0, 0.0, 0.0
+        u, v, x, y, sum_x, sum_y = step * along, step * across, 0.0, 0.0, 0.0, 0.0
         for i in range(cells):
             x, y = x - u, y - v
             size = math.sqrt(x * x + y * y)
@@ -47,7 +46,7 @@ def forces(contact, creep, flexible, halves, shares, bound):
                 x, y = x * bound[i] / size, y * bound[i] / size
             sum_x, sum_y = sum_x + x, sum_y + y
         fx, fy = fx + share * sum_x, fy + share * sum_y
-    return friction * load * fx, friction * load * fy
+    return limit * fx, limit * fy
 
 
 def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
@@ -55,8 +54,8 @@ def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
     pair = Pair()
     product = Ellipse(1.0, pair, cells=CELLS, march="plain", flexibilities="three")
     flexible = tuple(float(value) for value in flexibilities(AXIS, AXIS, pair))[:2]
-    contact = AXIS, LOAD, FRICTION
     strips, cells = grid(CELLS, product.net.strips.shape[1], "intermediate").records
+    halves, shares, bound = strips.half, strips.part, cells.bound
 
     def ours() -> Array:
         for _ in range(CALLS):
@@ -65,7 +64,8 @@ def calls() -> tuple[Callable[[], Array], Callable[[], Array]]:
 
     def theirs() -> Array:
         for _ in range(CALLS):
-            written = forces(contact, CREEP, flexible, strips.half, strips.part, cells.bound)
+            along, across = CREEP[0] / flexible[0], CREEP[1] / flexible[1]
+            written = forces(AXIS, FRICTION * LOAD, along, across, halves, shares, bound)
         return np.array(written)
 
     return ours, theirs

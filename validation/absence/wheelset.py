@@ -38,7 +38,7 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
     from models.systems.wheelset.run import run
 
     equations = equations_of(scene, engine, SPEED)
-    _, body, rails = equations.parameters
+    body, rails = equations.body, equations.rails
     wheels, profiles = rails.wheels[0], rails.profile.nodes.size > 0  # profiles have flanges of their own
     counts = {
         "springs": sum(stiffness > 0.0 for stiffness in body.stiffness),
@@ -57,10 +57,10 @@ def seen(scene: WheelsetScene, engine: str) -> tuple[dict[str, int], bytes]:
 def without_net(law: Any) -> str:
     """What the rates become where FASTSIM's net holds no numbers: the same to the last bit, or no numbers."""
     equations = Equations(CHOSEN, SPEED, law, 11)
-    state, (speed, body, rails) = equations.displaced(SHIFT), equations.parameters
+    state, (speed, body, _), rails = equations.displaced(SHIFT), equations.parameters, equations.rails
     rails = rails._replace(strips=np.full_like(rails.strips, np.nan), cells=np.full_like(rails.cells, np.nan))
     rates = np.empty(eq.STATES)
-    eq.rates(state, speed, body, rails, rates, equations.blank())
+    eq.rates(state, speed, body, forces.plain(rails), rates, equations.blank())
     return "the same" if rates.tobytes() == equations.rates(state).tobytes() else "no numbers"
 
 

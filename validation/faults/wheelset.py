@@ -126,7 +126,7 @@ def written(**functions: Any) -> Patch:
         def context() -> Iterator[None]:
             each = with_globals(wf.patch_by_patch.py_func, **functions)
             faulty = with_globals(wf.wheel_forces.py_func, LINEAR=None, patch_by_patch=each)
-            plain = {name: getattr(eq, name).py_func for name in ("rates", "set_rates", "room_for")}
+            plain = {name: getattr(eq, name).py_func for name in ("rates", "set_rates", "room_for", "rails_in")}
             with mock.patch.multiple(eq, wheel_forces=faulty, **plain):
                 yield
 
@@ -141,7 +141,7 @@ def after(change: Callable[..., None]) -> Patch:
     def with_change(real: Any) -> Any:
         def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
             real(state, speed, body, *rest)
-            change(state, body, rest[-2])
+            change(state, eq.Body(*body), rest[-2])
 
         return rates
 
@@ -211,8 +211,9 @@ def _one_gyroscope(state: Any, body: Any, rates: Any) -> None:
 
 def _damped_twice(real: Any) -> Any:
     def rates(state: Any, speed: Any, body: Any, *rest: Any) -> None:
-        doubled = tuple(2.0 * damping for damping in body.damping)
-        real(state, speed, body._replace(damping=doubled), *rest)
+        given = eq.Body(*body)
+        x, y, z = given.damping
+        real(state, speed, tuple(given._replace(damping=(2.0 * x, 2.0 * y, 2.0 * z))), *rest)
 
     return rates
 
