@@ -15,7 +15,7 @@ from models.multibody import forces as at
 from models.multibody.plain.road import driven, surface
 from models.multibody.plain.rolling import Ledger, TyreReport
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import run
+from models.systems.handling.run import build, run
 from studies.command.asked import SCENES, engines_of
 from validation.cases import written_equations
 from validation.faults.campaign import seen
@@ -117,14 +117,8 @@ def test_curves_of_the_description_press():
     without = car.changed(given=replace(curved(), springs=rolling_cars()["r19_free"].given.springs))
     q, v = car.straight(10.0)
     v[5:] += 0.3
-    ours, others = (Plain(PLAIN, written_equations_of(each)).acceleration(0.0, q, v) for each in (car, without))
+    ours, others = (build("reference", each).acceleration(0.0, q, v) for each in (car, without))
     assert np.abs(ours - others).max() > 0.1
-
-
-def written_equations_of(car):
-    from models.multibody.plain.rolling import PlainRolling
-
-    return PlainRolling(car).acceleration
 
 
 def test_a_cut_car_rests_on_its_static_loads():
