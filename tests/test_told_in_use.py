@@ -24,10 +24,9 @@ from studies.command.sweep_figure import BROKEN, WARNING, Swept, draw
 from studies.command_line import app
 from validation.cases import stated_errors
 from validation.common.grounds import allowing
-from validation.common.rows import Observed, not_run
+from validation.common.rows import Observed, not_run, rested
 from validation.price.problems import road_excited
 from validation.report.page import allowances
-from validation.run import rested
 from validation.stated_errors.sample import Sample
 
 ROAD = {"road": {"source": "study", "speed": 20.0}}

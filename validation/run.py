@@ -29,9 +29,8 @@ from models.ensemble.runner import Blocks, run_paths
 from models.ensemble.store import Arrays, code, locked
 from models.ensemble.workers import processes
 from validation.cases import CASES
-from validation.common import grounds
 from validation.common.changes import against, lines
-from validation.common.rows import STATUSES, CaseAnswer, Row, Saved
+from validation.common.rows import STATUSES, Row, Saved, failed, rested
 from validation.common.scenes import data_folder
 from validation.report.shares import full
 
@@ -126,25 +125,9 @@ def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone:
     }
 
 
-def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
-    """What a case answers; rows fail that rest on an assumption which was broken without leave.
-
-    What runs after the last row broke has a row of its own.
-    """
-    (rows, data), last = grounds.measured(measure)
-    rows = [row.grounded() for row in rows]
-    if last:
-        rows.append(_failed(f"{name}.assumptions", f"runs of case {name} after its last row", last))
-    return rows, data
-
-
 def _broken(name: str, reason: str) -> Row:
     """The failed row of a case that gave none."""
-    return _failed(f"{name}.broken", f"case {name}", reason)
-
-
-def _failed(id: str, quantity: str, reason: str) -> Row:
-    return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
+    return failed(f"{name}.broken", f"case {name}", reason)
 
 
 def validate(folder: Path, quick: bool, command: str, earlier: Saved | None = None, resumed: bool = False) -> int:

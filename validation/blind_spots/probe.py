@@ -57,7 +57,7 @@ def run_case(name: str, told: Told) -> None:
     """Measure the quick share of a case; a case that breaks has one row, which failed."""
     from importlib import import_module
 
-    from validation.run import rested
+    from validation.common.rows import rested
 
     told.begin(label_of(name))
     try:

@@ -1,5 +1,6 @@
 """Rows of the validation report: one quantity each, with what was expected and why."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -146,6 +147,23 @@ def behaves(
 def not_run(id: str, system: System, quantity: str, reason: str) -> Row:
     """Row for something that could not be measured here, with the reason."""
     return Row(id, system, quantity, None, "", "", None, "", "none", "not run", reason, "", "")
+
+
+def failed(id: str, quantity: str, reason: str) -> Row:
+    """Row of what gave no figure, or rests on what it must not."""
+    return Row(id, "pitch-plane", quantity, None, "", "", None, "", "none", "failed", reason)
+
+
+def rested(name: str, measure: Callable[[], CaseAnswer]) -> CaseAnswer:
+    """What a case answers; rows fail that rest on an assumption which was broken without leave.
+
+    What runs after the last row broke has a row of its own.
+    """
+    (rows, data), last = grounds.measured(measure)
+    rows = [row.grounded() for row in rows]
+    if last:
+        rows.append(failed(f"{name}.assumptions", f"runs of case {name} after its last row", last))
+    return rows, data
 
 
 def of_saved(row: dict[str, Any]) -> dict[str, Any]:
