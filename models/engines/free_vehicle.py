@@ -123,5 +123,24 @@ def built_share(engine: str, driven: Driven) -> tuple[tuple[str, ...], int]:
     return share
 
 
+def joints_alone(vehicle: SpatialVehicle) -> tuple[tuple[str, str], ...]:
+    """What engines have as their own of a vehicle whose springs keep to the heading of its carrier, and why no more:
+    heads and texts of a plan. Joints are counted in built models.
+
+    Such springs act along axes that turn with the carrier alone, while both their ends roll and pitch beside it.
+    """
+    driven = Driven(vehicle, np.zeros(3), np.zeros(1), None, None)
+    count, bars = len(vehicle.springs), len(vehicle.bars)
+    why = "their axes turn with the carrier alone, beside which both their ends roll and pitch: no element has that"
+    native = tuple(
+        (
+            "native",
+            f"{engine}: bodies and {built_share(engine, driven)[1]} joints, 0 of {count} springs and {bars} bars",
+        )
+        for engine in ENGINES
+    )
+    return (*native, ("shared", f"springs, mounts and bars: {why}"))
+
+
 def _module(engine: str) -> Any:
     return import_module(f"models.engines.free_vehicle_{engine}")

@@ -119,8 +119,21 @@ def describe(scene: BrakingScene) -> str:
         lines.append(_line(name, f"{PROCEDURES[procedure.kind]}, from {procedure.speed:g} m/s on {names}"))
     length = f"{1e3 * run.sample / run.substeps:g} ms, {run.substeps} to a sample"
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
+    if file is not None:
+        lines += [_line(*line) for line in _shares(scene)]
     assumed = {one.says: one for name in scene.procedures for one in _assumed(scene, name)}
     return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
+
+
+def _shares(scene: BrakingScene) -> list[tuple[str, str]]:
+    """What engines have as their own of a vehicle on its suspension, what they share, and what shares nothing."""
+    from models.engines.free_vehicle import joints_alone
+
+    return [
+        *joints_alone(sprung_of(scene).handling.vehicle),
+        ("shared", "tyres, wheels that turn, brakes and the road: no engine has them"),
+        ("reference", "plain code that shares no force with them, where --engine reference asks for it"),
+    ]
 
 
 def _assumed(scene: BrakingScene, name: str) -> list[Assumption]:

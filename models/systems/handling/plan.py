@@ -3,6 +3,7 @@
 from models.core.assumptions import assumption_lines
 from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
+from models.engines.free_vehicle import joints_alone
 from models.systems.handling.assumptions import assumptions
 from models.systems.handling.scene import LIMITS, HandlingScene
 from models.vehicles.plausible import plausible
@@ -40,6 +41,8 @@ def describe(scene: HandlingScene) -> str:
         ),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
+        *(_line(*line) for line in joints_alone(free)),
+        _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
         _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
     ]
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
