@@ -28,8 +28,8 @@ class Report(NamedTuple):
     turning: np.ndarray
 
 
-REPORTED = len(Report._fields)
-"""Numbers that a wheel reports."""
+REPORTED, TURNING = len(Report._fields), Report._fields.index("turning")
+"""Numbers that a wheel reports, and the row of its speed of turning, for code that Python runs as well."""
 
 
 @inlined
