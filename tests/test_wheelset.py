@@ -17,6 +17,7 @@ from models.rail.limit_cycle import attained, refined
 from models.rail.linear import critical_speed, gravity, growth, kinematic_wavelength, klingel, matrices
 from models.rail.profile_contact import Pose
 from models.rail.profile_statics import equivalent_conicity
+from models.rail.wheel_forces import REPORT
 from models.rail.wheelset import CHOSEN
 from validation.contact.manchester_references import CONTACT, contact_of, placed_at, sums
 
@@ -149,6 +150,13 @@ def test_energy_is_what_the_forces_do(law):
     assert (contact["power"] < 0.0).all()
     done = (contact["power"] - contact["load"] * deeper - contact["fx"] * 40.0).sum()
     assert gained == pytest.approx(done, abs=0.1)  # W; the energy of 4e5 J leaves 0.01 W, the least of faults 100 W
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (2, 3)])
+def test_contacts_that_are_not_known_yet_are_no_numbers(shape):
+    contacts = Equations(CHOSEN, 50.0).blank(*shape)
+    assert contacts.dtype == REPORT and contacts.shape == (*shape, 2)
+    assert all(np.isnan(contacts[name]).all() for name in REPORT.names)
 
 
 @pytest.mark.parametrize("law", ["linear", "fastsim"])

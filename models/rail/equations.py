@@ -30,6 +30,7 @@ from models.core.resolved import check_resolved
 from models.core.steps import divides
 from models.core.trajectory import Trajectory
 from models.machine.compiled import inlined, lean, njit
+from models.machine.records import size_of
 from models.rail.profile_contact import Pose
 from models.rail.wheel_forces import (
     LAWS,
@@ -249,9 +250,17 @@ class Equations:
         """
         return float(self.speed), tuple(self.body), plain(self.rails)
 
+    @cached_property
+    def patch_count(self) -> int:
+        """How many contacts both wheels together can have."""
+        return int(patches(self.rails.profile))
+
     def blank(self, *shape: int) -> Array:
-        """Contacts, REPORT (*shape, patches), that are not known yet."""
-        return np.full((*shape, patches(self.rails.profile)), np.nan, REPORT)
+        """Contacts, REPORT (*shape, patches), that are not known yet.
+
+        Filled as doubles: as records numpy fills them in four times the time, which is that of the rates at two states.
+        """
+        return np.full((*shape, self.patch_count * size_of(REPORT)), np.nan).view(REPORT)
 
     def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,)."""
