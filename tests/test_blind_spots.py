@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from models.machine.records import record
 from validation.blind_spots import planting
 from validation.blind_spots.audit import STARTUP, Traced, line_of
 from validation.blind_spots.rewriting import ROOT, NoSuchFunction, rewritten
@@ -65,6 +66,15 @@ def test_compiled_code_spoils_as_python_does():
     assert (number, count) == (1.01 * 0.3, 2)
     assert values.tolist() == [1.01 * 0.5, 1.01 * 1.5]
     assert array == pytest.approx([1.01**2 * 0.5, 1.01**2 * 1.5], rel=1e-15)
+
+
+def test_records_are_spoiled_field_by_field_in_python_and_in_compiled_code():
+    first = np.array([(0.5, 1.5), (2.5, 3.0)], record("force", "moment"))
+    second = first.copy()
+    scaled(first)
+    njit(lambda values: scaled(values))(second)
+    assert first.tolist() == [(1.01 * 0.5, 1.01 * 1.5), (1.01 * 2.5, 3.0)]
+    assert second.tolist() == [(1.01 * 0.5, 1.01 * 1.5), (1.01 * 2.5, 1.01 * 3.0)]
 
 
 def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places():

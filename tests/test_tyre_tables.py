@@ -5,7 +5,7 @@ import pytest
 
 from models.core.errors import InputError
 from models.tyre.magic_formula import PACEJKA, SURFACES, by_similarity, surface
-from models.tyre.tyre_table import TyreTable, across, along, place, stacked
+from models.tyre.tyre_table import Cells, TyreTable, across, along, place, stacked
 
 
 def small(peak=0.8):
@@ -28,11 +28,10 @@ def small(peak=0.8):
 
 def at(tables, number, angle, load, slip):
     """mu_x and mu_y by the compiled functions."""
-    i, p = place(tables.angles, angle)
-    j, q = place(tables.loads, load)
+    cells = Cells(*place(tables.angles, angle), *place(tables.loads, load))
     k, w = place(tables.slips, slip)
-    mu = [along(number, i, p, j, q, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
-    return (1 - w) * mu[0] + w * mu[1], across(number, i, p, j, q, k, w, tables.g, tables.h)
+    mu = [along(number, cells, node, tables.mu_x) for node in (k, min(k + 1, tables.slips.size - 1))]
+    return (1 - w) * mu[0] + w * mu[1], across(number, cells, k, w, tables.g, tables.h)
 
 
 def test_exact_at_nodes_linear_between_constant_beyond():

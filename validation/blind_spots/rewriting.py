@@ -14,8 +14,8 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 SPOILED, SCALED, PUT = "_spoiled_by_audit", "_scaled_by_audit", "_put_by_audit"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-VIEWS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "reshape", "ravel")
-"""Functions that give a view of their first argument: those of ``models.machine.stack``, and numpy's."""
+VIEWS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
+"""Functions that give a view of their first argument: those of ``models.machine``, and numpy's."""
 
 
 class NoSuchFunction(Exception):

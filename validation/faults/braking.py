@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from models.brake import brake, plane_vehicle
+from models.brake.advance import advance
 from models.brake.plane_vehicle import GRAVITY, PAPER, Plane
 from models.brake.port import sensors
 from models.brake.quarter import Path as QuarterPath
@@ -31,7 +32,7 @@ SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 def _first_step(own: Road, steer: float = 0.0) -> Moving:
     """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
     tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
-    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, own), 10.0, steer=steer)
+    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, own), 10.0, steer=steer, go=advance)
     if not steer:
         truck.turning[:] = 0.0
     truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
@@ -156,19 +157,15 @@ def _literal(real: Any) -> Any:
 
 
 def _tables(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
-    from dataclasses import replace
+    def stacked(real: Any) -> Any:
+        return lambda tables: (lambda of: of._replace(mu_x=np.ascontiguousarray(change(of.mu_x))))(real(tables))
 
-    return attribute(
-        "models.tyre.tyre_table:stacked",
-        lambda real: (
-            lambda tables: (lambda found: replace(found, mu_x=np.ascontiguousarray(change(found.mu_x))))(real(tables))
-        ),
-    )
+    return attribute("models.tyre.tyre_table:stacked", stacked)
 
 
 def _mirrored(real: Any) -> Any:
     """Steer angles, and by them the slip angles of the steered wheels, with the other sign."""
-    return lambda state, turning, torques, step, steer, *rest: real(state, turning, torques, step, -steer, *rest)
+    return lambda motion, torques, step, steer, vehicle: real(motion, torques, step, -steer, vehicle)
 
 
 def _spin(factor: float) -> Patch:
