@@ -30,6 +30,8 @@ class Report(NamedTuple):
 
 REPORTED = len(Report._fields)
 """Numbers that a wheel reports."""
+TURNING = Report._fields.index("turning")
+"""The row of the speeds of turning, for what runs in Python as well: there ``report_of`` gives no ``Report``."""
 
 
 @inlined

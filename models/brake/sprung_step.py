@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.brake.advance import AT_REST, FINE
-from models.brake.plane_records import Wheels, report_of
+from models.brake.plane_records import TURNING, Wheels, report_of
 from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.sprung import PITCH, ROLL
 from models.brake.surfaces import Surfaces, under_wheels
@@ -253,7 +253,7 @@ def advance(motion, torques, step, steer, vehicle, own):
             hold(known, before, after, step, motion, vehicle)
             if not march(own.engine, q, v):
                 return GAVE_UP, time
-            turning[:] = report_of(motion.report).turning
+            turning[:] = motion.report[TURNING]
         time += step
         if not max(abs(q[ROLL]), abs(q[PITCH])) <= UPRIGHT:
             return OVER, time
