@@ -28,8 +28,10 @@ class Report(NamedTuple):
     turning: np.ndarray
 
 
-REPORTED, TURNING = len(Report._fields), Report._fields.index("turning")
-"""Numbers that a wheel reports, and the row of its speed of turning, for code that Python runs as well."""
+REPORTED = len(Report._fields)
+"""Numbers that a wheel reports."""
+TURNING = Report._fields.index("turning")
+"""The row of the speeds of turning, for what runs in Python as well: there ``report_of`` gives no ``Report``."""
 
 
 @inlined

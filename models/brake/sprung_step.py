@@ -25,7 +25,6 @@ from models.machine.compiled import lean, named, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,
-    CHASSIS,
     COUNT,
     HEADER,
     JOINTS,
@@ -47,7 +46,8 @@ from models.multibody.forces import (
     room,
     touch,
 )
-from models.multibody.tree import PER_LINK, dot, three, times, twist
+from models.multibody.moving_vehicle import WheelContact
+from models.multibody.tree import dot, three, times, twist
 
 HELD = 4
 """Numbers that each wheel holds."""
@@ -94,41 +94,25 @@ def held_of(numbers):
 @lean
 def held_forces(numbers, q, v, f, contacts):
     """Add all forces to ``f`` (n,), and fill the ``Contacts``."""
-    chassis, table = int(numbers[CHASSIS]), start(numbers)
-    contact, sliding, way, creeping = (
+    wheel = WheelContact(
         array(doubles(10), (10,)),
         array(doubles(4), (4,)),
         array(doubles(WAY), (WAY,)),
-        array(doubles(3), (3,)),
+        array(doubles(REPORTED), (REPORTED,)),
     )
-    report, ledger = array(doubles(REPORTED), (REPORTED,)), array(doubles(LEDGER), (LEDGER,))
-    frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
+    way, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
+    vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
     waves, held = numbers[int(numbers[OF_WAVES]) :], held_of(numbers)
-    creeping[2], tyres, carrying = 0.0, beyond(table, int(numbers[OF_TYRES])), row(tree[0], PER_LINK, chassis)
+    creeping[2], tyres = 0.0, beyond(start(numbers), int(numbers[OF_TYRES]))
     for i in range(int(numbers[TYRES])):
-        own = row(tyres, PER_TYRE, i)
-        touch(
-            own,
-            waves,
-            int(numbers[WAVES]),
-            held.steer[i],
-            0.0,
-            v,
-            chassis,
-            frame,
-            tree,
-            contact,
-            sliding,
-            way,
-            ledger,
-            report,
-        )
+        tyre_row = row(tyres, PER_TYRE, i)
+        touch(tyre_row, waves, int(numbers[WAVES]), held.steer[i], 0.0, vehicle, wheel)
         contacts.along[i] = dot(three(way, PASSING), three(way, ROLLING))
-        contacts.across[i], contacts.load[i] = report[SLIP_Y], report[PRESS]
+        contacts.across[i], contacts.load[i] = wheel.report[SLIP_Y], wheel.report[PRESS]
         creeping[0], creeping[1] = held.force_x[i], held.force_y[i]
-        creep(own, creeping, way, chassis, f, tree, report)
-        twist(carrying, tree[2], times(three(way, AXLE), -held.moment[i]))
-    leave(numbers, frame, tree, f, ledger)
+        creep(tyre_row, creeping, vehicle, wheel)
+        twist(vehicle.chassis, vehicle.tree.ground, times(three(way, AXLE), -held.moment[i]))
+    leave(numbers, vehicle)
 
 
 @lean

@@ -11,7 +11,7 @@ serves every model in the process, and holds no address that could go stale in n
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -51,6 +51,37 @@ Acting = tuple[str | None, Vector, Vector]
 """Body, point and axis."""
 
 
+class Parts(NamedTuple):
+    """Counts and numbers of a vehicle's parts in the model's numeric data; all but counts are pointers to doubles."""
+
+    body_count: int
+    bodies: Any
+    points: Any
+    element_count: int
+    elements: Any
+
+
+class Motion(NamedTuple):
+    """What MuJoCo knows of the state, pointers to its doubles: coordinates and rates of the joints; of each body its
+    centre and rotation (rows); of each joint its anchor and axis in space."""
+
+    positions: Any
+    rates: Any
+    centres: Any
+    rotations: Any
+    anchors: Any
+    axes: Any
+
+
+class Workspace(NamedTuple):
+    """Pointers to what is worked out in a call: twist and wrench of each body (OF_BODY); travel and rate, then force,
+    of each element (OF_ELEMENT); lever of each point (OF_POINT)."""
+
+    bodies: Any
+    elements: Any
+    levers: Any
+
+
 @register_jitable
 def _three(p, i):
     return p[i], p[i + 1], p[i + 2]
@@ -77,55 +108,62 @@ def _along(a, b):
 
 
 @register_jitable
-def _move(bodies, count, points, v, centres, turned, anchors, axes, room, moved, levers):
+def _move(parts, motion, work):
     """Twists of the bodies, with no wrench on any, and what their points move the elements by."""
-    for b in range(count):
-        body, own, parent = beyond(bodies, PER_BODY * b), beyond(room, OF_BODY * b), int(bodies[PER_BODY * b + PARENT])
-        turn, shift = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        if parent >= 0:
-            turn, shift = _three(room, OF_BODY * parent + TURNS), _three(room, OF_BODY * parent + SHIFTS)
-        turning = int(body[TURNING])
-        for j in range(int(body[FIRST]), turning):
-            shift = _plus(shift, v[j], _three(axes, 3 * j))
-        for j in range(turning, int(body[LAST])):
-            axis = _three(axes, 3 * j)
-            turn, shift = _plus(turn, v[j], axis), _plus(shift, v[j], _across(_three(anchors, 3 * j), axis))
-        _put(own, TURNS, turn)
-        _put(own, SHIFTS, shift)
-        _put(own, MOMENTS, (0.0, 0.0, 0.0))
-        _put(own, FORCES, (0.0, 0.0, 0.0))
-        centre, rows = _three(centres, 3 * int(body[NUMBER])), beyond(turned, 9 * int(body[NUMBER]))
+    for b in range(parts.body_count):
+        body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
+        turn, shift = _twist(body, motion, work.bodies)
+        _put(state, TURNS, turn)
+        _put(state, SHIFTS, shift)
+        _put(state, MOMENTS, (0.0, 0.0, 0.0))
+        _put(state, FORCES, (0.0, 0.0, 0.0))
+        number = int(body[NUMBER])
+        centre, rows = _three(motion.centres, 3 * number), beyond(motion.rotations, 9 * number)
         x, y, z = _three(rows, 0), _three(rows, 3), _three(rows, 6)
         for i in range(int(body[POINT]), int(body[BEYOND])):
-            point = beyond(points, PER_POINT * i)
-            element, axis = beyond(moved, OF_ELEMENT * int(point[ELEMENT])), _three(point, AXIS)
+            point = beyond(parts.points, PER_POINT * i)
+            element, axis = beyond(work.elements, OF_ELEMENT * int(point[ELEMENT])), _three(point, AXIS)
             at = _three(point, PLACE)
             place = centre[0] + _along(x, at), centre[1] + _along(y, at), centre[2] + _along(z, at)
             lever = _across(place, axis)
             element[TRAVEL] += _along(axis, place)
             element[RATE] += _along(axis, shift) + _along(turn, lever)
-            _put(levers, OF_POINT * i, lever)
+            _put(work.levers, OF_POINT * i, lever)
 
 
 @register_jitable
-def _press(bodies, count, points, moved, levers, anchors, axes, room, forces):
+def _twist(body, motion, states):
+    """Turning of a body and the velocity that it gives the origin of space: its parent's and what its joints add."""
+    turn, shift, parent, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(body[PARENT]), int(body[TURNING])
+    if parent >= 0:
+        turn, shift = _three(states, OF_BODY * parent + TURNS), _three(states, OF_BODY * parent + SHIFTS)
+    for j in range(int(body[FIRST]), turning):
+        shift = _plus(shift, motion.rates[j], _three(motion.axes, 3 * j))
+    for j in range(turning, int(body[LAST])):
+        axis, rate = _three(motion.axes, 3 * j), motion.rates[j]
+        turn, shift = _plus(turn, rate, axis), _plus(shift, rate, _across(_three(motion.anchors, 3 * j), axis))
+    return turn, shift
+
+
+@register_jitable
+def _press(parts, motion, work, forces):
     """Bring the elements' forces onto the bodies' joints, riders first."""
-    for b in range(count - 1, -1, -1):
-        body, own, parent = beyond(bodies, PER_BODY * b), beyond(room, OF_BODY * b), int(bodies[PER_BODY * b + PARENT])
-        moment, force = _three(own, MOMENTS), _three(own, FORCES)
+    for b in range(parts.body_count - 1, -1, -1):
+        body, state = beyond(parts.bodies, PER_BODY * b), beyond(work.bodies, OF_BODY * b)
+        moment, force, parent = _three(state, MOMENTS), _three(state, FORCES), int(body[PARENT])
         for i in range(int(body[POINT]), int(body[BEYOND])):
-            point = beyond(points, PER_POINT * i)
-            pressed = -moved[OF_ELEMENT * int(point[ELEMENT])]
-            moment = _plus(moment, pressed, _three(levers, OF_POINT * i))
+            point = beyond(parts.points, PER_POINT * i)
+            pressed = -work.elements[OF_ELEMENT * int(point[ELEMENT])]
+            moment = _plus(moment, pressed, _three(work.levers, OF_POINT * i))
             force = _plus(force, pressed, _three(point, AXIS))
         turning = int(body[TURNING])
         for j in range(int(body[FIRST]), turning):
-            forces[j] += _along(_three(axes, 3 * j), force)
+            forces[j] += _along(_three(motion.axes, 3 * j), force)
         for j in range(turning, int(body[LAST])):
-            about = _plus(moment, -1.0, _across(_three(anchors, 3 * j), force))
-            forces[j] += _along(_three(axes, 3 * j), about)
+            about = _plus(moment, -1.0, _across(_three(motion.anchors, 3 * j), force))
+            forces[j] += _along(_three(motion.axes, 3 * j), about)
         if parent >= 0:
-            below = beyond(room, OF_BODY * parent)
+            below = beyond(work.bodies, OF_BODY * parent)
             _put(below, MOMENTS, _plus(moment, 1.0, _three(below, MOMENTS)))
             _put(below, FORCES, _plus(force, 1.0, _three(below, FORCES)))
 
@@ -158,9 +196,13 @@ def _more(law, travel, rate, q):
 
 
 @register_jitable
-def _act(e, count, road, tyres, q, v, moved, forces):
-    """Forces of the elements, in place of their travels, and on the joints that move their steady points."""
-    for i in range(count):
+def _act(parts, road, tyres, motion, moved, forces):
+    """Forces of the elements, in place of their travels, and on the joints that move their steady points.
+
+    road : pointer to the heights (m) under so many tyres, and then their rates (m/s).
+    """
+    e, q, v = parts.elements, motion.positions, motion.rates
+    for i in range(parts.element_count):
         travel, rate = moved[OF_ELEMENT * i] - e[REST], moved[OF_ELEMENT * i + RATE]
         length, more = int(e[LENGTH]), int(e[MORE])
         shares = more if more > 0 else length
@@ -195,19 +237,26 @@ def spatial_law() -> Any:
         count, elements, tyres = int(numbers[BODIES]), int(numbers[ELEMENTS]), int(numbers[TYRES])
         row = int(np.rint(double_at(data, time)[0] * numbers[PER_TIME]))
         road = beyond(numbers, int(numbers[ROAD]) + 2 * tyres * min(max(row, 0), int(numbers[ROWS]) - 1))
-        v, forces = array_at(data, velocity), array_at(data, passive)
-        anchors, axes = array_at(data, xanchor), array_at(data, xaxis)
         bodies = beyond(numbers, HEADER)
         points = beyond(bodies, PER_BODY * count)
-        laws = beyond(points, PER_POINT * int(numbers[POINTS]))
-        room, moved = doubles(OF_BODY * count), doubles(OF_ELEMENT * elements)
-        levers = doubles(OF_POINT * int(numbers[POINTS]))
+        parts = Parts(count, bodies, points, elements, beyond(points, PER_POINT * int(numbers[POINTS])))
+        work = Workspace(
+            doubles(OF_BODY * count), doubles(OF_ELEMENT * elements), doubles(OF_POINT * int(numbers[POINTS]))
+        )
         for i in range(OF_ELEMENT * elements):
-            moved[i] = 0.0
-        centres, turned = array_at(data, xpos), array_at(data, xmat)
-        _move(bodies, count, points, v, centres, turned, anchors, axes, room, moved, levers)
-        _act(laws, elements, road, tyres, array_at(data, position), v, moved, forces)
-        _press(bodies, count, points, moved, levers, anchors, axes, room, forces)
+            work.elements[i] = 0.0
+        motion = Motion(
+            array_at(data, position),
+            array_at(data, velocity),
+            array_at(data, xpos),
+            array_at(data, xmat),
+            array_at(data, xanchor),
+            array_at(data, xaxis),
+        )
+        forces = array_at(data, passive)
+        _move(parts, motion, work)
+        _act(parts, road, tyres, motion, work.elements, forces)
+        _press(parts, motion, work, forces)
 
     return law
 

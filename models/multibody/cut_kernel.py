@@ -6,6 +6,7 @@ elements, hubs, then the inputs of every half step, and curves.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,9 +68,32 @@ WRENCH, GUIDING = 6, 6
 """Columns of inputs: force (N) and moment (N m) of each hub; roll, pitch, their rates and their accelerations."""
 
 
+class JointMotion(NamedTuple):
+    """Joints and how they move.
+
+    joints (n, PER_JOINT) : as in the table; q, v (n,) : coordinates and rates; m (n + 1, PER_MOTION) : what is behind
+    each joint, see ``cut_mechanics``.
+    """
+
+    joints: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    m: np.ndarray
+
+
+class ForceReport(NamedTuple):
+    """What ``forces`` tells of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the declared
+    frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
+
+    elements: np.ndarray
+    wrenches: np.ndarray
+    moments: np.ndarray
+
+
 @lean
-def _element(e, numbers, joints, m, chassis, v, row):
+def _element(e, numbers, motion, chassis, row):
     """Force of an element; ``row`` (n,) becomes its travel by the joints behind the chassis."""
+    joints, m = motion.joints, motion.m
     axis, travel, rate = turned(m[int(e[AXIS_JOINT]) + 1], three(e, AXIS)), -e[DESIGN], 0.0
     row[:] = 0.0
     for side in range(2):
@@ -80,10 +104,10 @@ def _element(e, numbers, joints, m, chassis, v, row):
         while j > chassis:
             along = dot(axis, column(joints[j, TURNS], m[j + 1], end))
             row[j] += sign * along
-            rate += sign * along * v[j]
+            rate += sign * along * motion.v[j]
             j = int(joints[j, PARENT])
     if e[AXIS_JOINT] > chassis:
-        rate += _turn_axis(e, joints, m, chassis, v, axis, row)
+        rate += _turn_axis(e, motion, chassis, axis, row)
     force = e[FORCE] + e[STIFFNESS] * travel + e[DAMPING] * rate
     if e[FRICTION] != 0.0:
         force += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
@@ -101,23 +125,26 @@ def ends_apart(e, m):
 
 
 @lean
-def _turn_axis(e, joints, m, chassis, v, axis, row):
+def _turn_axis(e, motion, chassis, axis, row):
     """Add to ``row`` what an axis that turns beside the chassis changes of the travel; the rate of that."""
+    joints, m = motion.joints, motion.m
     moved, rate, j = cross(axis, ends_apart(e, m)), 0.0, int(e[AXIS_JOINT])
     while j > chassis:
         along = joints[j, TURNS] * dot(moved, three(m[j + 1], ALONG))
         row[j] += along
-        rate += along * v[j]
+        rate += along * motion.v[j]
         j = int(joints[j, PARENT])
     return rate
 
 
 @lean
-def _tyre(hub, joints, m, q, v, height, rate, speed, place):
-    """Force and moment (space) at the hub by a tyre on a road of this height and rate under it.
+def _tyre(hub, motion, place, road, speed):
+    """Force and moment (space) at the hub, at ``place``, by a tyre on a road of a height (m) and rate (m/s) under it.
 
     The side force of a tyre that only pushes goes with its load: in the air it has none.
     """
+    height, rate = road
+    joints, m, v = motion.joints, motion.m, motion.v
     down, j, risen, sideways = turned(m[ROLL + 1], (0.0, 0.0, -hub[HEIGHT])), int(hub[LAST]), 0.0, 0.0
     point = plus(place, down)
     while j >= 0:
@@ -129,7 +156,7 @@ def _tyre(hub, joints, m, q, v, height, rate, speed, place):
     if hub[ONE_SIDED] != 0.0:
         load = max(min(load, 2.0 * elastic), 0.0)
         grip = load / hub[LOAD]
-    side = grip * hub[CORNERING] * (hub[ROLL_STEER] * q[ROLL] + q[HEADING] - sideways / speed)
+    side = grip * hub[CORNERING] * (hub[ROLL_STEER] * motion.q[ROLL] + motion.q[HEADING] - sideways / speed)
     return (-load * rate / speed, side, load), (-down[2] * side, 0.0, down[0] * side)
 
 
@@ -140,15 +167,15 @@ def frame(head, hub):
 
 
 @lean
-def _enforce(head, wanted, joints, bodies, m, q, v, out, moments):
+def _enforce(head, wanted, bodies, motion, out, moments):
     """Write the moments (roll, pitch), N m, that give both the accelerations that are wanted."""
-    n, w = len(joints), head[HOLDING]
+    n, w, q, v = len(motion.joints), head[HOLDING], motion.q, motion.v
     mass, sides = array(doubles(n * n), (n, n)), array(doubles(3 * n), (3, n))
     sides[:] = 0.0
     for j in range(n):
         sides[0, j] = out[j]
     sides[1, ROLL] = sides[2, PITCH] = 1.0
-    inertia(joints, bodies, m, head[GRAVITY], mass, sides[0])
+    inertia(motion.joints, bodies, motion.m, head[GRAVITY], mass, sides[0])
     solve(mass, sides)
     roll = wanted[4] + 2.0 * w * (wanted[2] - v[ROLL]) + w * w * (wanted[0] - q[ROLL]) - sides[0, ROLL]
     pitch = wanted[5] + 2.0 * w * (wanted[3] - v[PITCH]) + w * w * (wanted[1] - q[PITCH]) - sides[0, PITCH]
@@ -177,32 +204,31 @@ def parts(numbers):
 
 
 @njit(cache=True, error_model="numpy")
-def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
+def forces(numbers, t, q, v, m, out, told):
     """Add all joint forces to ``out`` (n,) at a time (s), coordinates and rates (n,).
 
-    Also fills ``m``, the elements' forces ``inside`` (N, N m), the hubs' ``wrenches`` (hubs, 6) in the declared frame,
-    and the stabiliser's ``moments`` (2,), roll and pitch.
+    Also fills ``m`` and the ``ForceReport``.
     """
     head, joints, bodies, elements, hubs, inputs = parts(numbers)
     row = inputs[min(max(int(np.rint(t * head[PER_TIME])), 0), len(inputs) - 1)]
-    chassis, count = int(head[CHASSIS]), len(hubs)
+    chassis, count, motion, moments = int(head[CHASSIS]), len(hubs), JointMotion(joints, q, v, m), told.moments
     travel = array(doubles(len(joints)), (len(joints),))
     move(joints, q, v, m)
     for i in range(len(elements)):
-        inside[i] = _element(elements[i], numbers, joints, m, chassis, v, travel)
+        told.elements[i] = _element(elements[i], numbers, motion, chassis, travel)
         for j in range(chassis + 1, len(joints)):
-            out[j] -= inside[i] * travel[j]
+            out[j] -= told.elements[i] * travel[j]
     for i in range(count):
-        hub, known, own = hubs[i], wrenches[i], m[frame(head, hubs[i])]
+        hub, known, axes = hubs[i], told.wrenches[i], m[frame(head, hubs[i])]
         place = locate(m[int(hub[LAST]) + 1], hub, ARM)
         if head[ROAD] != 0.0:
-            force, moment = _tyre(hub, joints, m, q, v, row[i], row[count + i], head[SPEED], place)
-            put(known, 0, into(own, force, 0))
-            put(known, 3, into(own, moment, 0))
+            force, moment = _tyre(hub, motion, place, (row[i], row[count + i]), head[SPEED])
+            put(known, 0, into(axes, force, 0))
+            put(known, 3, into(axes, moment, 0))
         else:
             for k in range(WRENCH):
                 known[k] = row[WRENCH * i + k]
-            force, moment = turned(own, three(known, 0)), turned(own, three(known, 3))
+            force, moment = turned(axes, three(known, 0)), turned(axes, three(known, 3))
         add_wrench(joints, m, int(hub[LAST]), place, force, moment, out)
     moments[0] = moments[1] = 0.0
     wanted = row[len(row) - GUIDING :]
@@ -210,7 +236,7 @@ def forces(numbers, t, q, v, m, out, inside, wrenches, moments):
         moments[0] = head[ROLL_STIFFNESS] * (wanted[0] - q[ROLL]) + head[ROLL_DAMPING] * (wanted[2] - v[ROLL])
         moments[1] = head[PITCH_STIFFNESS] * (wanted[1] - q[PITCH]) + head[PITCH_DAMPING] * (wanted[3] - v[PITCH])
     elif head[GUIDE] == HELD:
-        _enforce(head, wanted, joints, bodies, m, q, v, out, moments)
+        _enforce(head, wanted, bodies, motion, out, moments)
     out[ROLL] += moments[0]
     out[PITCH] += moments[1]
 
@@ -222,7 +248,8 @@ def report(numbers, times, states, inside, wrenches, moments):
     m, out = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n), (n,))
     for i in range(len(times)):
         out[:] = 0.0  # what enforces an angle is found from all joint forces of this state
-        forces(numbers, times[i], states[i, :n], states[i, n:], m, out, inside[i], wrenches[i], moments[i])
+        told = ForceReport(inside[i], wrenches[i], moments[i])
+        forces(numbers, times[i], states[i, :n], states[i, n:], m, out, told)
 
 
 @njit(cache=True, error_model="numpy")
@@ -231,18 +258,9 @@ def accelerate(numbers, t, q, v, out):
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, e, h = len(joints), len(elements), len(hubs)
     m, mass = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)), array(doubles(n * n), (n, n))
+    told = ForceReport(array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))
     out[:] = 0.0
-    forces(
-        numbers,
-        t,
-        q,
-        v,
-        m,
-        out,
-        array(doubles(e), (e,)),
-        array(doubles(WRENCH * h), (h, WRENCH)),
-        array(doubles(2), (2,)),
-    )
+    forces(numbers, t, q, v, m, out, told)
     inertia(joints, bodies, m, head[GRAVITY], mass, out)
     solve(mass, array(start(out), (1, n)))
 
@@ -272,17 +290,9 @@ def joint_forces(numbers, t, q, v, f):
     """Add the joints' forces to ``f``, for callbacks: all but the time (s) are pointers to doubles."""
     head = array(numbers, (HEADER,))
     n, e, h = int(head[JOINTS]), int(head[ELEMENTS]), int(head[HUBS])
-    forces(
-        array(numbers, (int(head[ALL]),)),
-        t,
-        array(q, (n,)),
-        array(v, (n,)),
-        array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION)),
-        array(f, (n,)),
-        array(doubles(e), (e,)),
-        array(doubles(WRENCH * h), (h, WRENCH)),
-        array(doubles(2), (2,)),
-    )
+    m = array(doubles(PER_MOTION * (n + 1)), (n + 1, PER_MOTION))
+    told = ForceReport(array(doubles(e), (e,)), array(doubles(WRENCH * h), (h, WRENCH)), array(doubles(2), (2,)))
+    forces(array(numbers, (int(head[ALL]),)), t, array(q, (n,)), array(v, (n,)), m, array(f, (n,)), told)
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,6 +6,8 @@ those at the hubs; accelerations of points. Guides follow from Newton and Euler:
 they move, less what else acts there.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from models.machine.compiled import lean, njit
@@ -22,6 +24,7 @@ from models.multibody.cut_kernel import (
     PER_TIME,
     TWO,
     WRENCH,
+    ForceReport,
     ends_apart,
     forces,
     frame,
@@ -51,6 +54,18 @@ ELEMENT, CHASSIS_ROW, MOMENTS, POINT = 2, 9, 2, 3
 """Numbers of an element, the chassis, the stabiliser and a point in a row of answers; a guide and a hub have WRENCH."""
 JOINT, POINT_ARM, WEIGHT, PER_POINT = 0, 1, 4, 5
 """Of a point: the joint that carries it, where it is from there (m), how much of gravity is felt."""
+
+
+class FeltPlaces(NamedTuple):
+    """Where something is felt inside a vehicle of b bodies, h hubs and e elements.
+
+    guides (g,) : last joint of each guided body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both
+    ends and the frame of elements acts behind it; points (p, PER_POINT).
+    """
+
+    guides: np.ndarray
+    carried: np.ndarray
+    points: np.ndarray
 
 
 @lean
@@ -133,22 +148,23 @@ def _feel_point(joints, m, point, gravity, qdd):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def felt(numbers, every, states, guides, carried, points, own_axes, out):
+def felt(numbers, every, states, places, own_axes, out):
     """Write answers (n, all) of states (n, 2 c), ``every`` half steps apart from time 0 on.
 
-    guides (g,) : last joint of each body; carried (g, b + h + 3 e) : whether what acts on bodies, hubs, both ends and
-    the frame of elements acts behind it; points (p, PER_POINT); own_axes : whether guides and hubs are given in the
-    axes of what they carry instead of the chassis'.
+    places : ``FeltPlaces``; own_axes : whether guides and hubs are given in the axes of what they carry instead of the
+    chassis'.
     """
+    guides, points = places.guides, places.points
     head, joints, bodies, elements, hubs, _ = parts(numbers)
     n, b, e, h, chassis = len(joints), len(bodies), len(elements), len(hubs), int(head[CHASSIS])
     m, mass, sides = np.empty((n + 1, PER_MOTION)), np.empty((n, n)), np.empty((1, n))
     inside, travels, wrenches, moments = np.empty(e), np.empty(e), np.empty((h, WRENCH)), np.empty(2)
+    told = ForceReport(inside, wrenches, moments)
     acting, per_time, gravity = np.empty((b + h + 3 * e, 9)), head[PER_TIME], head[GRAVITY]
     for i in range(len(states)):
         q, v, row = states[i, :n], states[i, n:], out[i]
         sides[:] = 0.0
-        forces(numbers, i * every / per_time, q, v, m, sides[0], inside, wrenches, moments)
+        forces(numbers, i * every / per_time, q, v, m, sides[0], told)
         inertia(joints, bodies, m, gravity, mass, sides[0])
         solve(mass, sides)
         _move_bodies(joints, bodies, m, gravity, sides[0], acting[:b])
@@ -163,7 +179,7 @@ def felt(numbers, every, states, guides, carried, points, own_axes, out):
         at += CHASSIS_ROW + MOMENTS
         for g in range(len(guides)):
             last = int(guides[g])
-            force, moment = _sum_up(acting, carried[g], three(m[last + 1], PLACE))
+            force, moment = _sum_up(acting, places.carried[g], three(m[last + 1], PLACE))
             at = _written(m[last + 1 if own_axes else chassis + 1], force, moment, row, at)
         for g in range(h):
             force, moment = times(three(acting[b + g], 3), -1.0), times(three(acting[b + g], 6), -1.0)

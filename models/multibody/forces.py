@@ -18,6 +18,7 @@ import math
 from models.contact.fastsim_many import LOAD, MU, A, B
 from models.machine.compiled import lean
 from models.machine.stack import array, at, beyond, doubles, row, start
+from models.multibody.moving_vehicle import MovingVehicle, Tree, WheelContact, carried, carrier_frame, in_space
 from models.multibody.parts import press
 from models.multibody.tree import (
     GROUND,
@@ -109,8 +110,6 @@ pushes; of brakes and drive on wheels; of the steering on the wheels."""
 CENTRE, DOWN, ROLLING, ACROSS, NORMAL, AXLE, LOADING, PASSING, WAY = *range(0, 24, 3), 24
 """Of a wheel's way: its centre, the arm from there to the contact, axes along, across and normal to the road, axle,
 force of its load, velocity of its centre (3 each)."""
-COSINE, SINE, X, Y, TO_FRONT, TO_LEFT, YAWING = range(7)
-"""Of the carrier's frame: direction and place in space, its velocity along its own axes (m/s), its turning (rad/s)."""
 
 
 @lean
@@ -154,27 +153,36 @@ def _axle(steer, inclined):
 
 
 @lean
-def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact, slide, way, ledger, report):
-    """How a tyre presses on a road of ``count`` waves, and where and how it slides.
+def _road_under(waves, count, frame, place):
+    """Height (m) of the road under a place (m) of the carrier's axes, and the vector (-dz/dx, -dz/dy, 1) there."""
+    x, y = in_space(frame, place)
+    zeta, dx, dy = height(waves, count, x, y)
+    return zeta, (-(frame.cosine * dx + frame.sine * dy), frame.sine * dx - frame.cosine * dy, 1.0)
 
-    steer, steering : the wheel's angle (rad) and its rate; contact (10,), slide (4,), way (WAY,), report are filled.
-    """
-    spot, own = row(tree[1], PER_SPOT, int(tyre[POINT])), row(tree[0], PER_LINK, int(tyre[KNUCKLE]))
-    p, turning, axle = three(spot, WHERE), three(own, TURNING), _axle(steer, tyre[INCLINED])
-    passing = plus(
-        three(spot, RATE), (frame[TO_FRONT] - frame[YAWING] * p[1], frame[TO_LEFT] + frame[YAWING] * p[0], 0.0)
-    )
-    zeta, dx, dy = height(
-        waves,
-        count,
-        frame[X] + frame[COSINE] * p[0] - frame[SINE] * p[1],
-        frame[Y] + frame[SINE] * p[0] + frame[COSINE] * p[1],
-    )
-    upwards = -(frame[COSINE] * dx + frame[SINE] * dy), frame[SINE] * dx - frame[COSINE] * dy, 1.0
-    elastic, rising = max(tyre[STATIC] + tyre[VERTICAL] * (zeta - (p[2] - tyre[HEIGHT])), 0.0), dot(passing, upwards)
+
+@lean
+def _load(tyre, deflection, rising, ledger):
+    """Load (N) of a tyre pressed in by more (m) than at rest, which rises (m/s); its energy goes into the ledger."""
+    elastic = max(tyre[STATIC] + tyre[VERTICAL] * deflection, 0.0)
     load = max(elastic - tyre[VISCOUS] * rising, 0.0) if elastic > 0.0 else 0.0
     ledger[POTENTIAL] += 0.5 * elastic * elastic / tyre[VERTICAL]
     ledger[DISSIPATED] += (load - elastic) * rising
+    return load
+
+
+@lean
+def touch(tyre, waves, count, steer, steering, vehicle, wheel):
+    """How a tyre presses on a road of ``count`` waves, and where and how it slides: fills the ``WheelContact``.
+
+    steer, steering : the wheel's angle (rad) and its rate; vehicle : ``MovingVehicle``.
+    """
+    frame, tree, patch, slip = vehicle.frame, vehicle.tree, wheel.patch, wheel.slip
+    way, report = wheel.way, wheel.report
+    spot, knuckle = row(tree.spots, PER_SPOT, int(tyre[POINT])), row(tree.links, PER_LINK, int(tyre[KNUCKLE]))
+    p, turning, axle = three(spot, WHERE), three(knuckle, TURNING), _axle(steer, tyre[INCLINED])
+    passing = plus(three(spot, RATE), carried(frame, p))
+    zeta, upwards = _road_under(waves, count, frame, p)
+    load = _load(tyre, zeta - (p[2] - tyre[HEIGHT]), dot(passing, upwards), vehicle.ledger)
     long = math.sqrt(dot(upwards, upwards))
     normal = times(upwards, 1.0 / long)
     along = cross(axle, normal)
@@ -183,17 +191,17 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
     radius = max(p[2] - zeta, 0.0) / (long * flat)
     down = times(plus(times(axle, dot(axle, normal)), times(normal, -1.0)), radius / flat)
     across, rotor = cross(normal, along), int(tyre[ROTOR])
-    spin = v[rotor] if rotor >= 0 else dot(three(row(tree[0], PER_LINK, chassis), TURNING), axle) - dot(turning, axle)
-    whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame[YAWING] + steering))
+    spin = vehicle.rates[rotor] if rotor >= 0 else dot(three(vehicle.chassis, TURNING), axle) - dot(turning, axle)
+    whole = plus(plus(turning, times(axle, spin)), (0.0, 0.0, frame.yawing + steering))
     sliding = plus(passing, cross(whole, down))
-    slide[0], slide[1], slide[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
-    slide[3] = -spin * dot(cross(axle, down), along)
+    slip[0], slip[1], slip[2] = dot(sliding, along), dot(sliding, across), dot(whole, normal)
+    slip[3] = -spin * dot(cross(axle, down), along)
     pressing = load * long
-    contact[A], contact[B] = math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH]
-    contact[LOAD], contact[MU] = pressing, tyre[GRIP]
-    contact[FIRST] = contact[FIRST + 1] = contact[FIRST + 2] = 1.0 / tyre[BRISTLES]
+    patch[A], patch[B] = math.sqrt(tyre[RADIUS] * pressing / tyre[VERTICAL]), tyre[HALF_WIDTH]
+    patch[LOAD], patch[MU] = pressing, tyre[GRIP]
+    patch[FIRST] = patch[FIRST + 1] = patch[FIRST + 2] = 1.0 / tyre[BRISTLES]
     report[PRESS], report[ANGLE] = pressing, steer
-    report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slide[0], slide[1], slide[2], slide[3]
+    report[SLIP_X], report[SLIP_Y], report[TURN], report[TREAD] = slip[0], slip[1], slip[2], slip[3]
     put(way, CENTRE, p)
     put(way, DOWN, down)
     put(way, ROLLING, along)
@@ -205,38 +213,39 @@ def touch(tyre, waves, count, steer, steering, v, chassis, frame, tree, contact,
 
 
 @lean
-def creep(tyre, found, way, chassis, f, tree, report):
-    """Forces ``found`` of one tyre's contact, and its load, onto its wheel; the moment about the axle onto its spin."""
-    own, rotor, axle = row(tree[0], PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
-    force = plus(times(three(way, ROLLING), found[0]), times(three(way, ACROSS), found[1]))
-    turning = times(three(way, NORMAL), found[2])
+def creep(tyre, creeping, vehicle, wheel):
+    """A tyre's creep forces and moment (3,) and its load onto its wheel; the moment about the axle onto the spin."""
+    way, report, ground = wheel.way, wheel.report, vehicle.tree.ground
+    knuckle, rotor, axle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE])), int(tyre[ROTOR]), three(way, AXLE)
+    force = plus(times(three(way, ROLLING), creeping[0]), times(three(way, ACROSS), creeping[1]))
+    turning = times(three(way, NORMAL), creeping[2])
     moment = plus(cross(three(way, DOWN), force), turning)
-    push(own, tree[2], plus(force, three(way, LOADING)), three(way, CENTRE))
-    twist(own, tree[2], moment)
+    push(knuckle, ground, plus(force, three(way, LOADING)), three(way, CENTRE))
+    twist(knuckle, ground, moment)
     torque = dot(axle, moment)
     if rotor >= 0:
-        f[rotor] += torque
+        vehicle.forces[rotor] += torque
     else:
-        _hold(torque, axle, own, row(tree[0], PER_LINK, chassis))
-    report[FX], report[FY], report[MZ], report[STEER_MOMENT] = found[0], found[1], found[2], moment[2]
-    report[POWER] = found[0] * report[SLIP_X] + found[1] * report[SLIP_Y] + found[2] * report[TURN]
+        _hold(torque, axle, knuckle, vehicle.chassis)
+    report[FX], report[FY], report[MZ], report[STEER_MOMENT] = creeping[0], creeping[1], creeping[2], moment[2]
+    report[POWER] = creeping[0] * report[SLIP_X] + creeping[1] * report[SLIP_Y] + creeping[2] * report[TURN]
 
 
 @lean
-def turn_wheel(tyre, braking, driving, v, axle, chassis, f, tree, ledger, report):
-    """Torque of brake and drive on one wheel, and against it on the chassis."""
-    rotor = int(tyre[ROTOR])
+def turn_wheel(tyre, braking, driving, vehicle, wheel):
+    """Torque (N m) of brake and drive on one wheel, and against it on the chassis."""
+    rotor, axle, report = int(tyre[ROTOR]), three(wheel.way, AXLE), wheel.report
     report[SPIN_TORQUE] = 0.0
     if rotor < 0 or (braking == 0.0 and driving == 0.0):
         return
-    own, carrying = row(tree[0], PER_LINK, int(tyre[KNUCKLE])), row(tree[0], PER_LINK, chassis)
-    spin = v[rotor] + dot(three(own, TURNING), axle) - dot(three(carrying, TURNING), axle)
+    knuckle = row(vehicle.tree.links, PER_LINK, int(tyre[KNUCKLE]))
+    spin = vehicle.rates[rotor] + dot(three(knuckle, TURNING), axle) - dot(three(vehicle.chassis, TURNING), axle)
     report[SPIN_TORQUE] = tyre[DRIVEN] * driving
     if braking != 0.0:
         report[SPIN_TORQUE] -= tyre[BRAKED] * braking * math.tanh(spin / tyre[BRAKE_RATE])
-    f[rotor] += report[SPIN_TORQUE]
-    ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
-    _hold(-report[SPIN_TORQUE], axle, own, carrying)
+    vehicle.forces[rotor] += report[SPIN_TORQUE]
+    vehicle.ledger[TORQUE_POWER] += report[SPIN_TORQUE] * spin
+    _hold(-report[SPIN_TORQUE], axle, knuckle, vehicle.chassis)
 
 
 @lean
@@ -254,7 +263,7 @@ def room(head):
 
 @lean
 def enter(numbers, q, v, f, room, ledger):
-    """Add the forces of all parts to ``f`` or to the tree. Returns the carrier's frame and the tree, in the ``room``.
+    """Add the forces of all parts to ``f`` or to the tree. Returns the ``MovingVehicle``, its tree in the ``room``.
 
     numbers : array; q, v, f (n,) and ledger (LEDGER,) : arrays; room : pointer to as many doubles as needed.
     """
@@ -267,56 +276,55 @@ def enter(numbers, q, v, f, room, ledger):
     for i in range(LEDGER):
         ledger[i] = 0.0
     ledger[POTENTIAL], ledger[DISSIPATED] = press(table, int(numbers[OF_PARTS]), int(numbers[PARTS]), spots, q, v, f)
-    cosine, sine = math.cos(q[2]), math.sin(q[2])
-    frame = cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2]
-    return frame, (room, spots, ground)
+    chassis = row(room, PER_LINK, int(numbers[CHASSIS]))
+    return MovingVehicle(v, f, ledger, carrier_frame(q, v), Tree(room, spots, ground), chassis)
 
 
 @lean
-def leave(numbers, frame, tree, f, ledger):
-    """Drag, and all that was gathered in the tree, added to ``f`` and ledger."""
-    table = start(numbers)
+def leave(numbers, vehicle):
+    """Drag, and all that was gathered in the tree, added to the vehicle's forces and ledger."""
+    table, frame, f = start(numbers), vehicle.frame, vehicle.forces
     if numbers[DRAG] != 0.0:
-        _drag(numbers, frame, tree, ledger)
+        _drag(numbers, vehicle)
     inwards(
         beyond(table, HEADER),
         int(numbers[JOINTS]),
         beyond(table, int(numbers[OF_POINTS])),
         int(numbers[POINTS]),
-        tree,
+        vehicle.tree,
         f,
     )
-    ahead, aside, turn = tree[2]
-    f[0] += frame[0] * ahead - frame[1] * aside
-    f[1] += frame[1] * ahead + frame[0] * aside
+    ahead, aside, turn = vehicle.tree.ground
+    f[0] += frame.cosine * ahead - frame.sine * aside
+    f[1] += frame.sine * ahead + frame.cosine * aside
     f[2] += turn
 
 
 @lean
-def _drag(numbers, frame, tree, ledger):
+def _drag(numbers, vehicle):
     """Drag at the chassis' centre, against its motion along the vehicle."""
-    own = row(tree[0], PER_LINK, int(numbers[CHASSIS]))
-    place = plus(three(own, PLACE), out(own, numbers, DRAG_X))
-    ahead = (plus(three(own, SPEED), cross(three(own, TURNING), place)))[0] + frame[4] - frame[6] * place[1]
+    chassis, frame = vehicle.chassis, vehicle.frame
+    place = plus(three(chassis, PLACE), out(chassis, numbers, DRAG_X))
+    speed = plus(three(chassis, SPEED), cross(three(chassis, TURNING), place))
+    ahead = speed[0] + frame.ahead - frame.yawing * place[1]
     force = -numbers[DRAG] * abs(ahead) * ahead
-    ledger[DISSIPATED] += force * ahead
-    push(own, tree[2], (force, 0.0, 0.0), place)
+    vehicle.ledger[DISSIPATED] += force * ahead
+    push(chassis, vehicle.tree.ground, (force, 0.0, 0.0), place)
 
 
 @lean
-def _push_from_outside(numbers, t, frame, tree, ledger):
+def _push_from_outside(numbers, t, vehicle):
     """Pushes, which keep to where the vehicle heads."""
     controls, knots, table = int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
     count = int(numbers[controls - 1])
     for i in range(count):
         of = row(beyond(table, controls - 1 - PER_PUSH * count), PER_PUSH, i)
-        own = row(tree[0], PER_LINK, int(of[PUSHED_BY]))
+        link = row(vehicle.tree.links, PER_LINK, int(of[PUSHED_BY]))
         force = times(three(of, PUSH_AXIS), control(numbers, controls, FIRST_PUSH + i, knots, t)[0])
-        place = plus(three(own, PLACE), out(own, of, PUSHED_AT))
-        passing = (frame[TO_FRONT] - frame[YAWING] * place[1], frame[TO_LEFT] + frame[YAWING] * place[0], 0.0)
-        speed = plus(plus(three(own, SPEED), cross(three(own, TURNING), place)), passing)
-        ledger[DISSIPATED] += dot(force, speed)
-        push(own, tree[2], force, place)
+        place = plus(three(link, PLACE), out(link, of, PUSHED_AT))
+        speed = plus(plus(three(link, SPEED), cross(three(link, TURNING), place)), carried(vehicle.frame, place))
+        vehicle.ledger[DISSIPATED] += dot(force, speed)
+        push(link, vehicle.tree.ground, force, place)
 
 
 @lean
@@ -325,42 +333,26 @@ def all_forces(numbers, t, q, v, f, report, ledger):
 
     t : s; q, v : positions and rates of the coordinates (m, rad; m/s, rad/s) in the vehicle's order.
     """
-    w, chassis, knots, table = int(numbers[TYRES]), int(numbers[CHASSIS]), int(numbers[KNOTS]), start(numbers)
-    frame, tree = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
-    steer, steering = control(numbers, int(numbers[OF_KNOTS]), STEER, knots, t)
-    braking = control(numbers, int(numbers[OF_KNOTS]), BRAKE, knots, t)[0]
-    driving = control(numbers, int(numbers[OF_KNOTS]), DRIVE, knots, t)[0]
-    contacts, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
-    slides, found = array(doubles(4 * w), (w, 4)), array(doubles(4 * w), (w, 4))
+    w, controls, knots, table = int(numbers[TYRES]), int(numbers[OF_KNOTS]), int(numbers[KNOTS]), start(numbers)
+    vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
+    steer, steering = control(numbers, controls, STEER, knots, t)
+    braking, driving = control(numbers, controls, BRAKE, knots, t)[0], control(numbers, controls, DRIVE, knots, t)[0]
+    patches, ways = array(doubles(10 * w), (w, 10)), doubles(WAY * w)
+    slips, creeping = array(doubles(4 * w), (w, 4)), array(doubles(4 * w), (w, 4))
     tyres, waves = beyond(table, int(numbers[OF_TYRES])), numbers[int(numbers[OF_WAVES]) :]
     for i in range(w):
-        tyre = row(tyres, PER_TYRE, i)
-        touch(
-            tyre,
-            waves,
-            int(numbers[WAVES]),
-            tyre[STEERED] * steer,
-            tyre[STEERED] * steering,
-            v,
-            chassis,
-            frame,
-            tree,
-            contacts[i],
-            slides[i],
-            row(ways, WAY, i),
-            ledger,
-            report[i],
-        )
+        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
+        touch(tyre, waves, int(numbers[WAVES]), tyre[STEERED] * steer, tyre[STEERED] * steering, vehicle, wheel)
     cells = array(beyond(table, int(numbers[OF_CELLS])), (5, int(numbers[CELLS])))
     strips = array(beyond(table, int(numbers[OF_STRIPS])), (4, int(numbers[STRIPS])))
-    tyre_forces(contacts, slides, strips, cells, numbers[MIDDLE], found)
+    tyre_forces(patches, slips, strips, cells, numbers[MIDDLE], creeping)
     for i in range(w):
-        tyre, way = row(tyres, PER_TYRE, i), row(ways, WAY, i)
-        creep(tyre, found[i], way, chassis, f, tree, report[i])
-        turn_wheel(tyre, braking, driving, v, three(way, AXLE), chassis, f, tree, ledger, report[i])
+        tyre, wheel = row(tyres, PER_TYRE, i), WheelContact(patches[i], slips[i], row(ways, WAY, i), report[i])
+        creep(tyre, creeping[i], vehicle, wheel)
+        turn_wheel(tyre, braking, driving, vehicle, wheel)
         ledger[STEER_POWER] -= tyre[STEERED] * steering * report[i, STEER_MOMENT]
-    _push_from_outside(numbers, t, frame, tree, ledger)
-    leave(numbers, frame, tree, f, ledger)
+    _push_from_outside(numbers, t, vehicle)
+    leave(numbers, vehicle)
 
 
 @lean

@@ -167,7 +167,7 @@ def inwards(joints, n, points, count, tree, f):
 
     What acts between the vehicle's parts does not push the carrier: it feels what comes from outside, in its axes.
     """
-    links, spots, _ = tree
+    links, spots = tree.links, tree.spots
     for i in range(count):
         spot, own = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(points, PER_POINT, i)[JOINT]))
         force = three(spot, PUSH)

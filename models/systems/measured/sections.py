@@ -15,7 +15,7 @@ import numpy as np
 from models.core.errors import InputError
 from models.measured.signal import HUB, Place, Quantity, Signal
 from models.multibody.cut_kernel import WRENCH
-from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, felt
+from models.multibody.cut_section_kernel import CHASSIS_ROW, MOMENTS, POINT, FeltPlaces, felt
 from models.multibody.cut_table import Joints, joints
 from models.vehicles.cut_vehicle import CutVehicle
 
@@ -77,7 +77,7 @@ class Sections:
     wanted: tuple[str, ...] | None = None
     answers: tuple[Answer, ...] = field(init=False)
     columns: np.ndarray = field(init=False)
-    _guides: tuple[np.ndarray, ...] = field(init=False, repr=False, compare=False)
+    _places: FeltPlaces = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.wanted is not None:
@@ -96,15 +96,14 @@ class Sections:
             [joined.last[p.body], *np.subtract(p.place, joined.origin[p.body]), float(p.gravity)] for p in self.points
         ]
         points = np.array(rows, float).reshape(len(rows), 5)
-        object.__setattr__(self, "_guides", (*_guides(self.vehicle, joined), points))
+        object.__setattr__(self, "_places", FeltPlaces(*_guides(self.vehicle, joined), points))
 
     def read(self, numbers: np.ndarray, states: np.ndarray, every: int) -> np.ndarray:
         """Answers (n, answers) of states (n, 2 c), ``every`` half steps apart; ``numbers`` as in ``HubModel``."""
-        guides, carried, points = self._guides
-        wrenches = len(guides) + len(self.vehicle.hubs)
-        count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * len(points) + WRENCH * wrenches
+        wrenches, points = len(self._places.guides) + len(self.vehicle.hubs), len(self._places.points)
+        count = 2 * len(self.vehicle.elements) + CHASSIS_ROW + MOMENTS + POINT * points + WRENCH * wrenches
         out = np.empty((len(states), count))
-        felt(numbers, float(every), np.ascontiguousarray(states), guides, carried, points, self.frame == "hub", out)
+        felt(numbers, float(every), np.ascontiguousarray(states), self._places, self.frame == "hub", out)
         return out[:, self.columns]
 
 

@@ -1,0 +1,81 @@
+"""A free vehicle at one instant, as its compiled forces read it: its carrier, its tree, and what forces are added to.
+
+The carrier, the first three coordinates, has the frame in which the tree's vectors are given.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from models.machine.compiled import lean
+
+
+class CarrierFrame(NamedTuple):
+    """The carrier in space: cosine and sine of its heading, its place (m), the velocity of its origin along its own
+    axes, ahead and aside (m/s), and its yaw rate (rad/s)."""
+
+    cosine: float
+    sine: float
+    x: float
+    y: float
+    ahead: float
+    aside: float
+    yawing: float
+
+
+class Tree(NamedTuple):
+    """Pointers to the links and the spots (see ``models.multibody.tree``), and the forces (GROUND,) on the carrier."""
+
+    links: Any
+    spots: Any
+    ground: np.ndarray
+
+
+class MovingVehicle(NamedTuple):
+    """What each force of a vehicle reads and adds to.
+
+    rates, forces (n,) : of the coordinates; ledger (LEDGER,) : see ``forces``; chassis (PER_LINK,) : its link.
+    """
+
+    rates: np.ndarray
+    forces: np.ndarray
+    ledger: np.ndarray
+    frame: CarrierFrame
+    tree: Tree
+    chassis: np.ndarray
+
+
+class WheelContact(NamedTuple):
+    """A wheel on the road, columns as in ``forces`` and ``models.contact.fastsim_many``.
+
+    patch (10,) : what the tyre's contact is, as creep forces read it; slip (4,) : velocities of slip along and across
+    (m/s), turning (rad/s), speed of the tread (m/s); way (WAY,) : where it is and its axes; report (REPORTED,).
+    """
+
+    patch: np.ndarray
+    slip: np.ndarray
+    way: np.ndarray
+    report: np.ndarray
+
+
+@lean
+def carrier_frame(q, v):
+    """The ``CarrierFrame`` at positions and rates (n,)."""
+    cosine, sine = math.cos(q[2]), math.sin(q[2])
+    return CarrierFrame(cosine, sine, q[0], q[1], cosine * v[0] + sine * v[1], cosine * v[1] - sine * v[0], v[2])
+
+
+@lean
+def carried(frame, place):
+    """Velocity (m/s) that the carrier gives a point at a place (m), both in its axes."""
+    return frame.ahead - frame.yawing * place[1], frame.aside + frame.yawing * place[0], 0.0
+
+
+@lean
+def in_space(frame, place):
+    """Where a point at a place (m) in the carrier's axes lies on the ground of space."""
+    return (
+        frame.x + frame.cosine * place[0] - frame.sine * place[1],
+        frame.y + frame.sine * place[0] + frame.cosine * place[1],
+    )
