@@ -267,11 +267,7 @@ FAULTS = (
         "sections",
         attribute("models.drift.score:section_forces", lambda real: lambda f3, f4, pitch: real(f4, f3, pitch)),
     ),
-    Fault(
-        "gravity turned round",
-        "motion",
-        attribute("models.sensors.rigid_body_motion:motion", lambda real: lambda *own: real(*own, gravity=-9.81)),
-    ),
+    Fault("gravity turned round", "motion", attribute("models.sensors.rigid_body_motion:GRAVITY", lambda real: -real)),
     Fault("readings of two sensors exchanged", "motion", _read(lambda read: read[:, [1, 0, 2, 3]])),
     Fault("one sensor 1 % off", "motion", _read(_second_scaled)),
     Fault(

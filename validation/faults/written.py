@@ -116,11 +116,11 @@ def _swapped(first: int, second: int) -> Callable[[Any], Any]:
 
 
 def _turned_bar(real: Any) -> Any:
-    """The last element of a cut car, a bar, works the other way round."""
+    """The bars of a cut car work the other way round: their axes are as long as the track's inverse."""
 
-    def made(vehicle: Any, joined: Any, i: int) -> list[float]:
-        row: list[float] = real(vehicle, joined, i)
-        if i == len(vehicle.elements) - 1:
+    def made(element: Any, joined: Any) -> list[float]:
+        row: list[float] = real(element, joined)
+        if not np.isclose(np.linalg.norm(element.axis), 1.0):
             row[cut_at.AXIS : cut_at.AXIS + 3] = [-value for value in row[cut_at.AXIS : cut_at.AXIS + 3]]
         return row
 
