@@ -27,6 +27,25 @@ app = typer.Typer(
     help="Ground vehicles built in Exudyn, in MuJoCo and by hand, held to closed forms and to one another.",
 )
 
+
+def _say_version(wanted: bool) -> None:
+    """Print the version and end, where that is what the user wants."""
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"twinrig {version('twinrig')}")
+        raise typer.Exit()
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Options that belong to no command."""
+
+
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
 Changes = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4; repeatable.")
@@ -300,10 +319,11 @@ def _finish(
     a broken assumption ends with code 1.
     """
     from models.core.result_folders import COMMAND, drop_if_empty
+    from models.core.told import summarised
 
     try:
         with _progress(as_json) as progress:
-            summary = _judged(work(progress))
+            summary = summarised(work(progress))
         if doubts:
             summary["queries"] = queries(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
@@ -318,14 +338,6 @@ def _finish(
         _print(summary, doubts)
     if summary.get("failed") or (strict and any(one["broken"] for one in summary["assumptions"].values())):
         sys.exit(1)
-
-
-def _judged(summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary with the errors and assumptions of the "results" that a study hands over, told at its end."""
-    from models.core import told
-
-    results = summary.pop("results", {})
-    return summary | told.as_json(results) | {"table": [*summary.get("table", []), *told.lines(results)]}
 
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:

@@ -99,25 +99,25 @@ def _files(table: Any) -> Iterator[str]:
         yield table
 
 
-def engines_of(name: str | None, system: str) -> tuple[str, ...]:
-    """The engines that were asked for; none for a system that no engine computes."""
+def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
+    """The engines that were asked for; none for a system that no engine computes. option : where they were named."""
     engines = KNOWN[system].engines
     if name is not None and not engines:
-        raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
+        raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
         return engines
     if ":" in name:
-        return _outside(name, system)
+        return _outside(name, system, option)
     named = (*engines, *KNOWN[system].on_request)
     if name not in named:
-        raise InputError("--engine", "", name, "no such engine", (*named, "all"))
+        raise InputError(option, "", name, "no such engine", (*named, "all"))
     return (name,)
 
 
-def _outside(name: str, system: str) -> tuple[str, ...]:
+def _outside(name: str, system: str, option: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
     if system != DEFAULT:
-        raise InputError("--engine", "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
+        raise InputError(option, "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
     from models.engines.outside import register
 
     register(name)
