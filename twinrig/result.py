@@ -65,7 +65,8 @@ class Result(saved.Result):
         seconds = f"{said['seconds']:.3f} s" if said.get("seconds") else ""
         parts = "; ".join(part for part in (str(said.get("status", "")), counts, seconds) if part)
         doubts = [f"  in doubt: {text}" for text in json.loads(said.get("doubts", "[]"))]
-        return [f"  {said.get('system', '')} {self._label}: {parts}", *doubts, *lines({self._label: self})]
+        place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
+        return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *lines({self._label: self})]
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
         """Name, unit, axes, least, largest and meaning of each channel."""
