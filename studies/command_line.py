@@ -5,12 +5,12 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, get_args
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
@@ -19,7 +19,7 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding, lines, queries
 from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
     add_completion=False,
@@ -195,15 +195,11 @@ def run_scene(
 @contextmanager
 def _queried(scene: Any) -> Iterator[None]:
     """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
-    from models.core.strict import Query
-
     try:
         yield
     except InputError:
-        with suppress(InputError):
-            causes = (*get_args(Query), "exchanged", "shift")
-            for line in lines(finding for finding in findings_of(scene) if finding.check in causes):
-                print(line, file=sys.stderr)
+        for line in causes(scene):
+            print(line, file=sys.stderr)
         raise
 
 

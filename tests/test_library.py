@@ -213,6 +213,17 @@ def test_a_beginners_error_is_answered_with_the_remedy(mistake, result):
         ask(result)
 
 
+def test_an_unlikely_vehicle_is_told_in_the_result_and_where_the_run_is_refused():
+    with pytest.raises(twinrig.InputError, match="shorten the step") as refused:
+        twinrig.run("study_road", set={"vehicle.override.m3": 0.75})
+    assert any("m3" in note and "0.75 kg" in note for note in refused.value.__notes__)
+    run = twinrig.run("study_road", set={"vehicle.override.I": 5e4, "run.duration": 0.01}, error=False)
+    assert (
+        "  doubt: bodies[chassis: m3, I].inertia: 5e+04 kg m^2" in repr(run)
+        and "radius of gyration" in run._repr_html_()
+    )
+
+
 def test_channels_over_different_axes_are_told_by_their_axes():
     run = twinrig.run("contact_ellipse", set={"method.cells": 11}, error=False)
     with pytest.raises(twinrig.InputError, match=r"over the same axes .*over other: alone"):

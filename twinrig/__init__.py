@@ -11,7 +11,6 @@ command line refuses is refused here with the same messages: ``InputError`` for 
 for a run without an answer. Axes, signs and units stand in ``models``.
 """
 
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from twinrig import shadowed
@@ -40,10 +39,9 @@ __all__ = [
     "run",
     "validate",
 ]
-__version__ = version("twinrig")
 
 _CLASSES = {"Report": "twinrig.report", "Result": "twinrig.result", "Scene": "twinrig.scene"}
-"""Classes by their modules, which are imported where they are used: one of them needs numpy."""
+"""Classes by their modules, imported where they are used: with what tells the version, they take the most time."""
 
 
 def __getattr__(name: str) -> Any:
@@ -51,6 +49,10 @@ def __getattr__(name: str) -> Any:
 
     if name in _CLASSES:
         return getattr(import_module(_CLASSES[name]), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("twinrig")
     from models.core.errors import nearest
 
     raise AttributeError(f"twinrig has no {name!r}{nearest(name, tuple(__all__))}")

@@ -60,19 +60,22 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     set : as in ``load``; error : whether the error of steps or cells is estimated, by further runs, which cost about
     half as much as the run; how : what the system's run takes besides, such as ``procedure`` of braking, ``manoeuvre``
     of handling, ``case`` of wheel and rail, or ``speed`` (m/s) of a wheelset. Raises InputError before anything is run,
-    RunFailed where there is no answer.
+    RunFailed where there is no answer. What is unlikely of the input, such as a mass in tonnes, stands in the result.
     """
+    from models.core.finding import gathered, queries
     from models.systems import run as run_system
-    from studies.command.asked import plan_of
+    from studies.command.asked import findings_of, plan_of
     from twinrig.result import Result
 
     loaded = load(scene, set).checked
     options = _options(loaded)
     _check_how(loaded, how, options)
     chosen, checked = _engines(loaded, engine, options["engine"].default == "")
-    with _as_library():
+    with _as_library(loaded):
         plan_of(loaded).check(loaded, checked)
+        doubtful = queries(gathered(findings_of(loaded)))
         answer = run_system(loaded, chosen, error=error, **how)
+    answer.data.attrs["queries"] = json.dumps(doubtful)
     return Result(answer.data, answer.detail)
 
 
@@ -118,15 +121,22 @@ def _engines(scene: Any, asked: str, optional: bool) -> tuple[str, tuple[str, ..
 
 
 @contextmanager
-def _as_library() -> "Iterator[None]":
-    """Messages that name an option of the command line name the argument instead."""
+def _as_library(scene: Any = None) -> "Iterator[None]":
+    """Messages that name an option of the command line name the argument instead.
+
+    What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
+    """
+    from studies.command.asked import causes
+
     try:
         yield
     except InputError as error:
-        if not error.file.startswith("--"):
-            raise
-        renamed = InputError(error.file.lstrip("-"), error.place, error.value, error.allowed, error.choices)
-        raise renamed from None
+        if error.file.startswith("--"):
+            renamed = InputError(error.file.lstrip("-"), error.place, error.value, error.allowed, error.choices)
+            raise renamed from None
+        for line in causes(scene) if scene is not None else ():
+            error.add_note(line)
+        raise
 
 
 def read(path: str | Path) -> "Result":
@@ -185,7 +195,7 @@ def price(
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
-    with _as_library():
+    with _as_library(loaded):
         answer = recommended(loaded, tolerance, quantity, engines_of(engine, loaded.system, "engine"))
     return Report(tuple(lines(answer)), as_dict(answer), answer)
 
@@ -213,7 +223,7 @@ def choose(
 
     loaded = _choosing(load(scene, set), quantities, tolerance).checked
     engines = engines_of(engine, loaded.system, "engine")
-    with _as_library(), TemporaryDirectory() as temporary:
+    with _as_library(loaded), TemporaryDirectory() as temporary:
         study = ready(loaded, engines)
         kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
         summary = summarised(study.run(loaded, engines, kept, lambda text, share: None))

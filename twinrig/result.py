@@ -59,12 +59,14 @@ class Result(saved.Result):
         return str(self.data.attrs.get("engine") or self.data.attrs.get("system", "result"))
 
     def _said(self) -> list[str]:
-        """Status, counts, doubts, error and broken assumptions."""
+        """Status, counts, doubts about the run and its input, error and broken assumptions."""
         said = self.data.attrs
         counts = ", ".join(f"{count} {name}" for name, count in json.loads(said.get("counts", "{}")).items())
         seconds = f"{said['seconds']:.3f} s" if said.get("seconds") else ""
         parts = "; ".join(part for part in (str(said.get("status", "")), counts, seconds) if part)
-        doubts = [f"  in doubt: {text}" for text in json.loads(said.get("doubts", "[]"))]
+        texts = json.loads(said.get("doubts", "[]"))
+        queries = [one for one in json.loads(said.get("queries", "[]")) if one["text"] not in texts]
+        doubts = [f"  in doubt: {text}" for text in texts] + [f"  {one['weight']}: {one['text']}" for one in queries]
         place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
         return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *lines({self._label: self})]
 

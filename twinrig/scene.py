@@ -1,6 +1,5 @@
 """A scene as it was written, with what was checked of it; changes give a new scene, which is checked again."""
 
-import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,11 +60,11 @@ def of_table(table: Mapping[str, Any], file: str, folder: Path, changes: Mapping
 
     if not isinstance(changes, Mapping):
         raise InputError("set", "", changes, 'must be a table of dotted keys, for example {"run.step": 5e-4}')
-    changed = plain(copy.deepcopy(dict(table)))
+    changed = plain(table)
     file = file + CHANGED if changes and not file.endswith(CHANGED) else file
     for key, value in changes.items():
         put(changed, str(key), plain(value))
-    return Scene(changed, file, folder, checked(copy.deepcopy(changed), file, folder, KNOWN))
+    return Scene(changed, file, folder, checked(plain(changed), file, folder, KNOWN))
 
 
 def plain(value: Any) -> Any:

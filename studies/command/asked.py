@@ -3,13 +3,14 @@
 import os
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from models.core.errors import InputError
-from models.core.finding import Finding
+from models.core.finding import Finding, lines
 from models.core.systems import DEFAULT, SYSTEMS, listed, load
 from models.measured.file_kinds import is_measurement
 
@@ -70,6 +71,16 @@ def findings_of(scene: Any) -> tuple[Finding, ...]:
     look = getattr(plan_of(scene), "findings", None)
     own = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
     return (*(look(scene) if look else ()), *own)
+
+
+def causes(scene: Any) -> list[str]:
+    """Lines of the queries about a scene's vehicle and channels, which may be why it is refused."""
+    from models.core.strict import Query
+
+    checks = (*get_args(Query), "exchanged", "shift")
+    with suppress(InputError):
+        return lines(finding for finding in findings_of(scene) if finding.check in checks)
+    return []
 
 
 def _unended(scene: Any) -> Iterator[Finding]:
