@@ -28,6 +28,8 @@ SHORT = {
     "braking": ("braking", {"procedures.straight.speed": 1.0}, {"procedure": "straight"}),
 }
 """A shipped scene of each system, shortened, and what its run takes."""
+USUAL = {"handling": "exudyn", "measured": "mujoco", "contact": "", "wheel-rail": ""}
+"""Engines that run where none is named, if not the reference."""
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pandas", "pydantic", "matplotlib", "mujoco", "exudyn", "typer", "rich")
 
 
@@ -52,6 +54,7 @@ def test_every_system_runs_in_three_lines(system):
     run = twinrig.run(loaded, error=False, **how)
     said = f"{run}"
     assert loaded.system == system == run.data.attrs["system"] and loaded.title in said
+    assert run.data.attrs["engine"] == USUAL.get(system, "reference")
     numeric = [name for name, channel in run.data.data_vars.items() if channel.dtype.kind in "fiu"]
     assert all(f"  {name} " in said or "more: " in said for name in numeric)
     assert np.isfinite(run[numeric[0]]).all()
