@@ -5,12 +5,12 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, get_args
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.exceptions import TyperException
@@ -19,13 +19,32 @@ from models.core.errors import InputError, RunFailed
 from models.core.finding import Finding, lines, queries
 from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
-from studies.command.asked import SCENES, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
 
 app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Ground vehicles built in Exudyn, in MuJoCo and by hand, held to closed forms and to one another.",
 )
+
+
+def _say_version(wanted: bool) -> None:
+    """Print the version and end, where that is what the user wants."""
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"twinrig {version('twinrig')}")
+        raise typer.Exit()
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Options that belong to no command."""
+
 
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
 Changes = Annotated[
@@ -176,15 +195,11 @@ def run_scene(
 @contextmanager
 def _queried(scene: Any) -> Iterator[None]:
     """Where a scene is refused, tell queries about its vehicle and channels, too: they may be the cause."""
-    from models.core.strict import Query
-
     try:
         yield
     except InputError:
-        with suppress(InputError):
-            causes = (*get_args(Query), "exchanged", "shift")
-            for line in lines(finding for finding in findings_of(scene) if finding.check in causes):
-                print(line, file=sys.stderr)
+        for line in causes(scene):
+            print(line, file=sys.stderr)
         raise
 
 
@@ -300,10 +315,11 @@ def _finish(
     a broken assumption ends with code 1.
     """
     from models.core.result_folders import COMMAND, drop_if_empty
+    from models.core.told import summarised
 
     try:
         with _progress(as_json) as progress:
-            summary = _judged(work(progress))
+            summary = summarised(work(progress))
         if doubts:
             summary["queries"] = queries(doubts)
             write_whole(folder / "queries.json", json.dumps(summary["queries"], indent=1) + "\n")
@@ -318,14 +334,6 @@ def _finish(
         _print(summary, doubts)
     if summary.get("failed") or (strict and any(one["broken"] for one in summary["assumptions"].values())):
         sys.exit(1)
-
-
-def _judged(summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary with the errors and assumptions of the "results" that a study hands over, told at its end."""
-    from models.core import told
-
-    results = summary.pop("results", {})
-    return summary | told.as_json(results) | {"table": [*summary.get("table", []), *told.lines(results)]}
 
 
 def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume: Path | None) -> Path:

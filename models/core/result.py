@@ -6,7 +6,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -72,7 +72,7 @@ class Result:
     def every(self, spacing: float) -> "Result":
         """The same with rows ``spacing`` (s) apart, or all of them where they already are."""
         step = max(1, round(spacing / float(self.times[1] - self.times[0])))
-        return Result(self.data.isel(time=slice(None, None, step)), self.detail)
+        return replace(self, data=self.data.isel(time=slice(None, None, step)))
 
     @property
     def seconds(self) -> float:

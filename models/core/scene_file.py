@@ -147,21 +147,46 @@ _WHERE = re.compile(r"(.*?)(?: \(at line (\d+), column (\d+)\))?", re.DOTALL)
 def _apply(table: dict[str, Any], change: str) -> None:
     """Set one nested key from KEY.KEY=VALUE; the value is read as TOML, or as text if it is not."""
     key, equals, text = (part.strip() for part in change.partition("="))
-    *parents, last = key.split(".")
-    if not equals or not all((*parents, last)):
+    if not equals or not all(key.split(".")):
         raise InputError("--set", "", change, "must read KEY=VALUE, for example run.step=5e-4")
+    at, last = _holder(table, key, text, "--set")
+    at[last] = _value(text)
+
+
+def put(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set one nested key, as "run.step" or "manoeuvres.0.speed", to a plain value; None takes the key out.
+
+    Raises InputError for a key that leads nowhere, and for one to be taken out that is not there.
+    """
+    if not all(key.split(".")):
+        raise InputError("set", "", key, "must name a key, for example run.step")
+    at, last = _holder(table, key, value, "set")
+    if value is not None:
+        at[last] = value
+    elif isinstance(at, list) or last in at:
+        del at[last]
+    else:
+        raise InputError("set", key, None, "is not in the scene and cannot be taken out", tuple(at))
+
+
+def _holder(table: dict[str, Any], key: str, value: Any, file: str) -> tuple[Any, Any]:
+    """The table or list that holds a nested key, made where there is none, and the key's place in it.
+
+    value, file : what a message shows as offending, and where it was written.
+    """
+    *parents, last = key.split(".")
     at: Any = table
     for i, parent in enumerate(parents):
-        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_entry(at, parent, key, text)]
+        at = at.setdefault(parent, {}) if isinstance(at, dict) else at[_entry(at, parent, (file, key, value))]
         if not isinstance(at, dict | list):
-            raise InputError("--set", key, text, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
-    at[last if isinstance(at, dict) else _entry(at, last, key, text)] = _value(text)
+            raise InputError(file, key, value, f"{'.'.join(parents[: i + 1])} is a value, not a table of keys")
+    return at, last if isinstance(at, dict) else _entry(at, last, (file, key, value))
 
 
-def _entry(listed: list[Any], number: str, key: str, text: str) -> int:
-    """Place in a list, counted from 0 as in messages."""
+def _entry(listed: list[Any], number: str, written: tuple[str, str, Any]) -> int:
+    """Place in a list, counted from 0 as in messages; written : file, key and value of the change."""
     if not (number.isdecimal() and int(number) < len(listed)):
-        raise InputError("--set", key, text, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
+        raise InputError(*written, f"a list of {len(listed)} has no entry {number!r}: they count from 0")
     return int(number)
 
 

@@ -80,9 +80,13 @@ def load(path: Path, changes: Iterable[str] = (), systems: Mapping[str, System] 
     from models.core.scene_file import changed
 
     changes = list(changes)
-    table = changed(path, changes)
     file = path.name + (" with --set" if changes else "")
+    return of_table(changed(path, changes), file, path.parent, systems)
+
+
+def of_table(table: Mapping[str, Any], file: str, folder: Path, systems: Mapping[str, System] = SYSTEMS) -> Any:
+    """The checked scene of nested tables; messages name ``file``, and files that it names lie in ``folder``."""
     name = table.get("system", DEFAULT)
     if not isinstance(name, str) or name not in systems:
         raise InputError(file, "system", name, "no such system", tuple(systems))
-    return import_module(systems[name].scene).build(table, file, path.parent)
+    return import_module(systems[name].scene).build(table, file, folder)

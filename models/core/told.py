@@ -110,6 +110,12 @@ def as_json(results: Results) -> dict[str, Any]:
     }
 
 
+def summarised(summary: dict[str, Any]) -> dict[str, Any]:
+    """A study's summary with the errors and assumptions of the "results" that it hands over, told at its end."""
+    results = summary.pop("results", {})
+    return summary | as_json(results) | {"table": [*summary.get("table", []), *lines(results)]}
+
+
 def _plain(run: Result, key: str) -> dict[str, Any]:
     """An attribute without NaN and infinity, which JSON does not have."""
     said: dict[str, Any] = json.loads(run.data.attrs[key], parse_constant=lambda text: None)

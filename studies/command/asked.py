@@ -3,13 +3,14 @@
 import os
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from models.core.errors import InputError
-from models.core.finding import Finding
+from models.core.finding import Finding, lines
 from models.core.systems import DEFAULT, SYSTEMS, listed, load
 from models.measured.file_kinds import is_measurement
 
@@ -72,6 +73,16 @@ def findings_of(scene: Any) -> tuple[Finding, ...]:
     return (*(look(scene) if look else ()), *own)
 
 
+def causes(scene: Any) -> list[str]:
+    """Lines of the queries about a scene's vehicle and channels, which may be why it is refused."""
+    from models.core.strict import Query
+
+    checks = (*get_args(Query), "exchanged", "shift")
+    with suppress(InputError):
+        return lines(finding for finding in findings_of(scene) if finding.check in checks)
+    return []
+
+
 def _unended(scene: Any) -> Iterator[Finding]:
     """Remarks on the CSV files that a scene names whose last line has no line end."""
     from models.core.tables import ended
@@ -99,25 +110,25 @@ def _files(table: Any) -> Iterator[str]:
         yield table
 
 
-def engines_of(name: str | None, system: str) -> tuple[str, ...]:
-    """The engines that were asked for; none for a system that no engine computes."""
+def engines_of(name: str | None, system: str, option: str = "--engine") -> tuple[str, ...]:
+    """The engines that were asked for; none for a system that no engine computes. option : where they were named."""
     engines = KNOWN[system].engines
     if name is not None and not engines:
-        raise InputError("--engine", "", name, f"has no meaning for {system}, which no engine computes: leave it out")
+        raise InputError(option, "", name, f"has no meaning for {system}, which no engine computes: leave it out")
     if name is None or name == "all":
         return engines
     if ":" in name:
-        return _outside(name, system)
+        return _outside(name, system, option)
     named = (*engines, *KNOWN[system].on_request)
     if name not in named:
-        raise InputError("--engine", "", name, "no such engine", (*named, "all"))
+        raise InputError(option, "", name, "no such engine", (*named, "all"))
     return (name,)
 
 
-def _outside(name: str, system: str) -> tuple[str, ...]:
+def _outside(name: str, system: str, option: str) -> tuple[str, ...]:
     """An engine or an integrator from outside the tree, once it is registered."""
     if system != DEFAULT:
-        raise InputError("--engine", "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
+        raise InputError(option, "", name, f"can run scenes of {DEFAULT} only, and this one is of {system}")
     from models.engines.outside import register
 
     register(name)

@@ -2,7 +2,7 @@
 
 import csv
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -115,12 +115,24 @@ def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
         a, b = (dict(_quantities(file)) for file in files)
         notes += _alone(prefix, (files[0], a), (files[1], b))
         found += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
+    return _sorted(found, one, two), notes
+
+
+def compare_runs(one: Result, two: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
+    """The same of two results in memory, which messages and notes call by ``names``."""
+    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (one, two))
+    found = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
+    return _sorted(found, *names), _alone("", (names[0], a), (names[1], b))
+
+
+def _sorted(found: list[Difference], one: object, two: object) -> list[Difference]:
+    """The largest share first; raises InputError where there is none."""
     if not found:
         raise InputError(two, "", None, f"has no quantity in common with {one}: compare two results of one study")
-    return sorted(found, key=lambda each: -each.share), notes
+    return sorted(found, key=lambda each: -each.share)
 
 
-def _alone(prefix: str, *sides: tuple[Path, Collection[str]]) -> list[str]:
+def _alone(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
     """Notes on names that one side alone has."""
     return [
         f"{prefix}only in {path}: {', '.join(alone)}"
@@ -182,15 +194,19 @@ def _result(path: Path) -> Result | None:
 
 def _quantities(path: Path) -> Iterator[tuple[str, Quantity]]:
     """Quantities of a file by their names, with the errors that its result states."""
-    run = _result(path)
+    yield from _with_errors(_result(path), channels_of(load(path).data) if path.suffix == ".nc" else _table(path))
+
+
+def _with_errors(run: Result | None, quantities: Iterable[tuple[str, Quantity]]) -> Iterator[tuple[str, Quantity]]:
+    """Quantities with the errors that the result of which they are states."""
     errors = {} if run is None else errors_of(run)
-    for name, quantity in _netcdf(path) if path.suffix == ".nc" else _table(path):
+    for name, quantity in quantities:
         stated = errors.get(name.partition(", ")[0])
         yield name, quantity if stated is None else replace(quantity, error=stated.error)
 
 
-def _netcdf(path: Path) -> Iterator[tuple[str, Quantity]]:
-    data = load(path).data
+def channels_of(data: Any) -> Iterator[tuple[str, Quantity]]:
+    """Channels of numbers of a dataset, a quantity for each of their rows along time or another axis."""
     kinds = ", ".join(str(data.attrs[kind]) for kind in KINDS if kind in data.attrs)
     for name, channel in data.data_vars.items():
         if channel.dtype.kind not in "fiu" or channel.size == 0:
@@ -251,7 +267,7 @@ def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
+def _difference(name: str, one: Quantity, two: Quantity, file: object) -> Difference:
     """Raises InputError where kinds of runs, units or rows do not fit."""
     if one.kind != two.kind:
         raise InputError(file, name, two.kind, f"the other run is of {one.kind}: compare two runs of one kind")
@@ -271,7 +287,7 @@ def _difference(name: str, one: Quantity, two: Quantity, file: Path) -> Differen
     return _in_time(name, one, two, file)
 
 
-def _in_time(name: str, one: Quantity, two: Quantity, file: Path) -> Difference:
+def _in_time(name: str, one: Quantity, two: Quantity, file: object) -> Difference:
     """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
@@ -310,9 +326,14 @@ def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
         "names": [each.name for each in found],
         "differences": {name: [getattr(each, name) for each in found] for name in ("largest", "rms", "at", "share")},
         "within the stated error": [each.name for each in found if each.within],
-        "table": [*_lines(found), *(f"  {note}" for note in notes)],
+        "table": lines(found, notes),
         "results": results,
     }
+
+
+def lines(found: list[Difference], notes: list[str]) -> list[str]:
+    """Lines for the screen: what differs most, and the notes."""
+    return [*_lines(found), *(f"  {note}" for note in notes)]
 
 
 def _lines(found: list[Difference]) -> list[str]:

@@ -1,0 +1,266 @@
+"""What users call: load, run, compare, price, choose, validate; thin, on what the command line has, too.
+
+Heavy packages are imported by the functions that use them.
+"""
+
+import io
+import json
+from collections.abc import Mapping
+from contextlib import contextmanager, redirect_stdout
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from models.core.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from twinrig.report import Report
+    from twinrig.result import Result
+    from twinrig.scene import Scene
+
+AnyScene: TypeAlias = "str | Path | Mapping[str, Any] | Scene"
+"""A shipped scene's name, a file, a table, or a loaded scene."""
+Changes: TypeAlias = "Mapping[str, Any] | None"
+"""Values by dotted keys, as ``{"run.step": 5e-4}``."""
+PARTS = {
+    "braking": ("procedure", "procedures"),
+    "handling": ("manoeuvre", "manoeuvres"),
+    "wheel-rail": ("case", "cases"),
+}
+"""By system: the option of its run that names one of several drives, and the table of the scene that has them."""
+
+
+def load(scene: AnyScene, set: Changes = None) -> "Scene":
+    """Read and check a scene of any system; nothing is run.
+
+    set : values by dotted keys that replace those of the scene; None as a value takes a key out. Files that a table
+    names are looked for in the current folder. Raises InputError that names place, value and what is allowed.
+    """
+    from models.core.scene_file import parse
+    from studies.command.asked import scene_path
+    from twinrig.scene import Scene, of_table
+
+    if isinstance(scene, Scene):
+        return scene.with_(set) if set else scene
+    if isinstance(scene, Mapping):
+        return of_table(scene, "table", Path(), set or {})
+    if not isinstance(scene, str | Path):
+        raise InputError("", "scene", None, f"must be a name, a file, a table or a scene, not a {type(scene).__name__}")
+    if str(scene).endswith(".nc"):
+        raise InputError(scene, "", None, "is no scene; twinrig.read reads a saved result")
+    path = scene_path(str(scene))
+    return of_table(parse(path), path.name, path.parent, set or {})
+
+
+def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool = True, **how: Any) -> "Result":
+    """Run a scene in one engine, the usual one of its system if none is named, and save nothing.
+
+    set : as in ``load``; error : whether the error of steps or cells is estimated, by further runs, which cost about
+    half as much as the run; how : what the system's run takes besides, such as ``procedure`` of braking, ``manoeuvre``
+    of handling, ``case`` of wheel and rail, or ``speed`` (m/s) of a wheelset. Raises InputError before anything is run,
+    RunFailed where there is no answer. What is unlikely of the input, such as a mass in tonnes, stands in the result.
+    """
+    from models.core.finding import gathered, queries
+    from models.systems import run as run_system
+    from studies.command.asked import findings_of, plan_of
+    from twinrig.result import Result
+
+    loaded = load(scene, set).checked
+    options = _options(loaded)
+    _check_how(loaded, how, options)
+    chosen, checked = _engines(loaded, engine, options["engine"].default == "")
+    with _as_library(loaded):
+        plan_of(loaded).check(loaded, checked)
+        doubtful = queries(gathered(findings_of(loaded)))
+        answer = run_system(loaded, chosen, error=error, **how)
+    answer.data.attrs["queries"] = json.dumps(doubtful)
+    return Result(answer.data, answer.detail)
+
+
+def _options(scene: Any) -> Mapping[str, Any]:
+    """Parameters of the run of a scene's system; InputError where the system has none."""
+    from importlib import import_module
+
+    from models.core.systems import SYSTEMS
+
+    if scene.system not in SYSTEMS:
+        raise InputError(
+            scene.file, "system", scene.system, "is drawn by its study; use the command twinrig run", tuple(SYSTEMS)
+        )
+    return signature(import_module(f"{SYSTEMS[scene.system].package}.run").run).parameters
+
+
+def _check_how(scene: Any, how: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+    """Refuse options that the run of this system does not have, and drives that the scene does not have."""
+    names = (*(name for name in options if name not in ("scene", "engine", "error")), "engine", "error", "set")
+    for name in how:
+        if name not in names:
+            raise InputError("run", name, None, f"is no option of a run of {scene.system}", names)
+    option, table = PARTS.get(scene.system, ("", ""))
+    if how.get(option) is not None and how[option] not in getattr(scene, table):
+        raise InputError(scene.file, option, how[option], f"is not among {table}", tuple(getattr(scene, table)))
+
+
+def _engines(scene: Any, asked: str, optional: bool) -> tuple[str, tuple[str, ...]]:
+    """The engine of a run, "" where the system chooses it, and those for which the scene is checked."""
+    from studies.command.asked import engines_of
+
+    named = asked or getattr(getattr(scene, "run", None), "engine", None) or None
+    engines = engines_of(named, scene.system, "engine")
+    if asked and len(engines) != 1:
+        allowed = "a result is of one engine: run each, and lay two beside each other with twinrig.compare"
+        raise InputError("engine", "", asked, allowed, engines)
+    if len(engines) == 1:
+        return engines[0], engines
+    if optional or not engines:
+        return "", engines
+    usual = "reference" if "reference" in engines else engines[0]
+    return usual, (usual,)
+
+
+@contextmanager
+def _as_library(scene: Any = None) -> "Iterator[None]":
+    """Messages that name an option of the command line name the argument instead.
+
+    What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
+    """
+    from studies.command.asked import causes
+
+    try:
+        yield
+    except InputError as error:
+        if error.file.startswith("--"):
+            renamed = InputError(error.file.lstrip("-"), error.place, error.value, error.allowed, error.choices)
+            raise renamed from None
+        for line in causes(scene) if scene is not None else ():
+            error.add_note(line)
+        raise
+
+
+def read(path: str | Path) -> "Result":
+    """Read a result that ``Result.save`` or the command line has saved; raises InputError for another file."""
+    from models.core.result import load as load_result
+    from twinrig.result import Result
+
+    return Result(load_result(Path(path)).data)
+
+
+def compare(one: "Result | str | Path", two: "Result | str | Path") -> "Report":
+    """Lay two results of one kind beside each other: differences of all quantities, those that differ most first.
+
+    Each is a result or the file of a saved one. The detail is a list of ``Difference``: ``two`` less ``one``, with the
+    place where it is largest and whether it lies within the errors that both state. Raises InputError for results that
+    have nothing in common.
+    """
+    from studies.command.comparison import compare_runs, lines
+    from twinrig.report import Report
+
+    names = (_name(one, "the first"), _name(two, "the second"))
+    found, notes = compare_runs(_result(one), _result(two), names)
+    values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in found}
+    return Report((f"{names[1]} less {names[0]}", *lines(found, notes)), values, found)
+
+
+def _result(given: Any) -> "Result":
+    from models.core.result import Result as SavedResult
+
+    if isinstance(given, SavedResult):
+        return given  # type: ignore[return-value]
+    if isinstance(given, str | Path) and Path(given).suffix == ".nc":
+        return read(given)
+    raise InputError("compare", "", str(given), "is no result: give what twinrig.run returns, or a saved file (.nc)")
+
+
+def _name(given: Any, otherwise: str) -> str:
+    if isinstance(given, str | Path):
+        return str(given)
+    engine = getattr(given, "data", None) is not None and given.data.attrs.get("engine")
+    return f"{otherwise} ({engine})" if engine else otherwise
+
+
+def price(
+    scene: AnyScene, tolerance: float, quantity: str | None = None, engine: str = "all", *, set: Changes = None
+) -> "Report":
+    """Find the cheapest engine, integrator and step that hold a quantity of a scene to a tolerance, by runs.
+
+    tolerance : largest error that is allowed, in the quantity's unit; quantity : channels, as "f1,f2", if not the usual
+    one of the system; engine : one, or all. The detail is the ``Recommendation``. Raises InputError for scenes that
+    have no steps to choose, RunFailed where nothing is known.
+    """
+    from models.advice.price.recommendation import price as recommended
+    from models.advice.price.text import as_dict, lines
+    from studies.command.asked import engines_of
+    from twinrig.report import Report
+
+    loaded = load(scene, set).checked
+    with _as_library(loaded):
+        answer = recommended(loaded, tolerance, quantity, engines_of(engine, loaded.system, "engine"))
+    return Report(tuple(lines(answer)), as_dict(answer), answer)
+
+
+def choose(
+    scene: AnyScene,
+    quantities: "list[str] | None" = None,
+    tolerance: float | None = None,
+    engine: str = "all",
+    *,
+    set: Changes = None,
+    folder: str | Path | None = None,
+) -> "Report":
+    """Choose the effects of a scene that its quantities call for within a relative tolerance, by runs.
+
+    quantities, tolerance : those of the scene where None; a scene of another study needs both. folder : new or empty,
+    where figures, tables and the reduced scene are kept; else they are dropped. The values are those of ``twinrig run
+    --json``. Raises InputError.
+    """
+    from tempfile import TemporaryDirectory
+
+    from models.core.told import summarised
+    from studies.command.asked import engines_of, ready
+    from twinrig.report import Report
+
+    loaded = _choosing(load(scene, set), quantities, tolerance).checked
+    engines = engines_of(engine, loaded.system, "engine")
+    with _as_library(loaded), TemporaryDirectory() as temporary:
+        study = ready(loaded, engines)
+        kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
+        summary = summarised(study.run(loaded, engines, kept, lambda text, share: None))
+    return Report((loaded.title, *summary["table"]), summary)
+
+
+def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float | None) -> "Scene":
+    """The scene with the study that makes a choice."""
+    asked = {"quantities": quantities, "tolerance": tolerance}
+    changes: dict[str, Any] = {key: value for key, value in asked.items() if value is not None}
+    study = scene.checked.CHOOSING
+    if scene.checked.study != study:
+        for key, value in asked.items():
+            if value is None:
+                raise InputError("choose", key, None, "is missing: this scene asks for no choice of its own")
+        changes |= {"study": study, **({"options": None} if "options" in scene.table else {})}
+    return scene.with_(changes) if changes else scene
+
+
+def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
+    """Run the validation cases and write the report into a folder, a new one in ``results`` if none is named.
+
+    quick : the named short subset, about a minute. The values are those of ``results.json``; the detail is the number
+    of failed rows. Cases run in processes of their own: a script calls it below ``if __name__ == "__main__":``.
+    """
+    from twinrig.report import Report
+    from validation.run import validate as run_all
+
+    kept = _new_folder(folder, "validate-quick" if quick else "validate")
+    with redirect_stdout(io.StringIO()) as printed:
+        failed = run_all(kept, quick, f"twinrig.validate(quick={quick})")
+    values = json.loads((kept / "results.json").read_text(encoding="utf-8"))
+    return Report(tuple(printed.getvalue().splitlines()), {"folder": str(kept), "results": values}, failed)
+
+
+def _new_folder(wanted: str | Path | None, name: str) -> Path:
+    from models.core.result_folders import new_folder
+
+    with _as_library():
+        return new_folder(None if wanted is None else Path(wanted), name)

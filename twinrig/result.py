@@ -1,0 +1,166 @@
+"""The result of a run as users meet it: it prints itself, shows itself in a notebook, plots, and becomes a table."""
+
+import json
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from models.core import result as saved
+from models.core.assumptions import Broken, assumed_of, broken_of
+from models.core.discretisation import Estimate, errors_of
+from models.core.errors import InputError
+from models.core.told import lines, remarks
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+SHOWN = 20
+"""Channels with a row of their own in a summary; further ones are named."""
+WRAPPED = 90
+"""Characters in a line of a plot's title."""
+
+
+@dataclass(frozen=True, repr=False)
+class Result(saved.Result):
+    """One run; ``result["f1"]`` is a channel's array, ``result.data`` the xarray Dataset with units and meanings."""
+
+    def __getitem__(self, channel: str) -> np.ndarray:
+        """Values of a channel or of an axis; raises InputError that offers the nearest name."""
+        self._check(channel)
+        return super().__getitem__(channel)
+
+    def _check(self, *channels: str) -> None:
+        names = tuple(str(name) for name in self.data.variables)
+        for channel in channels:
+            if channel not in names:
+                raise InputError("", "channel", channel, "no such channel", names)
+
+    @property
+    def errors(self) -> dict[str, Estimate]:
+        """Estimated errors by channel, with their units; empty where none was made."""
+        return errors_of(self)
+
+    @property
+    def broken(self) -> list[Broken]:
+        """Assumptions that the run broke, each with where, how long, how far, and the remedy."""
+        return broken_of(self)
+
+    @property
+    def assumed(self) -> list[str]:
+        """Assumptions that the run was judged by."""
+        return assumed_of(self)
+
+    @property
+    def _label(self) -> str:
+        return str(self.data.attrs.get("engine") or self.data.attrs.get("system", "result"))
+
+    def _said(self) -> list[str]:
+        """Status, counts, doubts about the run and its input, error and broken assumptions."""
+        said = self.data.attrs
+        counts = ", ".join(f"{count} {name}" for name, count in json.loads(said.get("counts", "{}")).items())
+        seconds = f"{said['seconds']:.3f} s" if said.get("seconds") else ""
+        parts = "; ".join(part for part in (str(said.get("status", "")), counts, seconds) if part)
+        texts = json.loads(said.get("doubts", "[]"))
+        queries = [one for one in json.loads(said.get("queries", "[]")) if one["text"] not in texts]
+        doubts = [f"  in doubt: {text}" for text in texts] + [f"  {one['weight']}: {one['text']}" for one in queries]
+        place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
+        return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *lines({self._label: self})]
+
+    def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
+        """Name, unit, axes, least, largest and meaning of each channel."""
+        rows = []
+        for name, channel in self.data.data_vars.items():
+            axes = " x ".join(f"{axis} {size}" for axis, size in channel.sizes.items())
+            limits = _limits(channel.values)
+            unit, meaning = (str(channel.attrs.get(key, "")) for key in ("units", "long_name"))
+            rows.append((str(name), unit or "-", axes or "-", *limits, meaning))
+        return rows
+
+    def __repr__(self) -> str:
+        heads = ("channel", "unit", "axes", "least", "largest", "meaning")
+        rows = [heads, *self._rows()]
+        widths = [max(len(row[i]) for row in rows[: SHOWN + 1]) for i in range(len(heads))]
+        table = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows[: SHOWN + 1]]
+        more = [row[0] for row in rows[SHOWN + 1 :]]
+        rest = [f"  and {len(more)} more: {', '.join(more)}"] if more else []
+        return "\n".join([str(self.data.attrs.get("title", "")), *self._said(), *table, *rest])
+
+    def _repr_html_(self) -> str:
+        title = escape(str(self.data.attrs.get("title", "")))
+        said = "<br>".join(escape(line.strip()) for line in self._said())
+        heads = "".join(f"<th>{head}</th>" for head in ("channel", "unit", "axes", "least", "largest", "meaning"))
+        rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in self._rows())
+        return f"<p><b>{title}</b><br>{said}</p><table><tr>{heads}</tr>{rows}</table>"
+
+    def plot(self, *channels: str, axes: "Axes | None" = None) -> "Axes":
+        """Draw channels of one unit over their axis, a line for each row of what has several; returns the axes.
+
+        axes : of matplotlib, into which lines are drawn; new ones if there are none. What the run broke stands in the
+        title. Raises InputError for unknown channels, for text, and for channels of several units.
+        """
+        from studies.command.comparison import channels_of
+
+        if not channels:
+            raise InputError("", "plot", None, "name one channel or more", tuple(map(str, self.data.data_vars)))
+        self._check(*channels)
+        curves = dict(channels_of(self.data.reset_coords()[list(channels)]))
+        kinds = {(curve.unit, curve.over) for curve in curves.values()}
+        if len(kinds) != 1:
+            told = " and ".join(sorted(f"{unit or '-'} over {over}" for unit, over in kinds)) or "text"
+            raise InputError("", "plot", ", ".join(channels), f"holds {told}: plot numbers of one unit at a time")
+        if axes is None:
+            from matplotlib import pyplot
+
+            axes = pyplot.subplots(layout="constrained")[1]
+        for name, curve in curves.items():
+            axes.plot(curve.grid, curve.values, "o" if len(curve.grid) == 1 else "-", label=name)
+        ((unit, over),) = kinds
+        meaning = str(self.data[channels[0]].attrs.get("long_name", "")) if len(channels) == 1 else ""
+        axes.set(xlabel=over, ylabel=f"{meaning or ', '.join(channels)} [{unit or '-'}]")
+        self._head(axes)
+        if len(curves) > 1:
+            axes.legend()
+        return axes
+
+    def _head(self, axes: "Axes") -> None:
+        """Title of the scene, the engine, and what the run must be doubted for."""
+        from textwrap import fill
+
+        texts = (f"{self.data.attrs.get('title', '')}, {self._label}", *remarks({self._label: self}))
+        axes.set_title("\n".join(fill(text, WRAPPED) for text in texts), fontsize="small")
+
+    def to_pandas(self, *channels: str) -> "pd.DataFrame":
+        """Channels that lie over the same axes as columns of a table, all of them if none is named.
+
+        The index holds the axes; units stand in ``frame.attrs["units"]``. Raises InputError for channels over different
+        axes.
+        """
+        self._check(*channels)
+        chosen = self.data[list(channels)] if channels else self.data
+        axes: dict[tuple[str, ...], list[str]] = {}
+        for name, channel in chosen.data_vars.items():
+            axes.setdefault(tuple(map(str, channel.dims)), []).append(str(name))
+        if len(axes) > 1:
+            groups = "; ".join(
+                f"over {', '.join(dims) or 'nothing'}: {', '.join(names)}" for dims, names in axes.items()
+            )
+            raise InputError("", "to_pandas", None, f"name channels that lie over the same axes ({groups})")
+        frame = chosen.to_dataframe() if next(iter(axes), ()) else chosen.expand_dims("row").to_dataframe()
+        frame.attrs["units"] = {str(name): str(c.attrs.get("units", "")) for name, c in chosen.variables.items()}
+        return frame
+
+    def to_xarray(self) -> "xr.Dataset":
+        """A copy of all channels with their axes, units and meanings."""
+        return self.data.copy(deep=True)
+
+
+def _limits(values: np.ndarray) -> tuple[str, str]:
+    """Least and largest finite number of a channel, as text."""
+    if values.dtype.kind not in "fiub":
+        return "text", ""
+    finite = values[np.isfinite(values)]
+    return (f"{finite.min():.5g}", f"{finite.max():.5g}") if finite.size else ("none", "none")

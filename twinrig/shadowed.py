@@ -1,0 +1,22 @@
+"""Notice files of the user's that stand in the way of twinrig's packages of the same name."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+PACKAGES = ("models", "studies", "validation")
+"""What lies beside this package."""
+
+
+def check() -> None:
+    """Raise ImportError where Python would import another ``models``, ``studies`` or ``validation`` than twinrig's."""
+    beside = Path(__file__).resolve().parents[1]
+    for name in PACKAGES:
+        spec = find_spec(name)
+        place = Path(spec.origin).resolve() if spec is not None and spec.origin else None
+        if place is None:
+            raise ImportError(f"twinrig needs its package {name!r} in {beside}, which is not on Python's path")
+        if place != beside / name / "__init__.py":
+            hides = place.parent if place.name == "__init__.py" else place
+            raise ImportError(
+                f"{hides} hides twinrig's package {name!r}: rename it, or start Python in another folder", name=name
+            )
