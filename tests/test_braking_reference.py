@@ -20,7 +20,6 @@ from validation.braking import plain_sprung as whole
 from validation.braking.plain_relaxation import turn_apart
 from validation.braking.sprung_box import box, car
 from validation.cases import braking_reference as case
-from validation.faults import braking_reference as faults
 
 
 @pytest.mark.parametrize("name", case.LAWS)
@@ -126,16 +125,3 @@ def test_the_plain_code_holds_no_compiled_function():
     names = [f"models.brake.plain.{path.stem}" for path in Path(plain.__file__).parent.glob("*.py")]
     for name in (*names, "models.engines.braking_sprung_plain"):
         assert not [key for key, value in vars(import_module(name)).items() if hasattr(value, "py_func")], name
-
-
-@pytest.mark.full
-def test_every_vehicle_in_every_engine_at_a_hundred_states_and_along_a_second(tmp_path):
-    rows, _ = case.measure(False, tmp_path)
-    assert not [row for row in rows if row.status != "passed"] and len(rows) == 5 + 1 + 3 + 2 * 6
-
-
-@pytest.mark.full
-def test_every_planted_fault_is_seen_and_nothing_without_a_fault():
-    clean, *planted = faults.CAMPAIGN.measure()
-    assert max(clean["ratios"].values()) < 1.0
-    assert not [own["fault"] for own in planted if max(own["ratios"].values()) <= 1.0]
