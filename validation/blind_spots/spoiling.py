@@ -106,9 +106,12 @@ def _scaled(values):
 
 def _records(kind: types.Record) -> Any:
     """A compiled function that puts the numbers of an array of such records 1 % off."""
-    lines = "".join(f"        one.{name} = FACTOR * one.{name}\n" for name in kind.fields)
+    lines = "".join(f"        record.{name} = FACTOR * record.{name}\n" for name in kind.fields)
     names = {"np": np, "FACTOR": FACTOR}
-    exec(f"def whole(values):\n    for place in np.ndindex(values.shape):\n        one = values[place]\n{lines}", names)
+    exec(
+        f"def whole(values):\n    for place in np.ndindex(values.shape):\n        record = values[place]\n{lines}",
+        names,
+    )
     return names["whole"]
 
 

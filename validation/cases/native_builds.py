@@ -89,7 +89,7 @@ def _seconds(car: CutVehicle) -> list[Row]:
                 built.run()
                 best[route] = min(best.get(route, float("inf")), time.process_time() - begun)
         ratio = best["native"] / best["compiled"]
-        quantity = f"seconds of a step in {engine} with springs of its own by those with compiled forces"
+        quantity = f"ratio of seconds of a step in {engine} with springs of its own to those with compiled forces"
         why = "the machine decides; a second tree for the mounts" if engine == "exudyn" else "the machine decides"
         rows.append(
             Observed(f"native_builds.seconds_{engine}", SYSTEM, quantity, ratio, "1").beside(usual, why, "none")
