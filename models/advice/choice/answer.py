@@ -63,17 +63,17 @@ def sizes(full: Sequence[np.ndarray]) -> np.ndarray:
 
     A case that hardly moves beside the others is held to what it is of them.
     """
-    found = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full])
-    return np.maximum(found, HARDLY * found.max(initial=0.0))
+    amounts = np.array([np.std(case) if len(case) > 1 else abs(float(case[0])) for case in full])
+    return np.maximum(amounts, HARDLY * amounts.max(initial=0.0))
 
 
 def rounding(answer: Answer, unit: str) -> float:
     """Size up to which a quantity of a unit does not move, but for rounding."""
     alike = [
-        np.sqrt(case.max()) if one.sampled else abs(case).max(initial=0.0)
-        for one in answer.quantities.values()
-        if one.unit == unit
-        for case in one.cases
+        np.sqrt(case.max()) if quantity.sampled else abs(case).max(initial=0.0)
+        for quantity in answer.quantities.values()
+        if quantity.unit == unit
+        for case in quantity.cases
     ]
     return max(NOTHING, ROUNDING * float(max(alike, default=0.0)))
 
@@ -89,22 +89,22 @@ def by_chance(change: Cases, full: Cases) -> tuple[float, float]:
     from it, times Student's t for m - 1.
     """
     worst = 0.0, 0.0
-    for moved, own in zip(change, full, strict=True):
-        ratio = 1.0 + moved.mean() / own.mean()
+    for moved, unmoved in zip(change, full, strict=True):
+        ratio = 1.0 + moved.mean() / unmoved.mean()
         if not ratio > 0.0:  # nothing is left, or no mean square at all
-            return (1.0, 0.0) if not (moved + own).any() else (np.inf, np.inf)
-        rest, m = moved - (ratio - 1.0) * own, len(own)
-        error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * own.mean()) / (2.0 * np.sqrt(ratio))
+            return (1.0, 0.0) if not (moved + unmoved).any() else (np.inf, np.inf)
+        rest, m = moved - (ratio - 1.0) * unmoved, len(unmoved)
+        error = float(stdtrit(m - 1, SURE)) * rest.std(ddof=1) / (np.sqrt(m) * unmoved.mean()) / (2.0 * np.sqrt(ratio))
         worst = max(worst, (float(abs(np.sqrt(ratio) - 1.0)), float(error)), key=sum)
     return worst
 
 
-def less(one: Cases, full: Cases) -> Cases:
+def less(run: Cases, full: Cases) -> Cases:
     """Differences of two runs at the times that both have: the longer step's, every so many of the shorter one's.
 
     Raises InputError where the runs have no common times, as those that end by themselves.
     """
-    for few, many in (sorted(map(len, pair)) for pair in zip(one, full, strict=True)):
+    for few, many in (sorted(map(len, pair)) for pair in zip(run, full, strict=True)):
         if few != many and (few < 2 or (many - 1) % (few - 1)):
             raise InputError(
                 "",
@@ -113,7 +113,7 @@ def less(one: Cases, full: Cases) -> Cases:
                 "paths of runs that end by themselves cannot be compared: ask for "
                 "'rms' or 'max' of them, or for another number",
             )
-    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(one, full, strict=True))
+    return tuple(np.subtract(*_thinned(*pair)) for pair in zip(run, full, strict=True))
 
 
 def _thinned(*paths: np.ndarray) -> list[np.ndarray]:
@@ -129,7 +129,7 @@ def added(*changes: Cases) -> Cases:
 
 def relative(change: Cases, size: np.ndarray) -> float:
     """Largest relative change of all cases: rms of a path's difference, or a number's, by its size."""
-    moved = np.array([float(np.sqrt(np.mean(one**2))) for one in change])
+    moved = np.array([float(np.sqrt(np.mean(difference**2))) for difference in change])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(size > 0.0, moved / size, np.where(moved > 0.0, np.inf, 0.0))
     return float(share.max()) if np.isfinite(moved).all() else np.inf

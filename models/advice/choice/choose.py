@@ -131,12 +131,12 @@ class Chooser:
 
     def _longest(self, screen: Screen, chosen: Set, lengths: list[int], allowed: float) -> tuple[int, np.ndarray]:
         """Longest of ``lengths`` whose changes are allowed, and these (quantities,); by halving, the first always."""
-        low, high, found = 0, len(lengths), np.zeros(len(screen.quantities))
+        low, high, shares = 0, len(lengths), np.zeros(len(screen.quantities))
         while high - low > 1:
             middle = (low + high) // 2
             tried = screen.of_step(chosen, lengths[middle] // lengths[0])
-            low, high, found = (middle, high, tried) if (tried <= allowed).all() else (low, middle, found)
-        return lengths[low], found
+            low, high, shares = (middle, high, tried) if (tried <= allowed).all() else (low, middle, shares)
+        return lengths[low], shares
 
     def share(self, chosen: Set) -> float:
         """Largest predicted change, with what may be left out of it, by the tolerance; infinite where an assumption
@@ -152,7 +152,7 @@ class Chooser:
         runs = self.screen.variants
         if len(chosen) <= 2:
             return bool(runs.breaks(chosen))
-        return any(all(runs.breaks(frozenset([one, other])) for other in chosen - {one}) for one in chosen)
+        return any(all(runs.breaks(frozenset([effect, other])) for other in chosen - {effect}) for effect in chosen)
 
     def reach(self, chosen: Set) -> int:
         """Longest step, by the scene's own, that the predictions allow without these effects."""
@@ -173,14 +173,14 @@ class Chooser:
             for times in [k for k in reversed(self.whole.variants.lengths()) if k <= longest][: 1 + SHORTER]:
                 self.rounds += 1
                 change = self.whole.between(self.whole.variants.of(chosen, times), self.whole.variants.of())
-                found, chance = self.whole.shares(change), self.whole.chance(change)
+                shares, chance = self.whole.shares(change), self.whole.chance(change)
                 if self.whole.variants.breaks(chosen, times):
-                    found = np.full_like(found, np.inf)
-                self._confirmed[chosen] = times, found, chance
-                if self.holds(found + chance):
+                    shares = np.full_like(shares, np.inf)
+                self._confirmed[chosen] = times, shares, chance
+                if self.holds(shares + chance):
                     break
-                if (found < self.tolerance).all():
-                    self._doubtful.append(float(np.max(chance / (self.tolerance - found)) ** 2))
+                if (shares < self.tolerance).all():
+                    self._doubtful.append(float(np.max(chance / (self.tolerance - shares)) ** 2))
         return np.add(*self._confirmed[chosen][1:])
 
     def holds(self, changes: np.ndarray) -> bool:
@@ -191,7 +191,7 @@ class Chooser:
         """Whether it holds to leave these out, and takes less work than what is kept does at the steps that hold."""
         if not self.holds(self.confirm(further)):
             return False
-        work = [self.whole.variants.work(one, self._confirmed[one][0]) for one in (further, kept)]
+        work = [self.whole.variants.work(effects, self._confirmed[effects][0]) for effects in (further, kept)]
         return work[0] < work[1]
 
     def choose(self) -> Choice:
@@ -229,7 +229,7 @@ class Chooser:
         )
 
     def _choice(self, chosen: Set) -> Choice:
-        times, found, chance = self._confirmed[chosen]
+        times, shares, chance = self._confirmed[chosen]
         none: Set = frozenset()
         shown = [(none, 1), (none, self._confirmed[none][0]), (chosen, times)]
         calls = [run.counts["calls"] for key in shown if (run := self.whole.variants.of(*key)) is not None]
@@ -240,9 +240,9 @@ class Chooser:
             times,
             self.told(chosen, times),
             self.teller.remainder(chosen),
-            found,
+            shares,
             chance,
-            self.holds(found + chance),
+            self.holds(shares + chance),
             tuple(calls),
             tuple(count * seconds for count, seconds in zip(calls, each, strict=True)),
             self.rounds,
@@ -254,12 +254,12 @@ class Chooser:
 
     def _spent(self) -> int:
         """Calls of all runs so far."""
-        return sum({id(one): one.variants.calls for one in (self.whole, self.teller, self.screen)}.values())
+        return sum({id(screen): screen.variants.calls for screen in (self.whole, self.teller, self.screen)}.values())
 
     def _exhausted(self) -> bool:
         """Whether the search has taken as many calls as it may; from then on it has ``ended``."""
-        own = self.whole.variants.of()
-        share = self._spent() / (RUNS * own.counts["calls"]) if own else 1.0
+        whole_run = self.whole.variants.of()
+        share = self._spent() / (RUNS * whole_run.counts["calls"]) if whole_run else 1.0
         self.ended = self.ended or share >= 1.0
         self.progress(min(share, 1.0))
         return self.ended
@@ -280,18 +280,18 @@ class Chooser:
         """Largest predicted change if an effect that stayed went, too: above, as a tolerance, it would matter no more.
 
         Only those that may go, and whose going would save anything at the same step."""
-        found, times = {}, self.reach(chosen) // self.own
+        shares, times = {}, self.reach(chosen) // self.own
         for effect in self.effects:
             further = chosen | {effect}
             if effect not in chosen and self.screen.variants.work(further, times) < self.work(chosen):
-                found[effect] = self.share(further) * self.tolerance
-        return {effect: change for effect, change in found.items() if math.isfinite(change)}
+                shares[effect] = self.share(further) * self.tolerance
+        return {effect: change for effect, change in shares.items() if math.isfinite(change)}
 
     def path(self, kept: list[Set], banned: set[Set]) -> list[Set]:
         """The path that goes on from a kept one, step by step, as far as predictions allow."""
         path = list(kept)
         while True:
-            step = self._next(path[-1], banned, [frozenset([one]) for one in self.effects])
+            step = self._next(path[-1], banned, [frozenset([effect]) for effect in self.effects])
             step = step or self._next(path[-1], banned, self._promising())
             if not step:
                 return path
@@ -300,9 +300,9 @@ class Chooser:
     def _promising(self) -> list[Set]:
         """Pairs of which at least one breaks the budget alone, while both together hold it."""
         if self._pairs is None:
-            alone = {one: self.share(frozenset([one])) for one in self.effects}
-            pairs = [pair for pair in combinations(self.effects, 2) if max(alone[one] for one in pair) > BUDGET]
-            pairs.sort(key=lambda pair: sum(alone[one] for one in pair))
+            alone = {effect: self.share(frozenset([effect])) for effect in self.effects}
+            pairs = [pair for pair in combinations(self.effects, 2) if max(alone[effect] for effect in pair) > BUDGET]
+            pairs.sort(key=lambda pair: sum(alone[effect] for effect in pair))
             self._pairs = [
                 frozenset(pair) for pair in pairs if not self._exhausted() and self.share(frozenset(pair)) <= BUDGET
             ]

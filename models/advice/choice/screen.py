@@ -31,12 +31,12 @@ class Screen:
         full = variants.of()
         if full is None:  # tells why
             full = variants.system.answer(variants.scene, variants.engine)
-        found = {name: full.of(name, variants.scene.file) for name in quantities}
-        self.full = {name: quantity.cases for name, quantity in found.items()}
-        self.sizes = {name: quantity.sizes for name, quantity in found.items()}
-        self.sampled = {name for name, quantity in found.items() if quantity.sampled}
+        quantities_by_name = {name: full.of(name, variants.scene.file) for name in quantities}
+        self.full = {name: quantity.cases for name, quantity in quantities_by_name.items()}
+        self.sizes = {name: quantity.sizes for name, quantity in quantities_by_name.items()}
+        self.sampled = {name for name, quantity in quantities_by_name.items() if quantity.sampled}
         for name, size in self.sizes.items():
-            if not (np.isfinite(size).all() and (size > rounding(full, found[name].unit)).any()):
+            if not (np.isfinite(size).all() and (size > rounding(full, quantities_by_name[name].unit)).any()):
                 self._refuse(name, "does not move in this scene, so that there is nothing to hold it to")
         for name in self.sampled:
             share = max(float(case.max() / case.sum()) for case in self.full[name])
@@ -48,12 +48,12 @@ class Screen:
     def _refuse(self, name: str, why: str) -> NoReturn:
         raise InputError(self.variants.scene.file, f"quantities.{name}", None, why)
 
-    def between(self, one: Answer | None, other: Answer | None) -> Changes | None:
+    def between(self, run: Answer | None, other: Answer | None) -> Changes | None:
         """Differences of two runs, quantity by quantity; None where one of them is missing."""
-        if one is None or other is None:
+        if run is None or other is None:
             return None
         try:
-            return {name: less(one.of(name).cases, other.of(name).cases) for name in self.quantities}
+            return {name: less(run.of(name).cases, other.of(name).cases) for name in self.quantities}
         except InputError as error:
             if "rms" in error.allowed and "ends" not in error.allowed:
                 return None  # what is left has no such quantity
@@ -83,9 +83,9 @@ class Screen:
         """d of an effect."""
         return self.change(frozenset([effect]))
 
-    def second(self, one: str, two: str) -> Changes | None:
+    def second(self, first: str, two: str) -> Changes | None:
         """e of a pair."""
-        sets = map(frozenset, ((one, two), (one,), (two,)))
+        sets = map(frozenset, ((first, two), (first,), (two,)))
         both, *singles = (self.change(effects) for effects in sets)
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:
@@ -110,7 +110,7 @@ class Screen:
         none = np.zeros(len(self.quantities))
         if len(chosen) <= 2:
             return none
-        first = np.sum([self.shares(self.alone(one)) for one in chosen], axis=0)
+        first = np.sum([self.shares(self.alone(effect)) for effect in chosen], axis=0)
         second = np.sum([self.shares(self.second(*pair)) for pair in combinations(sorted(chosen), 2)], axis=0)
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
             return none  # the set was run itself
@@ -124,4 +124,4 @@ class Screen:
 
 
 def _minus(cases: Cases) -> Cases:
-    return tuple(-one for one in cases)
+    return tuple(-case for case in cases)

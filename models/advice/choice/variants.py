@@ -88,31 +88,31 @@ class Variants:
         key = (frozenset(left_out), times)
         if key not in self._kept:
             with breaches() as self._broken[key]:
-                found = self._kept[key] = self._run(*key)
-            self.calls += found.counts["calls"] if found else 0
+                answer = self._kept[key] = self._run(*key)
+            self.calls += answer.counts["calls"] if answer else 0
         return self._kept[key]
 
     def _run(self, left_out: Set, times: int) -> Answer | None:
         try:
-            found: Answer = self.system.answer(self.changed(left_out, times), self.engine)
+            answer: Answer = self.system.answer(self.changed(left_out, times), self.engine)
         except (InputError, RunFailed):
             return None
-        return found
+        return answer
 
     def breaks(self, left_out: Set, times: int = 1) -> list[Broken]:
         """Assumptions that the run without these effects breaks, and the scene itself keeps."""
         if self.of(left_out, times) is None or self.of() is None:
             return []
         known = self._broken[frozenset(), 1]
-        return [one for name, one in self._broken[left_out, times].items() if name not in known]
+        return [broken for name, broken in self._broken[left_out, times].items() if name not in known]
 
     def stated(self, left_out: Set, times: int = 1) -> list[Result]:
         """The results of a variant with the errors that they state, which takes its runs once more and their
         estimates."""
-        found: list[Result] = []
-        with suppress(RunFailed), watching(found.append):  # raised where an error is as large as what it is of
+        results: list[Result] = []
+        with suppress(RunFailed), watching(results.append):  # raised where an error is as large as what it is of
             self.system.answer(self.changed(left_out, times), self.engine, error=True)
-        return found
+        return results
 
     def changed(self, left_out: Set, times: int = 1) -> Any:
         """The scene of a variant; InputError where it cannot be."""

@@ -88,7 +88,7 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
     all_of_it = Variants(scene, engine)
     variants = all_of_it.window(STEPS)
     short, names = variants.scene, (*variants.effects, *variants.absent)
-    with breaches() as own:
+    with breaches() as broken_alone:
         base: Answer = system.answer(short, engine)
     runs: dict[str, Callable[[], Answer]] = {"": partial(system.answer, short, engine)}
     first, whys, keeps = {"": base}, dict[str, str](), dict[str, tuple[str, ...]]()
@@ -97,8 +97,8 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
             other = variants.changed(frozenset([name])) if name in variants.effects else variants.beside(name)
             with breaches() as others:
                 first[name], runs[name] = system.answer(other, engine), partial(system.answer, other, engine)
-            without, beside = (others, own) if name in variants.effects else (own, others)
-            keeps[name] = tuple(one.says for key, one in without.items() if key not in beside)
+            without, beside = (others, broken_alone) if name in variants.effects else (broken_alone, others)
+            keeps[name] = tuple(assumption.says for key, assumption in without.items() if key not in beside)
         except (InputError, RunFailed) as error:
             whys[name] = getattr(error, "why", "") or getattr(error, "allowed", "") or str(error)
     micros = _turns(runs)
@@ -122,15 +122,15 @@ def price_list(scene: Any, engine: str | None = None) -> PriceList:
 
 def _turns(runs: dict[str, Callable[[], Answer]]) -> dict[str, np.ndarray]:
     """CPU microseconds of a step (turns,) of every run."""
-    found = dict[str, list[float]]({name: [] for name in runs})
+    micros = dict[str, list[float]]({name: [] for name in runs})
     order, names, begun = np.random.default_rng(SEED), list(runs), time.process_time()
     for i in range(ROUNDS):
         if i >= LEAST_ROUNDS and (time.process_time() - begun) * (i + 1) > i * PATIENCE:
             break
         for j in order.permutation(len(names)):
-            one = runs[names[j]]()
-            found[names[j]].append(1e6 * one.seconds / one.counts["steps"])
-    return {name: np.array(values) for name, values in found.items()}
+            outcome = runs[names[j]]()
+            micros[names[j]].append(1e6 * outcome.seconds / outcome.counts["steps"])
+    return {name: np.array(values) for name, values in micros.items()}
 
 
 def spread(values: np.ndarray) -> tuple[float, float]:
@@ -145,14 +145,14 @@ def _price(
     base: Answer,
     other: Answer | None,
     took: np.ndarray | None,
-    own: np.ndarray,
+    unchanged: np.ndarray,
     why: str,
 ) -> Price:
     there, says = name in variants.effects, variants.says(name)
     if other is None or took is None:
         return Price(name, there, says, why)
     before, after = (other, base) if there else (base, other)
-    slow, fast = (own, took) if there else (took, own)
+    slow, fast = (unchanged, took) if there else (took, unchanged)
     seconds = np.maximum(slow, 1e-9), np.maximum(fast, 1e-9)
     gone = tuple(key for key in after.quantities if key not in before.quantities)
     return Price(
@@ -170,7 +170,7 @@ def _price(
 
 def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
     """Of what both have, by the scene's own size."""
-    found = []
+    changed = []
     for name, quantity in base.quantities.items():
         if name in other.quantities:
             try:
@@ -180,9 +180,9 @@ def _changes(base: Answer, other: Answer) -> tuple[Changed, ...]:
             size = quantity.sizes
             if quantity.sampled:
                 share, chance = by_chance(change, quantity.cases)
-                found.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
+                changed.append(Changed(name, quantity.unit, share * float(size.max()), share, chance))
                 continue
-            most = max(float(np.sqrt(np.mean(one**2))) for one in change)
+            most = max(float(np.sqrt(np.mean(difference**2))) for difference in change)
             moved = most > rounding(base, quantity.unit)
-            found.append(Changed(name, quantity.unit, most, relative(change, size) if moved else 0.0))
-    return tuple(sorted(found, key=lambda one: -one.relative))
+            changed.append(Changed(name, quantity.unit, most, relative(change, size) if moved else 0.0))
+    return tuple(sorted(changed, key=lambda difference: -difference.relative))

@@ -33,7 +33,7 @@ def price_list_of_ride(scene: Any) -> PriceList:
         effects = effects_of(whole.scene)
         rests = {effect.name: _rest(whole, effect) for effect in effects}
     more = {name: _beside(scene, name, whole.speed) for name in absent(scene)}
-    systems = {name: one for name, one in ({"": whole.full} | rests | more).items() if isinstance(one, Reduced)}
+    systems = {name: rest for name, rest in ({"": whole.full} | rests | more).items() if isinstance(rest, Reduced)}
     micros = _turns(systems)
     says = listing(scene.system)
     prices = [_price(whole, effect.name, effect.says, rests[effect.name], micros) for effect in effects]

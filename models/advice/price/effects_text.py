@@ -15,29 +15,29 @@ NOTHING = 1e-12
 """Relative change that is rounding."""
 
 
-def lines(found: PriceList, quantities: list[str]) -> list[str]:
+def lines(prices: PriceList, quantities: list[str]) -> list[str]:
     """What the scene costs, then every effect with what it costs and changes."""
-    counts = ", ".join(f"{value:,} {name}" for name, value in found.counts.items())
-    part = "" if found.each >= found.whole else f", {found.each:,} of {found.whole:,} steps priced"
+    counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
+    part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [
-        found.title,
-        f"  {found.engine}, {counts}{part}; {_micros(found.micros)} a step, CPU, median and its deviation",
+        prices.title,
+        f"  {prices.engine}, {counts}{part}; {_micros(prices.micros)} a step, CPU, median and its deviation",
         "",
         "  effects of the scene: what each adds to it, and what leaving it out changes",
-        *(line for one in found.prices if one.there for line in _price(one, quantities)),
-        *_absent(found, quantities),
+        *(line for price in prices.prices if price.there for line in _price(price, quantities)),
+        *_absent(prices, quantities),
         "",
         "  changes: rms of the difference, largest of all cases; in ( ) by the quantity's own deviation"
-        + ("; +- what chance may add, of so few samples" if _by_chance(found) else ""),
+        + ("; +- what chance may add, of so few samples" if _by_chance(prices) else ""),
     ]
 
 
-def _by_chance(found: PriceList) -> bool:
-    return any(change.chance for one in found.prices for change in one.changes)
+def _by_chance(prices: PriceList) -> bool:
+    return any(change.chance for price in prices.prices for change in price.changes)
 
 
-def _absent(found: PriceList, quantities: list[str]) -> list[str]:
-    rows = [line for one in found.prices if not one.there for line in _price(one, quantities)]
+def _absent(prices: PriceList, quantities: list[str]) -> list[str]:
+    rows = [line for price in prices.prices if not price.there for line in _price(price, quantities)]
     return ["", "  effects that it could have, at usual values: the same of putting it in", *rows] if rows else []
 
 
@@ -51,31 +51,31 @@ def _number(value: float, digits: int) -> str:
     return f"{float(f'{value:.{digits}g}'):,.0f}" if large else f"{value:.{digits}g}"
 
 
-def _price(one: Price, quantities: list[str]) -> list[str]:
+def _price(price: Price, quantities: list[str]) -> list[str]:
     """One effect: its cost in one line, what it changes in another."""
-    name = f"    {one.name:<{WIDTH}} "
-    if one.why:
-        return [f"{name}no price: {one.why}"]
-    ratio = f"{one.ratio[0]:.3g} times ({one.ratio[1]:.3g} to {one.ratio[2]:.3g})"
-    plus = "+" if one.micros[0] >= 0.0 else ""
-    cost = f"{name}{plus}{_micros(one.micros)} a step, {ratio}{_counts(one)}"
-    new = f"; there with it alone: {', '.join(one.gone[:SHOWN])}{', ...' if len(one.gone) > SHOWN else ''}"
-    rows = [f"{_changes(one, quantities)}{new if one.gone else ''}"]
-    rows += [f"keeps an assumption that is broken without it: {says}" for says in one.keeps]
+    name = f"    {price.name:<{WIDTH}} "
+    if price.why:
+        return [f"{name}no price: {price.why}"]
+    ratio = f"{price.ratio[0]:.3g} times ({price.ratio[1]:.3g} to {price.ratio[2]:.3g})"
+    plus = "+" if price.micros[0] >= 0.0 else ""
+    cost = f"{name}{plus}{_micros(price.micros)} a step, {ratio}{_counts(price)}"
+    new = f"; there with it alone: {', '.join(price.gone[:SHOWN])}{', ...' if len(price.gone) > SHOWN else ''}"
+    rows = [f"{_changes(price, quantities)}{new if price.gone else ''}"]
+    rows += [f"keeps an assumption that is broken without it: {says}" for says in price.keeps]
     return [cost, *(f"    {'':<{WIDTH}} {row}" for row in rows)]
 
 
-def _counts(one: Price) -> str:
+def _counts(price: Price) -> str:
     """Counts that it changes."""
-    before, after = one.counts
+    before, after = price.counts
     told = [f"{after[name] - before[name]:+,} {name}" for name in after if after[name] != before[name]]
     return "; " + ", ".join(told) if told else ""
 
 
-def _changes(one: Price, quantities: list[str]) -> str:
+def _changes(price: Price, quantities: list[str]) -> str:
     """The quantities that were asked for, or those that change most."""
-    asked = [change for change in one.changes if change.name in quantities]
-    shown = asked or [change for change in one.changes if change.relative > NOTHING][:SHOWN]
+    asked = [change for change in price.changes if change.name in quantities]
+    shown = asked or [change for change in price.changes if change.relative > NOTHING][:SHOWN]
     return "changes " + ("; ".join(map(_changed, shown)) or "nothing")
 
 
@@ -87,9 +87,9 @@ def _changed(change: Changed) -> str:
     return f"{name} by {_number(change.absolute, 3)}{unit} ({share})"
 
 
-def as_dict(found: PriceList) -> dict[str, Any]:
+def as_dict(prices: PriceList) -> dict[str, Any]:
     """All of it as JSON keeps it; None for what is not finite."""
-    plain: dict[str, Any] = _plain(asdict(found))
+    plain: dict[str, Any] = _plain(asdict(prices))
     return plain
 
 

@@ -73,8 +73,8 @@ class Meshed(ABC):
     @cached_property
     def steps(self) -> dict[str, float]:
         """Methods with their steps (s), each a part of ``first``."""
-        found = dict.fromkeys(self._part(self.step * k) for k in LONGER)
-        return {f"RK4 at {1e3 * step:.3g} ms": step for step in found}
+        steps = dict.fromkeys(self._part(self.step * k) for k in LONGER)
+        return {f"RK4 at {1e3 * step:.3g} ms": step for step in steps}
 
     def ladders(self) -> list[Ladder]:
         """Every step of every engine over the cells, or the steps alone."""

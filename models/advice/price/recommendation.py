@@ -101,8 +101,8 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnSce
     """A scene as its system's file gives it to the search; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
-        own: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
-        return own
+        priceable: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
+        return priceable
     package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
     why = getattr(package, "NO_PRICE", "has no steps to choose")
     raise InputError(
@@ -121,9 +121,9 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
         known, timed, winners = _confirmed(search, timed, winners)
     known, timed, winners = _resolved(scene, known, timed, winners)
     defaults = {
-        ladder.engine: found
+        ladder.engine: settings
         for ladder in scene.ladders()
-        if ladder.default and (found := _default(search, ladder, timed)) is not None
+        if ladder.default and (settings := _default(search, ladder, timed)) is not None
     }
     return Recommendation(scene, tolerance, searched, known, winners, defaults, tuple(search.tried))
 
@@ -131,28 +131,28 @@ def recommend(scene: OwnScene, tolerance: float) -> Recommendation:
 def _timed(search: Search) -> list[Choice]:
     """The coarsest setting of every method that meets the tolerance; seconds in rounds of those that may win."""
     curves: dict[str, Tried] = {}
-    for one in search.meeting():
-        coarsest = curves.setdefault(one.setting.curve, one)
-        if one.setting.value > coarsest.setting.value:
-            curves[one.setting.curve] = one
+    for attempt in search.meeting():
+        coarsest = curves.setdefault(attempt.setting.curve, attempt)
+        if attempt.setting.value > coarsest.setting.value:
+            curves[attempt.setting.curve] = attempt
     if not curves:
         return []
-    found = list(curves.values())
-    taken, longer = _raced(search, _rivals(found)), search.scene.whole / search.duration
-    seconds = [tuple(longer * taken.get(one.setting, np.array([one.seconds]))) for one in found]
+    attempts = list(curves.values())
+    taken, longer = _raced(search, _rivals(attempts)), search.scene.whole / search.duration
+    seconds = [tuple(longer * taken.get(attempt.setting, np.array([attempt.seconds]))) for attempt in attempts]
     return [
-        Choice(one, one.error, longer * one.calls, float(np.median(took)), False, took)
-        for one, took in zip(found, seconds, strict=True)
+        Choice(attempt, attempt.error, longer * attempt.calls, float(np.median(took)), False, took)
+        for attempt, took in zip(attempts, seconds, strict=True)
     ]
 
 
-def _rivals(found: list[Tried]) -> list[Tried]:
+def _rivals(attempts: list[Tried]) -> list[Tried]:
     """Those that may be an engine's fastest, or the fastest of all, where there is more than one."""
     rivals = dict[Tried, None]()
-    for engine in ("", *dict.fromkeys(one.setting.engine for one in found)):
-        own = [one for one in found if one.setting.engine.startswith(engine)]
-        least = min(one.seconds for one in own)
-        near = [one for one in own if one.seconds <= (FAR if one.setting.default else NEAR) * least]
+    for engine in ("", *dict.fromkeys(attempt.setting.engine for attempt in attempts)):
+        alike = [attempt for attempt in attempts if attempt.setting.engine.startswith(engine)]
+        least = min(attempt.seconds for attempt in alike)
+        near = [attempt for attempt in alike if attempt.seconds <= (FAR if attempt.setting.default else NEAR) * least]
         rivals |= dict.fromkeys(near if len(near) > 1 else [])
     return list(rivals)
 
@@ -160,25 +160,28 @@ def _rivals(found: list[Tried]) -> list[Tried]:
 def _raced(search: Search, rivals: list[Tried]) -> dict[Setting, np.ndarray]:
     """Seconds of each in a few rounds; of those that are not far behind by then, in more."""
     seconds = _rounds(search, rivals, FEWEST)
-    middle = {one.setting: float(np.median(seconds[one.setting])) for one in rivals}
+    middle = {attempt.setting: float(np.median(seconds[attempt.setting])) for attempt in rivals}
     least: dict[str, float] = {}
     for setting, took in middle.items():
         least[setting.engine] = min(took, least.get(setting.engine, took))
     left = [
-        one
-        for one in rivals
-        if middle[one.setting] <= (USUAL_BEHIND if one.setting.default else BEHIND) * least[one.setting.engine]
+        attempt
+        for attempt in rivals
+        if middle[attempt.setting]
+        <= (USUAL_BEHIND if attempt.setting.default else BEHIND) * least[attempt.setting.engine]
     ]
-    more = min(ROUNDS, int(PATIENCE / max(sum(middle[one.setting] for one in left), 1e-9))) - FEWEST
+    more = min(ROUNDS, int(PATIENCE / max(sum(middle[attempt.setting] for attempt in left), 1e-9))) - FEWEST
     further = _rounds(search, left, more) if more > 0 and len(left) > 1 else {}
-    return seconds | {setting: np.concatenate((seconds[setting], own)) for setting, own in further.items()}
+    return seconds | {
+        setting: np.concatenate((seconds[setting], seconds_again)) for setting, seconds_again in further.items()
+    }
 
 
 def _rounds(search: Search, rivals: list[Tried], rounds: int) -> dict[Setting, np.ndarray]:
-    jobs = [partial(search.scene.solve, one.setting, search.duration) for one in rivals]
-    lasted = [one.seconds for one in rivals]
+    jobs = [partial(search.scene.solve, attempt.setting, search.duration) for attempt in rivals]
+    lasted = [attempt.seconds for attempt in rivals]
     taken = interleave(jobs, rounds, LEAST, lasted=lasted, clock=time.process_time)
-    return dict(zip((one.setting for one in rivals), taken, strict=True))
+    return dict(zip((attempt.setting for attempt in rivals), taken, strict=True))
 
 
 def _winners(timed: list[Choice], keys: Iterable[tuple[str, str]]) -> Winners:
@@ -188,20 +191,22 @@ def _winners(timed: list[Choice], keys: Iterable[tuple[str, str]]) -> Winners:
 
 def _cheapest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
     """The least cost; an engine's default method is kept where it does not take longer beyond doubt: seconds wander."""
-    able = [one for one in timed if one.tried.setting.engine.startswith(engine)]
+    able = [choice for choice in timed if choice.tried.setting.engine.startswith(engine)]
     if not able:
         return None
-    best = min(able, key=lambda one: getattr(one, kind))
-    usual = [one for one in able if one.tried.setting.default and kind == "seconds" and not _slower(one, best)]
-    return min(usual, key=lambda one: one.seconds) if usual else best
+    best = min(able, key=lambda choice: getattr(choice, kind))
+    usual = [
+        choice for choice in able if choice.tried.setting.default and kind == "seconds" and not _slower(choice, best)
+    ]
+    return min(usual, key=lambda choice: choice.seconds) if usual else best
 
 
-def _slower(one: Choice, best: Choice) -> bool:
+def _slower(choice: Choice, best: Choice) -> bool:
     """Whether a choice takes longer than another one, beyond doubt where both were timed in the same rounds."""
-    both = min(len(one.rounds), len(best.rounds))
+    both = min(len(choice.rounds), len(best.rounds))
     if both < FEWEST:
-        return one.seconds > best.seconds
-    return paired_ratio(one.rounds[:both], best.rounds[:both])[1] > SLOWER
+        return choice.seconds > best.seconds
+    return paired_ratio(choice.rounds[:both], best.rounds[:both])[1] > SLOWER
 
 
 Known = tuple[Truth, list[Choice], Winners]
@@ -212,27 +217,29 @@ def _confirmed(search: Search, timed: list[Choice], winners: Winners) -> Known:
     scene = search.scene
     known = truth(scene, search.tolerance, scene.whole, max(0, search.truth.rung - 1), twice=False)
     over = Search(scene, known, search.tolerance, scene.whole)
-    ladders = {f"{one.engine} {one.method}": one for one in scene.ladders()}
-    able = {one.tried.setting: one for one in _shown(timed, winners)}
-    found = (_over_all(over, ladders[setting.curve], one) for setting, one in able.items())
-    held = [one for one in found if one is not None]
-    search.tried += [one for one in over.tried if one.status != "ok"]
+    ladders = {f"{choice.engine} {choice.method}": choice for choice in scene.ladders()}
+    able = {choice.tried.setting: choice for choice in _shown(timed, winners)}
+    confirmed = (_over_all(over, ladders[setting.curve], choice) for setting, choice in able.items())
+    held = [choice for choice in confirmed if choice is not None]
+    search.tried += [choice for choice in over.tried if choice.status != "ok"]
     return known, held, _winners(held, winners)
 
 
 def _shown(timed: list[Choice], winners: Winners) -> list[Choice]:
     """The winners and the defaults."""
-    return list(dict.fromkeys([*winners.values(), *(one for one in timed if one.tried.setting.default)]))
+    return list(dict.fromkeys([*winners.values(), *(choice for choice in timed if choice.tried.setting.default)]))
 
 
-def _over_all(over: Search, ladder: Ladder, one: Choice) -> Choice | None:
+def _over_all(over: Search, ladder: Ladder, choice: Choice) -> Choice | None:
     """A setting, or the next finer one of its method that meets the tolerance over the whole run."""
-    i, first = ladder.values.index(one.tried.setting.value), one.tried
+    i, first = ladder.values.index(choice.tried.setting.value), choice.tried
     for _ in range(ATTEMPTS):
         now = over.attempt(ladder.setting(i))
         if over.meets(now):
             ratio = ladder.work(first.setting.value, now.setting.value)
-            return Choice(now, now.error, now.calls, ratio * one.seconds, True, tuple(ratio * s for s in one.rounds))
+            return Choice(
+                now, now.error, now.calls, ratio * choice.seconds, True, tuple(ratio * s for s in choice.rounds)
+            )
         finer = (now.error / over.tolerance) ** (1 / (ladder.order or 1)) if np.isfinite(now.error) else 2.0
         wanted = ladder.values[i] / finer
         i = next((k for k in range(i + 1, len(ladder.values)) if ladder.values[k] <= wanted * (1 + 1e-9)), -1)
@@ -245,15 +252,18 @@ def _resolved(scene: OwnScene, known: Truth, timed: list[Choice], winners: Winne
     """Errors of the winners and the defaults against a truth that is better known than they are small: a setting may
     be far better than its tolerance asks, and as good as the reference that judged it."""
     shown = _shown(timed, winners)
-    errors = {one.tried.setting: one.error for one in shown}
+    errors = {choice.tried.setting: choice.error for choice in shown}
     if _blurred(known, errors):
         answers = {setting: scene.answer(scene.solve(setting, scene.whole)) for setting in errors}
         known, errors = _finer(scene, known, answers)
-    told = {one.tried.setting: replace(one, error=max(errors[one.tried.setting], known.uncertainty)) for one in shown}
+    told = {
+        choice.tried.setting: replace(choice, error=max(errors[choice.tried.setting], known.uncertainty))
+        for choice in shown
+    }
     return (
         known,
-        [told.get(one.tried.setting, one) for one in timed],
-        {key: told[one.tried.setting] for key, one in winners.items()},
+        [told.get(choice.tried.setting, choice) for choice in timed],
+        {key: told[choice.tried.setting] for key, choice in winners.items()},
     )
 
 
@@ -279,15 +289,15 @@ def _finer(scene: OwnScene, known: Truth, answers: dict[Setting, Answer]) -> tup
 def _default(search: Search, ladder: Ladder, timed: list[Choice]) -> Default | None:
     """What the engine's default does as it comes, and what it takes to meet the tolerance."""
     curve = f"{ladder.engine} {ladder.method}"
-    tried = [one for one in search.tried if one.setting.curve == curve]
+    tried = [attempt for attempt in search.tried if attempt.setting.curve == curve]
     if not tried:
         return None
-    as_it_is = min(tried, key=lambda one: abs(np.log(one.setting.value / ladder.default)))
-    met = next((one for one in timed if one.tried.setting.curve == curve), None)
-    clear = [one for one in tried if one.status == "ok"]
+    as_it_is = min(tried, key=lambda attempt: abs(np.log(attempt.setting.value / ladder.default)))
+    met = next((attempt for attempt in timed if attempt.tried.setting.curve == curve), None)
+    clear = [attempt for attempt in tried if attempt.status == "ok"]
     if met is not None or not clear:
         return Default(as_it_is, met, False)
-    finest = min(clear, key=lambda one: one.setting.value)
+    finest = min(clear, key=lambda attempt: attempt.setting.value)
     finer = (finest.error / search.tolerance) ** (1 / (ladder.order or 1))
     setting = replace(finest.setting, value=finest.setting.value / finer)
     longer = ladder.work(finest.setting.value, setting.value) * search.scene.whole / search.duration

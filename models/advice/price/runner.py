@@ -128,11 +128,11 @@ class Measured:
 
     def curves(self, status: Status | None = "ok") -> dict[str, list[Point]]:
         """Points of each curve, from coarse to fine; None takes every status."""
-        found = defaultdict(list)
+        points_of = defaultdict(list)
         for p in sorted(self.points, key=lambda p: -p.setting.value):
             if status in (None, p.status):
-                found[p.setting.curve].append(p)
-        return found
+                points_of[p.setting.curve].append(p)
+        return points_of
 
     def front(self, kind: str) -> list[Point]:
         """The points that stand clear of the reference's uncertainty and that no other one beats, by rising cost."""
@@ -141,11 +141,11 @@ class Measured:
 
     def orders(self, quantity: str) -> dict[str, float]:
         """Observed order of each curve: over the step, or over 1 / force calls for adaptive methods."""
-        found = {}
+        orders = {}
         for curve, points in self.curves().items():
             sizes = [1 / p.cost(self.costs[0]) if p.setting.adaptive else p.setting.value for p in points]
-            found[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.floor(quantity))
-        return found
+            orders[curve] = observed_order(sizes, [p.errors[quantity] for p in points], self.floor(quantity))
+        return orders
 
     def same(self) -> list[tuple[str, ...]]:
         """Groups of curves that coincide, judged on the points that stand clear of the reference's uncertainty."""
@@ -169,11 +169,11 @@ class Measured:
 
     def reaches(self, target: float, kind: str, extrapolate: bool = False) -> Reaches:
         """What each curve needs to meet ``target``, in one of ``costs``; curves that do not are left out."""
-        found = {
+        reaches = {
             curve: self._reach(points, target, [p.cost(kind) for p in points], extrapolate)
             for curve, points in self.curves().items()
         }
-        return {curve: least for curve, least in found.items() if least is not None}
+        return {curve: least for curve, least in reaches.items() if least is not None}
 
     def _reach(
         self, points: list[Point], target: float, costs: Sequence[float], extrapolate: bool = True
@@ -205,8 +205,8 @@ class Measured:
         have."""
         kept = [np.array(p.seconds)[:: len(p.seconds) // rounds][:rounds] for p in side]
         medians = np.array([np.median(seconds[resamples(rounds, DRAWS)], axis=1) for seconds in kept])
-        found = [self._reach(side, target, costs) for costs in medians.T]
-        return np.array([least.cost for least in found if least is not None])
+        cheapest_reaches = [self._reach(side, target, costs) for costs in medians.T]
+        return np.array([least.cost for least in cheapest_reaches if least is not None])
 
     def racing(self) -> list[Point]:
         """Points whose seconds decide something, by one run of each: the defaults; what the cheapest settings rest on,
@@ -272,7 +272,15 @@ def attempt(problem: Problem, setting: Setting) -> Point:
     else:
         status = "ok"
     counts = dict(solution.counts)
-    return Point(setting, status, reason, errors, counts, (seconds,), broken=tuple(one.says for one in broken.values()))
+    return Point(
+        setting,
+        status,
+        reason,
+        errors,
+        counts,
+        (seconds,),
+        broken=tuple(assumption.says for assumption in broken.values()),
+    )
 
 
 def measure(problem: Problem, quick: bool, rounds: int, least: float) -> Measured:
@@ -312,12 +320,12 @@ def _timed(problem: Problem, points: list[Point], rounds: int, least: float) -> 
     }
 
 
-def _near(found: Reaches, among: str) -> Reaches:
+def _near(reaches: Reaches, among: str) -> Reaches:
     """The cheapest curve among those of one engine, or of all, and those that take little longer."""
-    best = cheapest(found, among)
+    best = cheapest(reaches, among)
     return {
         curve: least
-        for curve, least in found.items()
+        for curve, least in reaches.items()
         if best and curve.startswith(among) and least.cost <= NEAR * best[1].cost
     }
 
@@ -329,7 +337,7 @@ def resting(points: list[Point], least: Reach) -> list[Point]:
     return [*coarser[-1:], *(p for p in finer[:1] if p is not coarser[-1])] if coarser else finer[:1]
 
 
-def cheapest(found: Reaches, among: str = "") -> tuple[str, Reach] | None:
+def cheapest(reaches: Reaches, among: str = "") -> tuple[str, Reach] | None:
     """The curve that meets a tolerance at the least cost, among those of one engine or of all."""
-    able = [item for item in found.items() if item[0].startswith(among)]
+    able = [item for item in reaches.items() if item[0].startswith(among)]
     return min(able, key=lambda item: item[1].cost, default=None)

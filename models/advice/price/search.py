@@ -62,9 +62,9 @@ class Search:
 
     def everything(self) -> "Search":
         """Every ladder, those of high order first: what they cost tells when others are given up."""
-        for ladder in {one.engine: one for one in self.scene.ladders()}.values():
+        for ladder in {each.engine: each for each in self.scene.ladders()}.values():
             self._warm(ladder)
-        for ladder in sorted(self.scene.ladders(), key=lambda one: (one.adaptive, -one.order)):
+        for ladder in sorted(self.scene.ladders(), key=lambda each: (each.adaptive, -each.order)):
             self.climb(ladder)
         return self
 
@@ -76,19 +76,21 @@ class Search:
                 solution = self.scene.solve(setting, self.duration)
                 seconds, answer = time.process_time() - begun, self.scene.answer(solution)
         except InputError as error:
-            found = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
+            attempt = Tried(setting, "refused", getattr(error, "why", "") or error.allowed)
         except RunFailed as error:
-            found = Tried(setting, "raised", str(error))
+            attempt = Tried(setting, "raised", str(error))
         else:
             error_of, calls = self.truth.error(answer), answer.counts.get(self.scene.counted, 0)
-            found = Tried(setting, "ok", "", error_of, calls, seconds)
+            attempt = Tried(setting, "ok", "", error_of, calls, seconds)
             if not error_of <= BEYOND * max(self.truth.size, self.tolerance):
                 why = f"an error of {error_of:.3g} {self.scene.unit} came back as a result"
-                found = replace(found, status="SILENT", reason=why)
+                attempt = replace(attempt, status="SILENT", reason=why)
             elif alone := self.truth.beside(broken):
-                found = replace(found, status="flagged", reason="; ".join(one.brief() for one in alone))
-        self.tried.append(found)
-        return found
+                attempt = replace(
+                    attempt, status="flagged", reason="; ".join(assumption.brief() for assumption in alone)
+                )
+        self.tried.append(attempt)
+        return attempt
 
     def _warm(self, ladder: Ladder) -> None:
         """One run that is not timed: an engine's first one imports and compiles."""
@@ -117,20 +119,20 @@ class Search:
 
     def meeting(self, engine: str = "") -> list[Tried]:
         """Those that meet the tolerance, of one engine or of all."""
-        return [one for one in self.tried if self.meets(one) and one.setting.engine.startswith(engine)]
+        return [attempt for attempt in self.tried if self.meets(attempt) and attempt.setting.engine.startswith(engine)]
 
-    def meets(self, one: Tried) -> bool:
+    def meets(self, attempt: Tried) -> bool:
         """Whether a setting holds the tolerance, and keeps the assumptions that the reference keeps."""
-        return one.status == "ok" and one.error <= self.held
+        return attempt.status == "ok" and attempt.error <= self.held
 
     def _elsewhere(self, ladder: Ladder) -> float:
         """The value that the method needs in another engine, 0 where none has it."""
-        alike = [one.setting.value for one in self.meeting() if one.setting.method == ladder.method]
+        alike = [attempt.setting.value for attempt in self.meeting() if attempt.setting.method == ladder.method]
         return max((value for value in alike if value in ladder.values), default=0.0)
 
     def _affordable(self, ladder: Ladder, last: Tried) -> int:
         """The finest rung whose run takes no longer than PATIENCE, or than what the engine has that meets."""
-        best = min(one.seconds for one in self.meeting(ladder.engine))
+        best = min(attempt.seconds for attempt in self.meeting(ladder.engine))
         most = max(PATIENCE, best) / max(last.seconds, 1e-9)
         work = [ladder.work(last.setting.value, value) for value in ladder.values]
         return max(i for i, times in enumerate(work) if i == 0 or times <= most)
@@ -145,7 +147,7 @@ class Search:
 
     def _too_long(self, ladder: Ladder, i: int, last: Tried | None) -> bool:
         """Whether a rung would take minutes where another engine has met the tolerance long since; said if so."""
-        best = min((one.seconds for one in self.meeting()), default=float("inf"))
+        best = min((attempt.seconds for attempt in self.meeting()), default=float("inf"))
         seconds = 0.0 if last is None else ladder.work(last.setting.value, ladder.values[i]) * last.seconds
         if seconds <= max(TOO_LONG, WORTH * best):
             return False

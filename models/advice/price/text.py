@@ -15,41 +15,45 @@ SAME = 0.005
 HEAD = f"  {'':<24}{'setting':<36}{'error':>11}{{counted:>16}}   time"
 
 
-def lines(found: Recommendation) -> list[str]:
+def lines(recommendation: Recommendation) -> list[str]:
     """The table of cheapest settings, what the defaults lose, what failed, and what to write into the scene."""
-    own = found.scene
+    scene = recommendation.scene
     first = (
-        f"  over the first {own.first:g} s, where all methods are tried: {found.searched.how} "
-        f"{found.searched.uncertainty:.1e} {own.unit}"
+        f"  over the first {scene.first:g} s, where all methods are tried: {recommendation.searched.how} "
+        f"{recommendation.searched.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
-        f"  DOUBT: {own.quantity} is at most {found.truth.size:.3g} {own.unit} itself: within {found.tolerance:g} "
-        f"{own.unit} even zero would do"
+        f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: within {recommendation.tolerance:g} "
+        f"{scene.unit} even zero would do"
     )
     return [
-        f"{own.title}: {own.quantity} within {found.tolerance:g} {own.unit} over {own.whole:g} s",
-        f"  truth: {found.truth.how} {found.truth.uncertainty:.1e} {own.unit}",
-        *([] if found.whole else [first]),
-        *([f"  {own.note}"] if own.note else []),
-        *([doubt] if found.tolerance >= found.truth.size else []),
-        *(f"  with every setting: {one.line()}" for one in found.truth.broken),
+        f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} over {scene.whole:g} s",
+        f"  truth: {recommendation.truth.how} {recommendation.truth.uncertainty:.1e} {scene.unit}",
+        *([] if recommendation.whole else [first]),
+        *([f"  {scene.note}"] if scene.note else []),
+        *([doubt] if recommendation.tolerance >= recommendation.truth.size else []),
+        *(f"  with every setting: {assumption.line()}" for assumption in recommendation.truth.broken),
         "",
-        *(_table(found) if found.winners else _none(found)),
-        *_defaults(found),
-        *_failures(found.tried),
-        *_into_the_scene(found),
+        *(_table(recommendation) if recommendation.winners else _none(recommendation)),
+        *_defaults(recommendation),
+        *_failures(recommendation.tried),
+        *_into_the_scene(recommendation),
     ]
 
 
-def _table(found: Recommendation) -> list[str]:
-    rows, unit = [HEAD.format(counted=found.scene.counted)], found.scene.unit
-    for (engine, kinds), one in _merged(found.winners).items():
+def _table(recommendation: Recommendation) -> list[str]:
+    rows, unit = [HEAD.format(counted=recommendation.scene.counted)], recommendation.scene.unit
+    for (engine, kinds), choice in _merged(recommendation.winners).items():
         who = f"{LABELS[engine] if engine else 'all'}, by {kinds}"
         rows.append(
-            f"  {who:<24}{_named(one.tried.setting, not engine):<36}{one.error:>9.2g} {unit}"
-            f"{one.calls:>16,.0f}   {cost(one.rounds or (one.seconds,))}"
+            f"  {who:<24}{_named(choice.tried.setting, not engine):<36}{choice.error:>9.2g} {unit}"
+            f"{choice.calls:>16,.0f}   {cost(choice.rounds or (choice.seconds,))}"
         )
-    over = " over the whole run" if found.whole or all(one.confirmed for one in found.winners.values()) else ""
+    over = (
+        " over the whole run"
+        if recommendation.whole or all(choice.confirmed for choice in recommendation.winners.values())
+        else ""
+    )
     return [
         *rows,
         f"  errors are measured{over}, against the truth; times are those of this machine's processor, model built "
@@ -60,22 +64,22 @@ def _table(found: Recommendation) -> list[str]:
 def _merged(winners: Winners) -> Winners:
     """One row where the same setting is the cheapest by both costs."""
     rows = Winners()
-    for (engine, kind), one in winners.items():
-        if (engine, "seconds") in rows and rows[engine, "seconds"] is one:
+    for (engine, kind), choice in winners.items():
+        if (engine, "seconds") in rows and rows[engine, "seconds"] is choice:
             rows[engine, "both"] = rows.pop((engine, "seconds"))
         else:
-            rows[engine, kind] = one
+            rows[engine, kind] = choice
     return rows
 
 
-def _none(found: Recommendation) -> list[str]:
-    able = [one for one in found.tried if one.status == "ok"]
+def _none(recommendation: Recommendation) -> list[str]:
+    able = [attempt for attempt in recommendation.tried if attempt.status == "ok"]
     if not able:
         return ["  no setting gave an answer"]
-    best = min(able, key=lambda one: one.error)
+    best = min(able, key=lambda attempt: attempt.error)
     return [
         f"  no setting tried meets the tolerance; the nearest is {_named(best.setting, True)} with "
-        f"{best.error:.2g} {found.scene.unit}"
+        f"{best.error:.2g} {recommendation.scene.unit}"
     ]
 
 
@@ -84,20 +88,20 @@ def _named(setting: Setting, whole: bool) -> str:
     return f"{engine if setting.method != setting.engine else ''}{setting.method}, {setting.label()}"
 
 
-def _defaults(found: Recommendation) -> list[str]:
+def _defaults(recommendation: Recommendation) -> list[str]:
     rows = [""]
-    for engine, one in found.defaults.items():
-        tried = one.as_it_is
-        known = max(tried.error, found.searched.uncertainty)
-        error = f"{'' if known == tried.error else 'below '}{known:.2g} {found.scene.unit}"
-        over = "" if found.whole else f" over {found.scene.first:g} s"
+    for engine, default in recommendation.defaults.items():
+        tried = default.as_it_is
+        known = max(tried.error, recommendation.searched.uncertainty)
+        error = f"{'' if known == tried.error else 'below '}{known:.2g} {recommendation.scene.unit}"
+        over = "" if recommendation.whole else f" over {recommendation.scene.first:g} s"
         as_it_is = f"{error}{over}" if tried.status == "ok" else tried.status
-        lost = _lost(found, engine, one.refined, one.extrapolated)
+        lost = _lost(recommendation, engine, default.refined, default.extrapolated)
         rows.append(f"  {LABELS[engine]}'s default, {_named(tried.setting, False)}: {as_it_is}{lost}")
-    return rows if found.defaults else []
+    return rows if recommendation.defaults else []
 
 
-def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
+def _lost(recommendation: Recommendation, engine: str, refined: Choice | None, extrapolated: bool) -> str:
     """What the default method costs beside the engine's cheapest and the cheapest of all, once refined."""
     if refined is None:
         return "; no step tried gives an answer"
@@ -105,7 +109,7 @@ def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolat
         f"{ratio:.3g} times the {kind} of {whose}"
         for whose, key in ((f"{LABELS[engine]}'s cheapest", engine), ("the cheapest of all", ""))
         for kind in ("calls", "seconds")
-        if (best := found.winners.get((key, kind))) is not None
+        if (best := recommendation.winners.get((key, kind))) is not None
         and abs((ratio := getattr(refined, kind) / max(getattr(best, kind), 1e-12)) - 1.0) > SAME
     ]
     met = f"within the tolerance at {refined.tried.setting.label()}{' (extrapolated)' if extrapolated else ''}"
@@ -115,61 +119,62 @@ def _lost(found: Recommendation, engine: str, refined: Choice | None, extrapolat
 def _failures(tried: tuple[Tried, ...]) -> list[str]:
     """Settings without an answer, by method, with the reason of the last one that was tried."""
     known = defaultdict[tuple[str, str], list[Tried]](list)
-    for one in tried:
-        if one.status != "ok":
-            known[one.status, f"{LABELS[one.setting.engine]} {one.setting.method}"].append(one)
+    for attempt in tried:
+        if attempt.status != "ok":
+            known[attempt.status, f"{LABELS[attempt.setting.engine]} {attempt.setting.method}"].append(attempt)
     if not known:
         return []
     return [
         "",
         "  without an answer to rely on",
         *(
-            f"    {status:<9}{method}, {', '.join(dict.fromkeys(one.setting.label() for one in own))}: {own[-1].reason}"
-            for (status, method), own in known.items()
+            f"    {status:<9}{method}, {', '.join(dict.fromkeys(attempt.setting.label() for attempt in attempts))}: {attempts[-1].reason}"
+            for (status, method), attempts in known.items()
         ),
     ]
 
 
-def _into_the_scene(found: Recommendation) -> list[str]:
+def _into_the_scene(recommendation: Recommendation) -> list[str]:
     """What to write into the scene to have the recommended setting."""
-    best = found.winners.get(("", "seconds"))
+    best = recommendation.winners.get(("", "seconds"))
     if best is None:
         return []
-    return ["", "  in the scene", *(f"    {line}" for line in found.scene.lines(best.tried.setting))]
+    return ["", "  in the scene", *(f"    {line}" for line in recommendation.scene.lines(best.tried.setting))]
 
 
-def as_dict(found: Recommendation) -> dict[str, Any]:
+def as_dict(recommendation: Recommendation) -> dict[str, Any]:
     """All of it as JSON keeps it."""
-    own = found.scene
+    scene = recommendation.scene
     return {
-        "scene": own.title,
-        "quantity": own.quantity,
-        "unit": own.unit,
-        "tolerance": found.tolerance,
-        "duration": own.whole,
-        "truth": found.truth.how,
-        "uncertainty": found.truth.uncertainty,
-        "broken assumptions": [asdict(one) for one in found.truth.broken],
+        "scene": scene.title,
+        "quantity": scene.quantity,
+        "unit": scene.unit,
+        "tolerance": recommendation.tolerance,
+        "duration": scene.whole,
+        "truth": recommendation.truth.how,
+        "uncertainty": recommendation.truth.uncertainty,
+        "broken assumptions": [asdict(each) for each in recommendation.truth.broken],
         "cheapest": [
-            {"engine": engine or "all", "by": kind, **_choice(one)} for (engine, kind), one in found.winners.items()
+            {"engine": engine or "all", "by": kind, **_choice(each)}
+            for (engine, kind), each in recommendation.winners.items()
         ],
         "defaults": {
             engine: {
-                "as it is": _tried(one.as_it_is),
-                "extrapolated": one.extrapolated,
-                "refined": None if one.refined is None else _choice(one.refined),
+                "as it is": _tried(each.as_it_is),
+                "extrapolated": each.extrapolated,
+                "refined": None if each.refined is None else _choice(each.refined),
             }
-            for engine, one in found.defaults.items()
+            for engine, each in recommendation.defaults.items()
         },
-        "tried": [_tried(one) for one in found.tried],
+        "tried": [_tried(each) for each in recommendation.tried],
     }
 
 
-def _choice(one: Choice) -> dict[str, Any]:
-    return {**_tried(one.tried), "error": one.error, "calls": one.calls, "seconds": one.seconds}
+def _choice(choice: Choice) -> dict[str, Any]:
+    return {**_tried(choice.tried), "error": choice.error, "calls": choice.calls, "seconds": choice.seconds}
 
 
-def _tried(one: Tried) -> dict[str, Any]:
-    setting = {name: getattr(one.setting, name) for name in ("engine", "method", "value")}
-    told = {name: getattr(one, name) for name in ("status", "reason", "error", "seconds")}
-    return {**setting, **told, "error": one.error if one.status == "ok" else None}
+def _tried(attempt: Tried) -> dict[str, Any]:
+    setting = {name: getattr(attempt.setting, name) for name in ("engine", "method", "value")}
+    told = {name: getattr(attempt, name) for name in ("status", "reason", "error", "seconds")}
+    return {**setting, **told, "error": attempt.error if attempt.status == "ok" else None}

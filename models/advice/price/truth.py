@@ -35,8 +35,8 @@ class Truth:
 
     def beside(self, broken: Mapping[str, Broken]) -> list[Broken]:
         """Of assumptions by name, those that the reference keeps."""
-        known = {one.name for one in self.broken}
-        return [one for name, one in broken.items() if name not in known]
+        known = {assumption.name for assumption in self.broken}
+        return [assumption for name, assumption in broken.items() if name not in known]
 
     def error(self, other: Answer) -> float:
         """Largest difference over the run, at the other's own instants; infinite for what is not finite."""
@@ -78,11 +78,11 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
     InputError where that cannot be reached, RunFailed where two families of solvers differ or none ends.
     """
     ladder = scene.reference()
-    found, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung)
+    settled, rung, change, seconds, broken = _settled(scene, ladder, tolerance, duration, rung)
     said = _named(ladder.setting(rung))
     other = scene.second(ladder.setting(rung)) if twice else None
     finer = "half the cells and a longer step change it by" if ladder.cells else "halving its step changes"
-    alone = Truth(found, change, f"{said}; {finer}", rung, scene.cell, seconds, tuple(broken.values()))
+    alone = Truth(settled, change, f"{said}; {finer}", rung, scene.cell, seconds, tuple(broken.values()))
     if other is None:
         return alone
     differs = alone.error(scene.answer(scene.solve(other, duration)))
@@ -95,7 +95,7 @@ def truth(scene: OwnScene, tolerance: float, duration: float, rung: int = 0, twi
 def _change(scene: OwnScene, before: Answer, now: Answer) -> float:
     """Largest difference that half the step makes, at the rows of both: between rows the coarser is interpolated."""
     both = ((now, before), (before, now))
-    return max(Truth(one, 0.0, "", 0, scene.cell).error(other) for one, other in both)
+    return max(Truth(run, 0.0, "", 0, scene.cell).error(other) for run, other in both)
 
 
 def _named(setting: Setting) -> str:

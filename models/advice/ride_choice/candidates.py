@@ -120,8 +120,8 @@ class Candidates:
         screen, reduced = self.screen(whole, frozenset()), self.system(whole, chosen)
         if screen is None or reduced is None:
             return False
-        two, one = screen.identity(reduced)
-        return bool((abs(two / one - 1.0) <= CERTAIN).all())
+        two, variance = screen.identity(reduced)
+        return bool((abs(two / variance - 1.0) <= CERTAIN).all())
 
     def _predict(self, whole: Whole, chosen: Set, reduced: Reduced) -> np.ndarray:
         screen = self.screen(whole, chosen)

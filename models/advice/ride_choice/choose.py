@@ -170,7 +170,7 @@ class Chooser(Candidates):
         step: calls that are fewer then are so because errors of what is left out and of steps make up for each other.
         """
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
-        for less in sorted(fewer, key=lambda one: float(abs(self.between(one)).max())):
+        for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
             if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):
                 continue  # it alone bounds the step
             same = self.cost(less).step >= self.cost(chosen).step * (1 - WORTH)

@@ -142,8 +142,8 @@ def longest_step(marches: Sequence[RunInSteps], exact: list[np.ndarray], toleran
     stable, runs = min(march.longest for march in marches), list(zip(marches, exact, strict=True))
 
     def kept(step: float) -> bool:
-        for i, (march, own) in enumerate(runs):
-            if not (abs(march.deviations(step) / own - 1.0) <= tolerance).all():
+        for i, (march, deviations) in enumerate(runs):
+            if not (abs(march.deviations(step) / deviations - 1.0) <= tolerance).all():
                 runs.insert(0, runs.pop(i))  # what broke it here is likely to break it elsewhere
                 return False
         return True

@@ -106,13 +106,13 @@ def _begin(march: March, road: np.ndarray) -> np.ndarray:
 
 def _noise(march: March, road: np.ndarray, step: float) -> np.ndarray:
     """Mean force (steps, n, copies) of white noise over each step, 0 where none reaches the vehicle."""
-    own, n = march.reduced.excitation, march.vehicle
+    roads, n = march.reduced.excitation, march.vehicle
     into = np.hstack([b[:n] for b in march.reduced.system.B])
     if not into.any():
         return np.zeros((len(road) // 2, 1, 1))
     begin, middle, end = road[:-2:2], road[1::2], road[2::2]
     path, back = (
-        np.kron(np.eye(len(own.heights)), each)
-        for each in (march.speed * own.F, np.linalg.pinv(march.speed**0.5 * own.G))
+        np.kron(np.eye(len(roads.heights)), each)
+        for each in (march.speed * roads.F, np.linalg.pinv(march.speed**0.5 * roads.G))
     )
     return into @ (back @ ((end - begin) / step - path @ (begin + 4 * middle + end) / 6))

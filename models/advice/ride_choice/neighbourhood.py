@@ -105,7 +105,7 @@ class Neighbourhood:
         speeds."""
         left, full = self.spectra(rest, self.few, True), self.at_few
         ratio = np.sqrt(left.variances / full.variances)
-        logs = [own.slopes / own.variances[..., None] for own in (left, full)]
+        logs = [spectra.slopes / spectra.variances[..., None] for spectra in (left, full)]
         slopes = ratio[..., None] / 2 * (logs[0] - logs[1])
         worst = (abs(ratio - 1) + abs(slopes).sum(axis=2)).argmax(axis=0)
         signs = [np.sign(slopes[i, q]) * (1.0 if ratio[i, q] >= 1 else -1.0) for q, i in enumerate(worst)]
@@ -116,7 +116,7 @@ class Neighbourhood:
         apart = scene.vehicle.side_forces or scene.vehicle.drags
         groups = [speeds[[i]] for i in range(len(speeds))] if apart else [speeds]
         spectra = [self._spectra(scene, speeds, slopes) for speeds in groups]
-        return Spectra(*(np.concatenate([getattr(one, key) for one in spectra]) for key in ("variances", "slopes")))
+        return Spectra(*(np.concatenate([getattr(each, key) for each in spectra]) for key in ("variances", "slopes")))
 
     def _spectra(self, scene: ReducedScene, speeds: np.ndarray, slopes: bool) -> Spectra:
         vehicle, _ = constrain(scene, float(speeds[0]))
@@ -173,9 +173,9 @@ class Response:
         return C, read.road + self.s * read.road_rate
 
 
-def _less(one: Any, other: Any, keys: Iterable[str]) -> Any:
+def _less(spectra: Any, other: Any, keys: Iterable[str]) -> Any:
     """One less another in some of its arrays."""
-    return replace(one, **{key: getattr(one, key) - getattr(other, key) for key in keys})
+    return replace(spectra, **{key: getattr(spectra, key) - getattr(other, key) for key in keys})
 
 
 def _off(scene: ReducedScene, factors: Mapping[Parameter, float]) -> ReducedScene:

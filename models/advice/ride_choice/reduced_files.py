@@ -42,17 +42,17 @@ def reduced(table: dict[str, Any], rest: ReducedScene) -> dict[str, Any]:
     """The tables of the whole vehicle less bars, damping of tyres and what the limits name."""
     bars = {bar.name for bar in rest.vehicle.bars}
     undamped = {tyre.name for tyre in rest.vehicle.tyres if not tyre.damping}
-    found = dict(table)
+    changed = dict(table)
     if "anti_roll_bars" in table:
-        found["anti_roll_bars"] = [bar for bar in table["anti_roll_bars"] if bar["name"] in bars]
-    found["tyres"] = [{**tyre, "damping": 0.0} if tyre["name"] in undamped else tyre for tyre in table["tyres"]]
+        changed["anti_roll_bars"] = [bar for bar in table["anti_roll_bars"] if bar["name"] in bars]
+    changed["tyres"] = [{**tyre, "damping": 0.0} if tyre["name"] in undamped else tyre for tyre in table["tyres"]]
     limits = {
         "massless": sorted(rest.massless),
         "rigid": sorted(rest.rigid),
-        "locked": [list(one) for one in sorted(rest.locked)],
+        "locked": [list(pair) for pair in sorted(rest.locked)],
     }
     given = {key: names for key, names in limits.items() if names}
-    return found | ({"reduced": given} if given else {})
+    return changed | ({"reduced": given} if given else {})
 
 
 def toml(table: dict[str, Any]) -> str:
@@ -63,9 +63,9 @@ def toml(table: dict[str, Any]) -> str:
             continue
         if isinstance(value, dict):
             blocks += ["", f"[{_key(key)}]", *_lines(value)]
-        elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
-            for one in value:
-                blocks += ["", f"[[{_key(key)}]]", *_lines(one)]
+        elif isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+            for entry in value:
+                blocks += ["", f"[[{_key(key)}]]", *_lines(entry)]
         else:
             lines.append(f"{_key(key)} = {_value(value)}")
     return "\n".join([*lines, *blocks]) + "\n"

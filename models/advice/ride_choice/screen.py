@@ -85,13 +85,13 @@ class Screen:
     def identity(self, reduced: Reduced) -> tuple[np.ndarray, np.ndarray]:
         """Certificate: variances (quantities,) by the whole scene's P and the reduced L, and by the reduced P."""
         system, left = reduced.system, (reduced.left @ self.base.T).astype(np.longdouble)
-        own = solve(system, self.rows)
+        covariance = solve(system, self.rows)
         P = left @ self.solved.P @ left.T
         half = system.A.astype(np.longdouble) @ P
         rest = half + half.T + noise_of(system)
         C = system.C[self.rows].astype(np.longdouble)
-        found = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", own.L, rest)
-        return found.astype(float), own.variance.astype(float)
+        variance = np.einsum("ki,ij,kj->k", C, P, C) + np.einsum("kij,ij->k", covariance.L, rest)
+        return variance.astype(float), covariance.variance.astype(float)
 
 
 def still(A: np.ndarray) -> bool:
@@ -102,8 +102,8 @@ def still(A: np.ndarray) -> bool:
 
 def confirmed(reduced: Reduced, rows: list[int]) -> np.ndarray:
     """Variances (quantities,) by the exact solve of the reduced system, inf where it has none. Raises InputError."""
-    found: Covariance = stationary(reduced.system)
-    return np.array([found.variance[row] if found.status[row] == FINITE else np.inf for row in rows])
+    covariance: Covariance = stationary(reduced.system)
+    return np.array([covariance.variance[row] if covariance.status[row] == FINITE else np.inf for row in rows])
 
 
 def silent(reduced: Reduced, rows: list[int]) -> np.ndarray:

@@ -16,13 +16,13 @@ def answer(scene: Scene, engine: str, error: bool = False) -> Answer:
     """Run the scene."""
     assembly = assemble(scene)
     begun = time.process_time()
-    found = run(scene, engine, assembly=assembly, error=error)
+    result = run(scene, engine, assembly=assembly, error=error)
     seconds = time.process_time() - begun
-    told, states = found.counts(), found.detail.states
+    told, states = result.counts(), result.detail.states
     counts = {"steps": told.get("steps", len(states) - 1), "states": states.shape[1]}
-    counts["calls"] = told.get("force calls", CALLS.get(found.data.attrs["integrator"], 1) * counts["steps"])
+    counts["calls"] = told.get("force calls", CALLS.get(result.data.attrs["integrator"], 1) * counts["steps"])
     quantities = {
-        str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in found.data.data_vars.items()
+        str(name): Quantity(each.attrs["units"], (each.values,)) for name, each in result.data.data_vars.items()
     }
     return Answer(quantities, counts, seconds)
 
@@ -45,6 +45,6 @@ def coarsen(table: dict[str, Any], scene: Scene, times: int) -> None:
     """Steps so many times as long, those of every engine; all of them are kept."""
     table["run"] |= {"step": times * scene.run.step}
     table["run"].pop("output_step", None)
-    for own in table.get("engines", {}).values():
-        if "step" in own:
-            own["step"] *= times
+    for engine_table in table.get("engines", {}).values():
+        if "step" in engine_table:
+            engine_table["step"] *= times

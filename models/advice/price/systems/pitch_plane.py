@@ -96,7 +96,7 @@ class OwnPitchPlane:
 
     def ladders(self) -> list[Ladder]:
         """Every method of the catalogue; generalised-alpha with Exudyn's own spectral radius and the recommended."""
-        found = []
+        ladders = []
         for engine in self.engines:
             for name, known in CATALOGUE[engine].items():
                 adaptive = known.adaptive or getattr(OUTSIDE.get(engine), "adaptive", False)
@@ -107,8 +107,8 @@ class OwnPitchPlane:
                     values = values[:1] if (engine, name) in MISSING else values
                     order = 0 if adaptive else known.order
                     default = DEFAULTS.get((engine, method), 0.0)
-                    found.append(Ladder(engine, method, values, order, adaptive, default))
-        return found
+                    ladders.append(Ladder(engine, method, values, order, adaptive, default))
+        return ladders
 
     def reference(self) -> Ladder:
         """The written equations by RK4; each step is half the one before."""

@@ -44,13 +44,13 @@ class OwnWheelset(Meshed):
 
     def read(self, run: list[Path]) -> tuple[np.ndarray, np.ndarray, int]:
         """The quantity of all paths side by side; each is judged."""
-        for speed, one in zip(self.speeds, run, strict=True):
-            judged_path(self.scene, self.own, speed, one)
+        for speed, wheelset_run in zip(self.speeds, run, strict=True):
+            judged_path(self.scene, self.own, speed, wheelset_run)
         name, times = self.quantity, run[0].times
         if name in STATES:
-            columns = [one.states[:, [STATES[name][0]]] for one in run]
+            columns = [wheelset_run.states[:, [STATES[name][0]]] for wheelset_run in run]
         else:
-            columns = [one.contacts[CONTACTS[name][0]] for one in run]
+            columns = [wheelset_run.contacts[CONTACTS[name][0]] for wheelset_run in run]
         return times, np.hstack(columns), 4 * len(run) * (len(times) - 1) * run[0].contacts.shape[1]
 
     def lines(self, setting: Setting) -> list[str]:
