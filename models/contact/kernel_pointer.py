@@ -48,8 +48,8 @@ def pointer(cells: int = 21, distance: Distance | None = None) -> Pointer:
     distance : of bodies whose contact is no ellipse; then the table is theirs, for Kalker's theory of 1983.
     """
     compiled = _compiled()
-    found = net(cells) if distance is None else table(distance, cells)
-    return Pointer(int(compiled.address), found, compiled.ctypes)
+    mesh = net(cells) if distance is None else table(distance, cells)
+    return Pointer(int(compiled.address), mesh, compiled.ctypes)
 
 
 @cache

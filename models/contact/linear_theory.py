@@ -202,9 +202,9 @@ def _narrow(kind: int, ratio: float, nu: float) -> float:
 def _long(kind: int, ratio: float, nu: float) -> float:
     """Coefficient of a patch along the direction of rolling, b/a = g to 0 (the same table, last row)."""
     wide = 2.0 * math.log(4.0 * ratio)
-    one, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu
+    divisor, two, three = wide - 2.0 * nu, (1.0 - nu) * wide + 2.0 * nu, (1.0 - nu) * wide - 2.0 + 4.0 * nu
     if kind == 0:
-        return 2.0 * math.pi * ratio / one * (1.0 + (3.0 - math.log(4.0)) / one)
+        return 2.0 * math.pi * ratio / divisor * (1.0 + (3.0 - math.log(4.0)) / divisor)
     if kind == 1:
         return 2.0 * math.pi * ratio / two * (1.0 + (1.0 - nu) * (3.0 - math.log(4.0)) / two)
     if kind == 2:

@@ -74,8 +74,8 @@ class Pair:
 
         Dundurs' second constant is K / (1 - nu).
         """
-        one, two = self.one, self.two
-        return self.G / 4.0 * ((1.0 - 2.0 * one.nu) / one.G - (1.0 - 2.0 * two.nu) / two.G)
+        first, two = self.one, self.two
+        return self.G / 4.0 * ((1.0 - 2.0 * first.nu) / first.G - (1.0 - 2.0 * two.nu) / two.G)
 
     def quasi_identity_error(self, friction: float) -> float:
         """Force, as a share of mu N, that leaving K out may cost at this coefficient of friction: 2 |K| / mu.

@@ -48,11 +48,11 @@ class Distance:
     @property
     def curvatures(self) -> tuple[float, float]:
         """Second derivatives (1/m) in the middle of x and y, over four nodes, along and across."""
-        found = []
+        second_differences = []
         for x, y in ((4.0 * self.dx, 0.0), (0.0, 4.0 * self.dy)):
             low, here, high = self.at(np.array([-x, 0.0, x]), np.array([-y, 0.0, y]))
-            found.append(float((low - 2.0 * here + high) / (x + y) ** 2))
-        return found[0], found[1]
+            second_differences.append(float((low - 2.0 * here + high) / (x + y) ** 2))
+        return second_differences[0], second_differences[1]
 
     @cached_property
     def padded(self) -> Array:

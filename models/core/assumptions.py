@@ -97,13 +97,13 @@ class Broken:
 
 def broken(run: Result, assumption: Assumption) -> Broken | None:
     """Where a run breaks an assumption most, None where it keeps to it; values that are no numbers are not judged."""
-    found = [
+    judged = [
         _rarely(run, assumption, where, values)
         if isinstance(values, Gaussian)
         else _broken(run, assumption, where, np.asarray(values, float))
         for where, values in assumption.watched(run).items()
     ]
-    return max((one for one in found if one is not None), key=lambda one: one.share, default=None)
+    return max((breach for breach in judged if breach is not None), key=lambda breach: breach.share, default=None)
 
 
 def _broken(run: Result, a: Assumption, where: str, values: np.ndarray) -> Broken | None:
@@ -139,9 +139,9 @@ def _rarely(run: Result, a: Assumption, where: str, values: Gaussian) -> Broken 
 def judged(run: Result, assumptions: Iterable[Assumption]) -> Result:
     """The result with what it assumes, and what of that it broke; its status says so, too."""
     listed = list(assumptions)
-    breaches = [one for one in (broken(run, each) for each in listed) if one is not None]
+    breaches = [breach for breach in (broken(run, each) for each in listed) if breach is not None]
     run.data.attrs["assumptions"] = json.dumps(
-        {"assumed": [each.says for each in listed], "broken": [asdict(one) for one in breaches]}
+        {"assumed": [each.says for each in listed], "broken": [asdict(breach) for breach in breaches]}
     )
     if breaches:
         run.data.attrs["status"] += ", assumptions broken"
@@ -164,13 +164,13 @@ def watching(note: Callable[[Result], None]) -> Iterator[None]:
 
 def assumption_lines(assumptions: Iterable[Assumption], width: int = 10) -> list[str]:
     """What ``twinrig show`` says that a scene assumes, a line each."""
-    return [f"  {'assumes':<{width}} {one.says} ({one.allowed})" for one in assumptions]
+    return [f"  {'assumes':<{width}} {assumption.says} ({assumption.allowed})" for assumption in assumptions]
 
 
 def broken_of(run: Result) -> list[Broken]:
     """Assumptions that a result says it broke."""
     said: dict[str, Any] = json.loads(run.data.attrs.get("assumptions", "{}"))
-    return [Broken(**one) for one in said.get("broken", ())]
+    return [Broken(**entry) for entry in said.get("broken", ())]
 
 
 def assumed_of(run: Result) -> list[str]:
@@ -185,9 +185,9 @@ def breaches() -> Iterator[dict[str, Broken]]:
     worst: dict[str, Broken] = {}
 
     def note(run: Result) -> None:
-        for one in broken_of(run):
-            if one.name not in worst or one.share > worst[one.name].share:
-                worst[one.name] = one
+        for breach in broken_of(run):
+            if breach.name not in worst or breach.share > worst[breach.name].share:
+                worst[breach.name] = breach
 
     with watching(note):
         yield worst

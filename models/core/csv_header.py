@@ -100,8 +100,8 @@ def trimmed(cells: Sequence[str]) -> list[str]:
 
 def separator_line(text: str) -> str:
     """Separator that a first line ``sep=;`` names; empty where it is no such line."""
-    found = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
-    return found[1] if found else ""
+    matched = re.fullmatch(r'\s*"?sep=(.)"?\s*', text, re.IGNORECASE)
+    return matched[1] if matched else ""
 
 
 def decimal_sign(path: str | Path, line: int, separator: str, cells: Sequence[str]) -> str:
@@ -129,8 +129,8 @@ def is_number(cell: str) -> bool:
 def find_head(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:
     """Headings above numbers by every separator that makes sense of the first line that has such; none where no line
     has."""
-    found = ([head for sign in separators if (head := _head(lines, i, known, sign))] for i in range(len(lines)))
-    return next(filter(None, found), [])
+    heads = ([head for sign in separators if (head := _head(lines, i, known, sign))] for i in range(len(lines)))
+    return next(filter(None, heads), [])
 
 
 def find_headings(lines: Sequence[Line], known: Callable[[str], bool], separators: Sequence[str]) -> list[Head]:

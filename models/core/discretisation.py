@@ -146,7 +146,7 @@ def estimated(
     told, how = by_steps(fine, again, order, step, growth, sizes)
     known = {name: run.data[name].attrs.get("units", "") for name in fine.channels if name in run.data}
     known |= fine.units
-    return stated(run, {name: replace(one, unit=known.get(name, "")) for name, one in told.items()}, how)
+    return stated(run, {name: replace(estimate, unit=known.get(name, "")) for name, estimate in told.items()}, how)
 
 
 def by_steps(
@@ -193,11 +193,11 @@ def _by_half_steps(
     rows = rows_at(finer.times, fine.times[part])
     told = {}
     for name, values in fine.channels.items():
-        one = estimate(finer.channels[name][rows], values[part], order, step)
+        error = estimate(finer.channels[name][rows], values[part], order, step)
         later = max(
             _later(values[part] - finer.channels[name][rows], values) if part[0] else 1.0, growth.get(name, 1.0)
         )
-        told[name] = rescaled(replace(one, error=one.error * 2.0**one.order * later), size_of(values), step)
+        told[name] = rescaled(replace(error, error=error.error * 2.0**error.order * later), size_of(values), step)
     return told
 
 
@@ -216,12 +216,12 @@ def _later(gap: np.ndarray, values: np.ndarray) -> float:
     return max(1.0, rougher, (len(values) / len(gap)) ** min(power, STEEPEST))
 
 
-def rescaled(one: Estimate, size: float, step: float) -> Estimate:
+def rescaled(estimate: Estimate, size: float, step: float) -> Estimate:
     """The estimate with the share and the step that follow from its error and the size of the whole channel, ``step``
     being that of the run."""
-    share = one.error / size if size > 0.0 else (0.0 if one.error == 0.0 else math.inf)
-    wanted = (share / GOAL) ** (1.0 / one.order) if share < math.inf else 1.0
-    return replace(one, share=share, step=step / _parts(wanted))
+    share = estimate.error / size if size > 0.0 else (0.0 if estimate.error == 0.0 else math.inf)
+    wanted = (share / GOAL) ** (1.0 / estimate.order) if share < math.inf else 1.0
+    return replace(estimate, share=share, step=step / _parts(wanted))
 
 
 def _parts(wanted: float) -> int:
@@ -247,8 +247,8 @@ def of_tolerance(
         same = len(looser.times) == len(fine.times) and np.array_equal(looser.times, fine.times)
         at = values if same else CubicSpline(fine.times, values)(looser.times)
         error = max(_rms(at - looser.channels[name]) / (factor**FALL - 1.0), FLOOR * tolerance * size_of(values))
-        one = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
-        told[name] = rescaled(one, (sizes or {}).get(name, size_of(values)), tolerance)
+        estimate = Estimate(error, run.data[name].attrs.get("units", ""), 0.0, 1.0 / FALL, tolerance)
+        told[name] = rescaled(estimate, (sizes or {}).get(name, size_of(values)), tolerance)
     return stated(run, told, f"a run with {factor:g} times the tolerance", "as tolerance")
 
 
@@ -259,15 +259,15 @@ def by_cells(error: float, size: float, unit: str, cells: int, order: float, mos
     return Estimate(error, unit, share, order, float(min(most, math.ceil(needed))), CELLS)
 
 
-def summed(one: Estimate, other: Estimate) -> Estimate:
+def summed(first: Estimate, other: Estimate) -> Estimate:
     """An error on top of another, as that of an input on top of that of the run which it drives.
 
     What mends it is told of the larger one where that is of cells and the other of steps.
     """
-    larger = one if one.share >= other.share else other
-    step = min(one.step, other.step) if one.of == other.of == "" else larger.step
-    order = min(one.order, other.order)
-    return Estimate(one.error + other.error, one.unit, one.share + other.share, order, step, larger.of)
+    larger = first if first.share >= other.share else other
+    step = min(first.step, other.step) if first.of == other.of == "" else larger.step
+    order = min(first.order, other.order)
+    return Estimate(first.error + other.error, first.unit, first.share + other.share, order, step, larger.of)
 
 
 def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:
@@ -275,13 +275,13 @@ def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    channels = {name: asdict(one) for name, one in told.items()}
+    channels = {name: asdict(estimate) for name, estimate in told.items()}
     run.data.attrs["error"] = json.dumps({"how": how, "of": of, "channels": channels})
     worst = max(told, key=lambda name: told[name].share, default=None)
     if worst is not None and told[worst].refused:
-        engine, one = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
-        why = f"{worst} errs by {100.0 * one.share:.3g} % of its deviation; {one.advice(of)}"
-        fault = "cells are too few" if one.of else "steps are too long" if one.step else "error is too large"
+        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
+        why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(of)}"
+        fault = "cells are too few" if estimate.of else "steps are too long" if estimate.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
         failure.partial = run
         raise failure
@@ -306,7 +306,7 @@ def of_theory(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
     No grid lessens it, so that it is neither warned of nor refused.
     """
     said = json.loads(run.data.attrs["error"])
-    said["theory"] = {"how": how, "channels": {name: asdict(one) for name, one in told.items()}}
+    said["theory"] = {"how": how, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 
@@ -317,7 +317,7 @@ def of_chance(run: Result, told: Mapping[str, Estimate], samples: int) -> Result
     Beside it stands what was said of the steps before.
     """
     said = json.loads(run.data.attrs["error"])
-    said["chance"] = {"samples": samples, "channels": {name: asdict(one) for name, one in told.items()}}
+    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 
@@ -331,27 +331,27 @@ def by_chance(error: float, size: float, unit: str, samples: int) -> Estimate:
 
 def worst_of(run: Result) -> Estimate | None:
     """The estimate of the largest share; None where none was made."""
-    return max(errors_of(run).values(), key=lambda one: one.share, default=None)
+    return max(errors_of(run).values(), key=lambda estimate: estimate.share, default=None)
 
 
 def error_lines(run: Result) -> list[str]:
     """What is printed of a result's error: the worst channel of steps and of cells, the worst of both first, with a
     warning and what to use where one is due; then what its theory and its sample leave."""
     said, told = json.loads(run.data.attrs.get("error", "{}")), errors_of(run)
-    found = [f"error not estimated: {said['why']}"] if "why" in said else []
-    shares = {name: one.share for name, one in sorted(told.items(), key=lambda entry: entry[1].share)}
+    text = [f"error not estimated: {said['why']}"] if "why" in said else []
+    shares = {name: estimate.share for name, estimate in sorted(told.items(), key=lambda entry: entry[1].share)}
     worst = {told[name].of: name for name in shares}
     for name in sorted(worst.values(), key=lambda name: -shares[name]):
         line = f"error at most {_size(name, told[name])}, by {said['how']}"
-        found.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
+        text.append(f"{line}: WARNING, {told[name].advice(said['of'])}" if told[name].warned else line)
     for kind, words in (("theory", "error of the theory"), ("chance", "standard error of {samples} paths")):
         if kind in said:
             name, values = max(said[kind]["channels"].items(), key=lambda entry: entry[1]["share"])
             line = f"{words.format(**said[kind])} at most {_size(name, Estimate(**values))}"
-            found.append(f"{line}, {said[kind]['how']}" if "how" in said[kind] else line)
-    return found
+            text.append(f"{line}, {said[kind]['how']}" if "how" in said[kind] else line)
+    return text
 
 
-def _size(name: str, one: Estimate) -> str:
-    size = f"{one.error:.2g} {one.unit}".rstrip()
-    return f"{100.0 * one.share:.2g} % ({name}: {size})"
+def _size(name: str, estimate: Estimate) -> str:
+    size = f"{estimate.error:.2g} {estimate.unit}".rstrip()
+    return f"{100.0 * estimate.share:.2g} % ({name}: {size})"

@@ -163,8 +163,8 @@ def module_of(system: str, name: str) -> Any:
         file = import_module(f"{SYSTEMS[system].effects}.{name}")
     except (ImportError, SyntaxError) as error:
         raise InputError(f"{name}.py", "", None, f"is no effect of {system} that can be imported: {error}") from None
-    own = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
-    missing = [key for key in ("COST", *own) if not hasattr(file, key)]
+    needed = ("PLACE", "leave_out") if hasattr(file, "named") else ("Parameters", "extend")
+    missing = [key for key in ("COST", *needed) if not hasattr(file, key)]
     if missing:
         raise InputError(
             f"{name}.py",
@@ -195,8 +195,8 @@ def absent(scene: Any) -> tuple[str, ...]:
 
 def tables_of(scene: Any) -> Mapping[str, Any]:
     """The scene's tables [effects.NAME]."""
-    own = getattr(scene, "effects", None)
-    return own if isinstance(own, Mapping) else {}
+    tables = getattr(scene, "effects", None)
+    return tables if isinstance(tables, Mapping) else {}
 
 
 @cache
@@ -212,31 +212,33 @@ def read_tables(tables: Mapping[str, Any], system: str, file: str) -> Table:
 
 def with_own(scene: Any) -> Any:
     """The scene with its tables [effects.NAME] read; refuses what is no effect, and what cannot be together."""
-    found = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
-    if found.effects:
-        check(found)
-    return found
+    extended_scene = scene.model_copy(update={"effects": read_tables(scene.effects, scene.system, scene.file)})
+    if extended_scene.effects:
+        check(extended_scene)
+    return extended_scene
 
 
 def extended(built: Any, scene: Any) -> Any:
     """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
-    for name, own in tables_of(scene).items():
-        built = _extend(name, module_of(scene.system, name), built, own)
+    for name, table in tables_of(scene).items():
+        built = _extend(name, module_of(scene.system, name), built, table)
     return built
 
 
-def _extend(name: str, module: Any, built: Any, own: Any) -> Any:
+def _extend(name: str, module: Any, built: Any, table: Any) -> Any:
     try:
-        found = module.extend(built, own)
+        result = module.extend(built, table)
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        lines = [one.lineno for one in traceback.extract_tb(error.__traceback__) if one.filename == module.__file__]
+        lines = [
+            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == module.__file__
+        ]
         allowed = f"line {lines[-1]} stops with {type(error).__name__}: {error}"
         raise InputError(f"{name}.py", "extend", None, allowed) from error
-    if found is None:
+    if result is None:
         raise InputError(f"{name}.py", "extend", None, "returns nothing: it must give back what it gets, changed")
-    return found
+    return result
 
 
 def _read(name: str, values: Any, system: str, file: str) -> Any:
@@ -308,9 +310,9 @@ def without(scene: Any, *left_out: str) -> Any:
             del table["effects"][name]
         else:
             module_of(scene.system, name).leave_out(table, scene)
-    found = _confirmed(rebuilt(table, scene), left_out, False)
+    smaller = _confirmed(rebuilt(table, scene), left_out, False)
     needy = [name for name in named(scene) if set(left_out) & {*module_of(scene.system, name).NEEDS}]
-    gone = [name for name in needy if name not in (*left_out, *named(found))]
+    gone = [name for name in needy if name not in (*left_out, *named(smaller))]
     if gone:
         need = "it needs" if len(gone) == 1 else "they need"
         raise InputError(
@@ -319,7 +321,7 @@ def without(scene: Any, *left_out: str) -> Any:
             None,
             f"{' and '.join(left_out)} cannot be left out alone: leave out {' and '.join(gone)}, too, for {need} it",
         )
-    return found
+    return smaller
 
 
 def _depth(name: str, system: str) -> int:
@@ -359,9 +361,9 @@ def _put_in(table: Table, name: str, scene: Any) -> None:
 
 def rebuilt(table: Table, scene: Any) -> Any:
     """The scene of an edited table, checked."""
-    found = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
-    check(found)
-    return found
+    changed_scene = import_module(SYSTEMS[scene.system].scene).build(table, scene.file, Path(scene.folder))
+    check(changed_scene)
+    return changed_scene
 
 
 def lines(scene: Any, width: int = 10) -> list[str]:

@@ -70,9 +70,9 @@ def checked(model: type[Model], table: Mapping[str, Any], file: str, folder: Pat
     for key in ("file", "folder"):
         if key in table:
             raise InputError(file, key, table[key], "unknown key", tuple(set(model.model_fields) - {"file", "folder"}))
-    found = read(model, {**_automatic(model, table, file), "file": file, "folder": str(folder)}, file)
-    found.check_choice()
-    return found
+    checked_scene = read(model, {**_automatic(model, table, file), "file": file, "folder": str(folder)}, file)
+    checked_scene.check_choice()
+    return checked_scene
 
 
 AUTO = "auto"
@@ -194,10 +194,10 @@ def _value(text: str) -> Any:
     """A value as in a scene file; text needs no quotes."""
     for written in (text,) if '"' in text or "'" in text else (text, BARE_POINT.sub(_with_digits, text)):
         try:
-            found = tomllib.loads(f"x = {written}")
+            parsed = tomllib.loads(f"x = {written}")
         except (ValueError, RecursionError):
             continue
-        return found["x"] if len(found) == 1 else text
+        return parsed["x"] if len(parsed) == 1 else text
     return text
 
 

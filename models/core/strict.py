@@ -52,17 +52,17 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
 
 def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
     """One message for all that was found."""
-    first, *others = sorted(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+    first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]
     said = _phrase(first, keys, _owner(model, keys))
-    rest = [_dotted(place, _keys(found)) for found in others if f"mean {_keys(found)[-1]!r}" not in said]
+    rest = [_dotted(place, _keys(fault)) for fault in others if f"mean {_keys(fault)[-1]!r}" not in said]
     more = f"; also wrong: {', '.join(rest[:5])}{', ...' if len(rest) > 5 else ''}" if rest else ""
     return InputError(file, _dotted(place, keys), value, said + more)
 
 
-def _keys(found: Any) -> tuple[str, ...]:
-    return tuple(str(part) for part in found["loc"])
+def _keys(fault: Any) -> tuple[str, ...]:
+    return tuple(str(part) for part in fault["loc"])
 
 
 def _dotted(place: str, keys: tuple[str, ...]) -> str:

@@ -159,9 +159,9 @@ def _cut_off(lines: list[str]) -> bool:
     numbers = [NUMBER.fullmatch(cell.strip()) for _, _, cell in (*before[1:], last)]
     if None in numbers:
         return True
-    *others, own = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
+    *others, cut = [[len(part or "") for part in number.groups()] for number in numbers if number is not None]
     fewest = [min(counts) for counts in zip(*others, strict=True)]
-    whole = own[1] >= fewest[1] and own[2] >= fewest[2] and (fewest[1] > 0 or own[0] >= fewest[0])
+    whole = cut[1] >= fewest[1] and cut[2] >= fewest[2] and (fewest[1] > 0 or cut[0] >= fewest[0])
     value, *earlier = (float(cell) for _, _, cell in (last, *before[:0:-1][:RUN]))
     leaps = [abs(a - b) for a, b in itertools.pairwise(earlier)]
     leaping = len(last[2]) < len(before[-1][2]) and abs(value - earlier[0]) > LEAP * max(leaps, default=0.0)
@@ -282,8 +282,8 @@ def _opened(path: Path) -> TextIO:
 
 def _nearest(header: str, columns: tuple[Columns, ...]) -> Columns:
     """The set of columns that shares most names with the header."""
-    found = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
-    return max(columns, key=lambda wanted: len(found & set(wanted)))
+    in_header = {cell.partition("[")[0].strip().strip('"') for cell in header.split(",")}
+    return max(columns, key=lambda wanted: len(in_header & set(wanted)))
 
 
 def _block(path: Path, part: list[tuple[int, str]], names: list[str], factors: np.ndarray, titles: list[str]) -> Block:

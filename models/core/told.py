@@ -18,14 +18,14 @@ Results = Mapping[str, Result]
 
 def lines(results: Results) -> list[str]:
     """Lines for the screen: errors first, then broken assumptions, each once with the names of those that broke it."""
-    return [*_errors(results), *(f"  {names}: {one.line()}" for names, one in breaches(results))]
+    return [*_errors(results), *(f"  {names}: {breach.line()}" for names, breach in breaches(results))]
 
 
 def _errors(results: Results) -> list[str]:
     if len(results) <= EACH:
         return [f"  {name}: {line}" for name, run in results.items() for line in error_lines(run)]
     untold: dict[str, list[str]] = {}
-    worst = {name: one for name, run in results.items() if (one := worst_of(run)) is not None}
+    worst = {name: estimate for name, run in results.items() if (estimate := worst_of(run)) is not None}
     for name, run in results.items():
         for line in error_lines(run) if name not in worst else ():
             untold.setdefault(line, []).append(name)
@@ -33,7 +33,7 @@ def _errors(results: Results) -> list[str]:
     if not worst:
         return listed
     largest = max(worst, key=lambda name: worst[name].share)
-    warned = [name for name, one in worst.items() if one.warned]
+    warned = [name for name, estimate in worst.items() if estimate.warned]
     more = (
         [f"  errors above {100.0 * WARNED:g} % in {len(warned)} of {len(worst)}: {_few(warned)}"] if warned[1:] else []
     )
@@ -50,11 +50,11 @@ def breaches(results: Results) -> list[tuple[str, Broken]]:
     where: dict[str, list[str]] = {}
     worst: dict[str, Broken] = {}
     for name, run in results.items():
-        for one in broken_of(run):
-            where.setdefault(one.name, []).append(name)
-            if one.name not in worst or one.share > worst[one.name].share:
-                worst[one.name] = one
-    return [(_few(where[name]), one) for name, one in worst.items()]
+        for breach in broken_of(run):
+            where.setdefault(breach.name, []).append(name)
+            if breach.name not in worst or breach.share > worst[breach.name].share:
+                worst[breach.name] = breach
+    return [(_few(where[name]), breach) for name, breach in worst.items()]
 
 
 def remarks(results: Results) -> list[str]:
@@ -64,7 +64,7 @@ def remarks(results: Results) -> list[str]:
         for name, run in results.items()
         if (worst := worst_of(run)) is not None and worst.warned
     ]
-    return [*steps[:EACH], *(one.brief() for _, one in breaches(results))]
+    return [*steps[:EACH], *(breach.brief() for _, breach in breaches(results))]
 
 
 def gathered(whole: Result, parts: Results) -> Result:
@@ -78,8 +78,10 @@ def gathered(whole: Result, parts: Results) -> Result:
     }
     whole.data.attrs["error"] = json.dumps({**first, "channels": channels} if channels else first)
     assumed = dict.fromkeys(text for run in parts.values() for text in assumed_of(run))
-    kept = [replace(one, where=f"{names}, {one.where}") for names, one in breaches(parts)]
-    whole.data.attrs["assumptions"] = json.dumps({"assumed": list(assumed), "broken": [asdict(one) for one in kept]})
+    kept = [replace(breach, where=f"{names}, {breach.where}") for names, breach in breaches(parts)]
+    whole.data.attrs["assumptions"] = json.dumps(
+        {"assumed": list(assumed), "broken": [asdict(breach) for breach in kept]}
+    )
     broke = (run.data.attrs["status"] for run in parts.values() if broken_of(run))
     whole.data.attrs["status"] = next(broke, whole.data.attrs["status"])
     return whole
@@ -91,7 +93,7 @@ def inherited(derived: Result, results: Results, how: str) -> Result:
     Without estimates in the results it has none.
     """
     assumed = [says for run in results.values() for says in assumed_of(run)]
-    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(one) for _, one in breaches(results)]}
+    told = {"assumed": list(dict.fromkeys(assumed)), "broken": [asdict(breach) for _, breach in breaches(results)]}
     derived.data.attrs["assumptions"] = json.dumps(told)
     if told["broken"] and "assumptions broken" not in derived.data.attrs["status"]:
         derived.data.attrs["status"] += ", assumptions broken"

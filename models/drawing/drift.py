@@ -126,13 +126,13 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
     """
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.2))
-    for road, found in sweep.items():
+    for road, curve in sweep.items():
         name, colour = ROADS[road]
-        axes[0].loglog(found[:, 0], found[:, 1], "-", color=colour, label=f"spring, {name}")
-        axes[0].loglog(found[:, 0], found[:, 2], "o", color=colour, markersize=4, label=f"high-pass, {name}")
-        held = found[:, 1] < TUMBLED
-        axes[1].loglog(found[held, 0], found[held, 3], "o-", color=colour, markersize=4, label=name)
-        tumbled = found[~held, 0]
+        axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring, {name}")
+        axes[0].loglog(curve[:, 0], curve[:, 2], "o", color=colour, markersize=4, label=f"high-pass, {name}")
+        held = curve[:, 1] < TUMBLED
+        axes[1].loglog(curve[held, 0], curve[held, 3], "o-", color=colour, markersize=4, label=name)
+        tumbled = curve[~held, 0]
         axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles, {name}")
     low = limits.pitch_error / 2
     axes[0].axhspan(low, limits.pitch_error, color="#00795a", alpha=0.16, linewidth=0, label="allowed")

@@ -100,12 +100,12 @@ class _Powers(LogFormatterSciNotation):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The label of a mark, as matplotlib asks for it."""
-        found = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
-        if not found:
+        power = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
+        if not power:
             return text
         if self.axis and _narrow(*sorted(self.axis.get_view_interval())) and 1e-3 <= x < 1e5:
             return f"{x:g}"
-        return f"{found[1] + ' × ' if found[1] else ''}10{found[2].translate(RAISED)}"
+        return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(RAISED)}"
 
 
 class _Between(LogLocator):

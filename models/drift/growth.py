@@ -117,9 +117,9 @@ def growth_until(pitch_rate: np.ndarray, period: float, p: Parameters, cutoff: f
         second, third, fourth = (np.cumsum(values * times**power) for power in (2, 3, 4))
         return 3 * times**2 * second - 4 * times * third + fourth
 
-    found = np.zeros(len(times))
-    found[2:] = weighted(squares)[2:] / weighted(np.ones(len(times)))[2:]
-    return np.sqrt(np.maximum(found, 0.0))
+    scaled = np.zeros(len(times))
+    scaled[2:] = weighted(squares)[2:] / weighted(np.ones(len(times)))[2:]
+    return np.sqrt(np.maximum(scaled, 0.0))
 
 
 def pitch_variance(times: np.ndarray | float, rate: np.ndarray | float, intensity: float) -> np.ndarray:

@@ -80,9 +80,9 @@ def consistency(innovations: np.ndarray, names: Sequence[str]) -> Consistency:
 
 def _mean(name: str, column: np.ndarray, tail: float) -> Figure:
     """In deviations of an innovation."""
-    own = column[np.isfinite(column)]
-    wide = float(norm.isf(tail)) / math.sqrt(len(own))
-    return Figure(f"mean of {name}", float(own.mean()), -wide, wide)
+    known = column[np.isfinite(column)]
+    wide = float(norm.isf(tail)) / math.sqrt(len(known))
+    return Figure(f"mean of {name}", float(known.mean()), -wide, wide)
 
 
 def _correlation(name: str, column: np.ndarray, tail: float) -> Figure:

@@ -148,7 +148,7 @@ def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
     """
     if len(run.times) != len(truth.times) or np.abs(run.times - truth.times).max() > 1e-9:
         raise InputError("", "times", None, "the run and the true one need rows at the same times")
-    loads, true = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (run, truth))
+    loads, true = (section_forces(forces["f3"], forces["f4"], forces["pitch"]) for forces in (run, truth))
     pitch = run["pitch"] - truth["pitch"]
     return Errors(
         damage={name: damage_ratio(loads[name], true[name], slope) for name in CHANNELS},
@@ -160,15 +160,15 @@ def errors(run: Result, truth: Result, slope: float = SLOPE) -> Errors:
     )
 
 
-def verdict(own: Own, found: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
+def verdict(figures: Own, deviations: Errors, effects: Iterable[str], limits: Limits) -> Verdict:
     """The verdict of a virtual measurement, by damage, pitch error and artificial moment.
 
     ``accepted``: all within the limits. ``stabilise``: a run without any stabiliser (none of MEASURED or LEVEL among
     the scene's ``effects``) that is outside them but has not tumbled. ``rejected``: all else.
     """
-    if own.pitch_max > TUMBLED:
-        return _tumbled(own)
-    wrong = [*_beyond(found, limits), *_burden(own, limits)]
+    if figures.pitch_max > TUMBLED:
+        return _tumbled(figures)
+    wrong = [*_beyond(deviations, limits), *_burden(figures, limits)]
     if not wrong:
         return Verdict("accepted", f"damage ratios within {limits.damage_error:.0%} of 1")
     stabilised = not set(effects).isdisjoint((*MEASURED, *LEVEL))
@@ -196,7 +196,7 @@ def uncertainty(run: Result) -> float:
 
 
 def blind_verdict(
-    own: Own,
+    figures: Own,
     effects: Iterable[str],
     duration: float,
     limits: Limits,
@@ -215,21 +215,21 @@ def blind_verdict(
     effects : names of the scene's effects; duration : of the run in s; ``trusted`` and ``consistent`` None: not known.
     """
     named = set(effects)
-    if own.pitch_max > TUMBLED:
-        return _tumbled(own)
+    if figures.pitch_max > TUMBLED:
+        return _tumbled(figures)
     if named.isdisjoint((*MEASURED, *LEVEL)):
         return _free(duration, trusted)
-    wrong = _burden(own, limits) + (["NIS outside its band"] if consistent is False else [])
+    wrong = _burden(figures, limits) + (["NIS outside its band"] if consistent is False else [])
     wrong += [f"pitch known to {uncertainty:.2g} rad only"] if uncertainty > limits.pitch_error else []
     if wrong:
         return Verdict("rejected", "; ".join(wrong))
     if named.isdisjoint(MEASURED):
         return Verdict("stabilise", "held near zero, not to a measured pitch: wrong on a grade, unseen in the run")
-    return Verdict("accepted", f"held to the measured pitch by {own.moment_share_band:.1%} of I pitch''")
+    return Verdict("accepted", f"held to the measured pitch by {figures.moment_share_band:.1%} of I pitch''")
 
 
-def _tumbled(own: Own) -> Verdict:
-    return Verdict("rejected", f"tumbled: pitch of {own.pitch_max:.2g} rad; none of its forces mean anything")
+def _tumbled(figures: Own) -> Verdict:
+    return Verdict("rejected", f"tumbled: pitch of {figures.pitch_max:.2g} rad; none of its forces mean anything")
 
 
 def _free(duration: float, trusted: float | None) -> Verdict:
@@ -240,19 +240,21 @@ def _free(duration: float, trusted: float | None) -> Verdict:
     return Verdict("stabilise", f"free, and trusted for {trusted:.3g} s of {duration:.3g} s")
 
 
-def _beyond(found: Errors, limits: Limits) -> list[str]:
+def _beyond(deviations: Errors, limits: Limits) -> list[str]:
     """What the true run shows to be wrong."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
-        for name, ratio in found.damage.items()
+        for name, ratio in deviations.damage.items()
         if not abs(ratio - 1.0) <= limits.damage_error
     ]
-    return damage + ([] if found.pitch_max <= limits.pitch_error else [f"pitch wrong by {found.pitch_max:.2g} rad"])
+    return damage + (
+        [] if deviations.pitch_max <= limits.pitch_error else [f"pitch wrong by {deviations.pitch_max:.2g} rad"]
+    )
 
 
-def _burden(own: Own, limits: Limits) -> list[str]:
+def _burden(figures: Own, limits: Limits) -> list[str]:
     """What the run itself shows to be wrong."""
-    shares = {"moment": (own.moment_share_band, "I pitch''"), "force": (own.force_share_band, "m3 z3''")}
+    shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
         f"artificial {name} {share:.0%} of {whole}"
         for name, (share, whole) in shares.items()
@@ -274,8 +276,8 @@ def low_pass(values: np.ndarray, step: float) -> np.ndarray:
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:
     """Rms of a part by that of the whole; nothing of nothing is nothing."""
-    own, all_of_it = rms(part), rms(whole)
-    return own / all_of_it if all_of_it > 0 else (np.inf if own > 0 else 0.0)
+    size, all_of_it = rms(part), rms(whole)
+    return size / all_of_it if all_of_it > 0 else (np.inf if size > 0 else 0.0)
 
 
 def _means(values: np.ndarray, step: float) -> np.ndarray:

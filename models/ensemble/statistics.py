@@ -47,5 +47,5 @@ def quantile(values: np.ndarray, level: float) -> tuple[float, float, float]:
     ordered, count = np.sort(values), len(values)
     half = ERRORS_95 * math.sqrt(count * level * (1 - level))
     ranks = (math.ceil(count * level) - 1, math.floor(count * level - half) - 1, math.ceil(count * level + half) - 1)
-    found = [float(ordered[min(max(rank, 0), count - 1)]) for rank in ranks]
-    return found[0], found[1], found[2]
+    quantiles = [float(ordered[min(max(rank, 0), count - 1)]) for rank in ranks]
+    return quantiles[0], quantiles[1], quantiles[2]

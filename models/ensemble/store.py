@@ -46,17 +46,18 @@ class Store:
             self._claim(fingerprint(facts))
             yield
 
-    def _claim(self, own: dict[str, Any]) -> None:
+    def _claim(self, described: dict[str, Any]) -> None:
         """Note down whose blocks these are; raises InputError if the folder belongs to another job."""
         file = self.folder / JOB
         if not file.exists():
-            write_whole(file, json.dumps(own, indent=1).encode())
+            write_whole(file, json.dumps(described, indent=1).encode())
             return
         kept = _read_note(file)
-        for key in (*own, *kept):
-            if own.get(key) != kept.get(key):
+        for key in (*described, *kept):
+            if described.get(key) != kept.get(key):
                 allowed = (
-                    f"this folder belongs to another job: {own.get(key)!r} is asked for here; resume with what it was "
+                    f"this folder belongs to another job: {described.get(key)!r} is asked for here; "
+                    "resume with what it was "
                     "begun with, or begin in a new folder"
                 )
                 raise InputError(file, key, kept.get(key), allowed)
@@ -146,21 +147,21 @@ def named_files(value: Any, folder: Path) -> dict[str, str]:
     value : texts, and lists and tables of these. Files that a TOML file names count from its own folder; of code
     named ``file.py:Name`` or ``module:Name`` it is the file, without what that imports.
     """
-    found: dict[str, str] = {}
-    _collect(value, folder, found, set())
-    return found
+    hashes: dict[str, str] = {}
+    _collect(value, folder, hashes, set())
+    return hashes
 
 
-def _collect(value: Any, folder: Path, found: dict[str, str], seen: set[Path]) -> None:
+def _collect(value: Any, folder: Path, hashes: dict[str, str], seen: set[Path]) -> None:
     if isinstance(value, dict | list | tuple):
         for inner in value.values() if isinstance(value, dict) else value:
-            _collect(inner, folder, found, seen)
+            _collect(inner, folder, hashes, seen)
     elif isinstance(value, str) and (path := _file(value, folder)) and path.resolve() not in seen:
         seen.add(path.resolve())
         content = path.read_bytes()
-        found[value] = found.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
+        hashes[value] = hashes.get(value, "") + hashlib.sha256(content).hexdigest()[:16]
         if path.suffix == ".toml":
-            _collect(_table(content), path.parent, found, seen)
+            _collect(_table(content), path.parent, hashes, seen)
 
 
 def _file(text: str, folder: Path) -> Path | None:

@@ -43,8 +43,8 @@ def checked(load: np.ndarray) -> np.ndarray:
         raise InputError("", "load", f"{given.ndim}-dimensional, {given.dtype}", "must be one row of real numbers")
     load = given.astype(float)
     if not len(load) or not np.isfinite(load).all():
-        found = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
-        raise InputError("", "load", None, f"{found}: damage needs at least one sample, and all of them finite")
+        fault = f"{np.count_nonzero(~np.isfinite(load))} of {len(load)} samples are not finite"
+        raise InputError("", "load", None, f"{fault}: damage needs at least one sample, and all of them finite")
     return load
 
 
@@ -53,12 +53,12 @@ def summed(spans: np.ndarray, counts: np.ndarray, slope: float) -> float:
     if not (math.isfinite(slope) and slope > 0.0):
         raise InputError("", "slope", slope, "must be a Woehler exponent above 0")
     with np.errstate(over="ignore"):
-        found = float(np.sum(counts * spans**slope))
-    if not math.isfinite(found):
+        damage = float(np.sum(counts * spans**slope))
+    if not math.isfinite(damage):
         raise InputError(
             "", "load", float(spans.max()), f"has a range whose power {slope:g} is beyond all numbers: use another unit"
         )
-    return found
+    return damage
 
 
 def pseudo_damage(load: np.ndarray, slope: float = SLOPE) -> float:

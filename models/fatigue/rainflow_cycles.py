@@ -11,7 +11,7 @@ def cycles(turns):
 
     Consecutive points differ and turn; the first and the last point of a load count among them.
     """
-    stack, found, first, top = np.empty(len(turns)), np.empty((len(turns), 3)), 0, 0
+    stack, closed, first, top = np.empty(len(turns)), np.empty((len(turns), 3)), 0, 0
     n = 0
     for i in range(len(turns)):
         stack[top] = turns[i]
@@ -20,15 +20,15 @@ def cycles(turns):
             last, before = abs(stack[top - 1] - stack[top - 2]), abs(stack[top - 2] - stack[top - 3])
             if last < before:
                 break
-            found[n] = before, 0.5 * (stack[top - 2] + stack[top - 3]), 1.0
+            closed[n] = before, 0.5 * (stack[top - 2] + stack[top - 3]), 1.0
             if top - first == 3:
-                found[n, 2] = 0.5
+                closed[n, 2] = 0.5
                 first += 1
             else:
                 stack[top - 3] = stack[top - 1]
                 top -= 2
             n += 1
     for i in range(first, top - 1):
-        found[n] = abs(stack[i + 1] - stack[i]), 0.5 * (stack[i + 1] + stack[i]), 0.5
+        closed[n] = abs(stack[i + 1] - stack[i]), 0.5 * (stack[i + 1] + stack[i]), 0.5
         n += 1
-    return found[:n, 0].copy(), found[:n, 1].copy(), found[:n, 2].copy()
+    return closed[:n, 0].copy(), closed[:n, 1].copy(), closed[:n, 2].copy()

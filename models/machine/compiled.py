@@ -80,26 +80,26 @@ def checksum(folder: Path) -> int:
 def _files(function: Any) -> list[Path]:
     """A function's file, and those of compiled functions that are its globals."""
     called = [function.__globals__.get(name) for name in function.__code__.co_names]
-    own = [function, *(one.py_func for one in called if hasattr(one, "py_func"))]
-    return [Path(one.__code__.co_filename) for one in own]
+    functions = [function, *(each.py_func for each in called if hasattr(each, "py_func"))]
+    return [Path(each.__code__.co_filename) for each in functions]
 
 
 def stamp(file: Path, *others: Path) -> int:
     """Of the sources that a kernel of this file may be made of: its folder's, and kernels of those others and of what
     all of them import."""
-    made_of = {*others, *(path for one in (file, *others) for path in _imported(one))}
+    made_of = {*others, *(path for each in (file, *others) for path in _imported(each))}
     elsewhere = sorted(path for path in made_of if path.parent not in (file.parent, *COMMON))
     return zlib.crc32(b"".join(path.read_bytes() for path in elsewhere), checksum(file.parent))
 
 
 def _imported(file: Path) -> set[Path]:
     """Files with kernels that a file imports, and those that they import."""
-    found, left = set[Path](), [file]
+    imported, left = set[Path](), [file]
     while left:
-        new = _kernels(left.pop()) - found
-        found |= new
+        new = _kernels(left.pop()) - imported
+        imported |= new
         left += new
-    return found
+    return imported
 
 
 @cache
@@ -110,7 +110,7 @@ def _kernels(file: Path) -> frozenset[Path]:
     places = [
         ROOT.joinpath(*module.split("."), *name)
         for module, *names in IMPORT.findall(file.read_text())
-        for name in ((), *((one.split()[0],) for one in "".join(names).split(",") if one.strip()))
+        for name in ((), *((part.split()[0],) for part in "".join(names).split(",") if part.strip()))
     ]
     files = {place.with_suffix(".py") for place in places}
     return frozenset(

@@ -52,9 +52,9 @@ def row(typing_context, pointer, size, i):
 
     def generate(context, builder, signature, arguments):
         first, size, i = arguments
-        own = make_array(kind)(context, builder)
+        array = make_array(kind)(context, builder)
         populate_array(
-            own,
+            array,
             builder.gep(first, [builder.mul(size, i)]),
             [size],
             [ir.Constant(size.type, 8)],
@@ -62,7 +62,7 @@ def row(typing_context, pointer, size, i):
             None,
             None,
         )
-        return own._getvalue()
+        return array._getvalue()
 
     return kind(DOUBLES, types.intp, types.intp), generate
 

@@ -36,7 +36,9 @@ def interleave(
     rounds, a run that has been its first; clock : that of the processor leaves out what else the machine does.
     """
     known = [0.0] * len(jobs) if lasted is None else lasted
-    repeats = [1 if one > LONG * least else _repeats(job, least, clock) for job, one in zip(jobs, known, strict=True)]
+    repeats = [
+        1 if duration > LONG * least else _repeats(job, least, clock) for job, duration in zip(jobs, known, strict=True)
+    ]
     order = np.random.default_rng(SEED)
     seconds = np.full((len(jobs), rounds), np.nan)
     for i in range(rounds):

@@ -94,8 +94,8 @@ class AxleForces:
     @cached_property
     def arms(self) -> np.ndarray:
         """Accelerations (2, 2), of heave (upwards) and pitch (nose up), that 1 N at the front and at the rear make."""
-        own = self.rigid
-        return np.array([[1 / own.mass, 1 / own.mass], [own.front / own.total, -own.rear / own.total]])
+        body = self.rigid
+        return np.array([[1 / body.mass, 1 / body.mass], [body.front / body.total, -body.rear / body.total]])
 
     @cached_property
     def pitch(self) -> tuple[np.ndarray, np.ndarray]:
@@ -127,19 +127,21 @@ class AxleForces:
 
 def axle_signals(recording: Recording, axle: str) -> list[Signal]:
     """Vertical forces of an axle: those of the axle, or of both its wheels."""
-    found = [s for at in AXLES[axle] for s in recording.find("force", at, "z") if not s.check]
-    whole = [signal for signal in found if signal.at == axle]
-    return whole or found
+    vertical = [s for at in AXLES[axle] for s in recording.find("force", at, "z") if not s.check]
+    whole = [signal for signal in vertical if signal.at == axle]
+    return whole or vertical
 
 
 def axles(recording: Recording, parameters: Parameters) -> AxleForces | None:
     """Vertical forces of both axles as the checks read them, short and long gaps bridged straight; None where one
     lacks a wheel."""
     signals = tuple(tuple(axle_signals(recording, axle)) for axle in AXLES)
-    if not all(own and len(own) == (1 if own[0].at == axle else 2) for axle, own in zip(AXLES, signals, strict=True)):
+    if not all(
+        side and len(side) == (1 if side[0].at == axle else 2) for axle, side in zip(AXLES, signals, strict=True)
+    ):
         return None
-    front, rear = (np.asarray(sum(_straight(recording.samples(s)) for s in own)) for own in signals)
-    turn = all(s.frame != "inertial" for own in signals for s in own)
+    front, rear = (np.asarray(sum(_straight(recording.samples(s)) for s in side)) for side in signals)
+    turn = all(s.frame != "inertial" for side in signals for s in side)
     return AxleForces(
         np.column_stack([front, rear]),
         recording.period,
@@ -176,27 +178,29 @@ class Steady:
         return np.abs(self.accelerations) > self.known
 
 
-def steady(own: AxleForces) -> Steady:
+def steady(axles: AxleForces) -> Steady:
     """What is left of equilibrium over the whole record.
 
     A rise counts only as far as neither a level road nor a climb with the pitch that the forces give explains it.
     """
-    rate, pitch = own.pitch
-    times = _blocks(own.lasted * np.linspace(-0.5, 0.5, len(own.forces)))
-    units = np.array([GRAVITY, own.arms[1, 0] * own.loads[0] * GRAVITY / (own.parameters.g or GRAVITY)])
-    level = _slope(times, _blocks(own.rise))
-    climbing = _slope(times, _blocks(own.rise), _blocks(pitch)) if abs(pitch).max() < STEEP else level
+    rate, pitch = axles.pitch
+    times = _blocks(axles.lasted * np.linspace(-0.5, 0.5, len(axles.forces)))
+    units = np.array([GRAVITY, axles.arms[1, 0] * axles.loads[0] * GRAVITY / (axles.parameters.g or GRAVITY)])
+    level = _slope(times, _blocks(axles.rise))
+    climbing = _slope(times, _blocks(axles.rise), _blocks(pitch)) if abs(pitch).max() < STEEP else level
     risen, turned = (
-        _known(found, unit, gained, own.lasted)
-        for found, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
+        _known(estimate, unit, gained, axles.lasted)
+        for estimate, unit, gained in ((level, units[0], RISE), (_slope(times, _blocks(rate)), units[1], SWING))
     )
-    risen = min(risen, _known(climbing, units[0], RISE, own.lasted), key=lambda found: abs(found[0]) / found[1])
+    risen = min(
+        risen, _known(climbing, units[0], RISE, axles.lasted), key=lambda estimate: abs(estimate[0]) / estimate[1]
+    )
     return Steady(np.array([risen[0], turned[0]]), np.array([risen[1], turned[1]]), units)
 
 
-def _known(found: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
+def _known(estimate: tuple[float, float], unit: float, gained: float, lasted: float) -> tuple[float, float]:
     """A slope, and how well it is known, from the scatter about it."""
-    return found[0], SMALL * unit + (gained + SCATTER * found[1]) / lasted
+    return estimate[0], SMALL * unit + (gained + SCATTER * estimate[1]) / lasted
 
 
 def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = None) -> tuple[float, float]:
@@ -209,10 +213,10 @@ def _slope(times: np.ndarray, values: np.ndarray, pitch: np.ndarray | None = Non
     if pitch is not None and np.ptp(pitch) > 0:
         climb = pitch - pitch.mean()
         steady_climb = climb @ times / (times @ times)
-        own = climb - steady_climb * times
-        speed = float(np.clip(own @ values / (own @ own), 0.0, FASTEST)) if own @ own > 0 else 0.0
+        curve = climb - steady_climb * times
+        speed = float(np.clip(curve @ values / (curve @ curve), 0.0, FASTEST)) if curve @ curve > 0 else 0.0
         values = values - speed * climb
-        unlike = max(float(np.sqrt((own @ own) / (climb @ climb))), LEAST)
+        unlike = max(float(np.sqrt((curve @ curve) / (climb @ climb))), LEAST)
     slope = float(times @ values / (times @ times))
     return slope, float(np.sqrt(np.mean((values - slope * times) ** 2))) / unlike
 

@@ -39,165 +39,166 @@ IN_FILE: dict[Wrong, str] = {
 """Remedies where the column of a file, and no channel map, says what a signal is."""
 
 
-def check(own: AxleForces) -> list[Finding]:
+def check(axles: AxleForces) -> list[Finding]:
     """All findings; what an earlier one explains, a later one does not name again."""
-    largest = float(np.abs(own.forces).max())
-    if largest > IMPOSSIBLE * own.loads.sum():
-        text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {own.loads.sum():.4g} N."
-        return [_error(own, "weight", text, largest, "N")]
+    largest = float(np.abs(axles.forces).max())
+    if largest > IMPOSSIBLE * axles.loads.sum():
+        text = f"A wheel force of {largest:.4g} N is none of a vehicle that weighs {axles.loads.sum():.4g} N."
+        return [_error(axles, "weight", text, largest, "N")]
     for look in (_sparse, _explained, _coarse, _balance, _start):
-        found = look(own)
-        if found:
-            return found + _dead(own)
-    return _dead(own) + _copied(own) + _order(own) or [_good(own)]
+        findings = look(axles)
+        if findings:
+            return findings + _dead(axles)
+    return _dead(axles) + _copied(axles) + _order(axles) or [_good(axles)]
 
 
-def _sparse(own: AxleForces) -> list[Finding]:
+def _sparse(axles: AxleForces) -> list[Finding]:
     """A long record of which a run takes next to nothing, too sparse for a wheel."""
-    text = sparse(len(own.forces), own.period, own.duration)
+    text = sparse(len(axles.forces), axles.period, axles.duration)
     if not text:
         return []
-    return [Finding("times", "doubt", "wheel forces", text, own.period, "s", own.names)]
+    return [Finding("times", "doubt", "wheel forces", text, axles.period, "s", axles.names)]
 
 
-def _explained(own: AxleForces) -> list[Finding]:
+def _explained(axles: AxleForces) -> list[Finding]:
     """What a common mistake explains to a few per cent, at both axles."""
-    p = own.parameters
+    p = axles.parameters
     if p.g == 0:
         return []
-    if own.empty.any():
+    if axles.empty.any():
         text = " ".join(
             counted_from_load(axle[0].name, mean, load)
-            for axle, mean, load, empty in zip(own.signals, own.means, own.loads, own.empty, strict=True)
+            for axle, mean, load, empty in zip(axles.signals, axles.means, axles.loads, axles.empty, strict=True)
             if empty
         )
-        return [_error(own, "weight", text, 100 * (own.means.sum() / own.loads.sum() - 1), "%")]
+        return [_error(axles, "weight", text, 100 * (axles.means.sum() / axles.loads.sum() - 1), "%")]
     wheels = np.array([p.m1, p.m2]) * p.g
-    missing, lacks = own.loads - own.means, 100 * (own.means.sum() / own.loads.sum() - 1)
-    if _near(missing, wheels, own.loads) and not _near(missing, 0 * wheels, own.loads):
+    missing, lacks = axles.loads - axles.means, 100 * (axles.means.sum() / axles.loads.sum() - 1)
+    if _near(missing, wheels, axles.loads) and not _near(missing, 0 * wheels, axles.loads):
         text = (
             f"The wheel forces lack {missing[0]:.4g} N in front and {missing[1]:.4g} N at the rear on average, the "
             f"weight of the wheels ({wheels[0]:.4g} N and {wheels[1]:.4g} N): they were measured above the wheels. Add "
             "it, with the wheels' inertia force if they move."
         )
-        return [_error(own, "weight", text, lacks, "%")]
-    if _near(own.means, own.loads / 2, own.loads / 2):
+        return [_error(axles, "weight", text, lacks, "%")]
+    if _near(axles.means, axles.loads / 2, axles.loads / 2):
         text = (
-            f"The wheel forces are half the static loads of the axles ({own.loads[0]:.5g} N and {own.loads[1]:.5g} N): "
+            f"The wheel forces are half the static loads of the axles "
+            f"({axles.loads[0]:.5g} N and {axles.loads[1]:.5g} N): "
             "they are of one wheel of each axle. Add those of the other."
         )
-        return [_error(own, "weight", text, -50.0, "%")]
-    return _exchanged(own)
+        return [_error(axles, "weight", text, -50.0, "%")]
+    return _exchanged(axles)
 
 
 def _near(values: np.ndarray, wanted: np.ndarray, scale: np.ndarray) -> bool:
     return bool((np.abs(values - wanted) < LIKE * scale / 2).all())
 
 
-def _exchanged(own: AxleForces) -> list[Finding]:
+def _exchanged(axles: AxleForces) -> list[Finding]:
     """Axles whose loads fit crosswise, and not as they are named."""
-    as_is, crossed = (np.abs(each / own.loads - 1).max() for each in (own.means, own.means[::-1]))
-    if crossed > LIKE or as_is < 3 * crossed or not steady(own).seen[1]:
+    as_is, crossed = (np.abs(each / axles.loads - 1).max() for each in (axles.means, axles.means[::-1]))
+    if crossed > LIKE or as_is < 3 * crossed or not steady(axles).seen[1]:
         return []
     text = (
-        f"Front and rear are exchanged: {own.means[0]:.5g} N in front and {own.means[1]:.5g} N at the rear on "
-        f"average, where {own.loads[0]:.5g} N and {own.loads[1]:.5g} N rest. Exchange their columns, or a and b of "
+        f"Front and rear are exchanged: {axles.means[0]:.5g} N in front and {axles.means[1]:.5g} N at the rear on "
+        f"average, where {axles.loads[0]:.5g} N and {axles.loads[1]:.5g} N rest. Exchange their columns, or a and b of "
         "the vehicle."
     )
-    return [_error(own, "swapped", text, 100 * float(as_is), "%")]
+    return [_error(axles, "swapped", text, 100 * float(as_is), "%")]
 
 
-def _coarse(own: AxleForces) -> list[Finding]:
+def _coarse(axles: AxleForces) -> list[Finding]:
     """Axles whose mean says by itself that sign or unit is wrong, or that moves the vehicle beyond all roads."""
-    found, far = [], _far(own, steady(own)).any()
-    for axle, mean, load in zip(own.signals, own.means, own.loads if own.parameters.g else (), strict=False):
+    findings, far = [], _far(axles, steady(axles)).any()
+    for axle, mean, load in zip(axles.signals, axles.means, axles.loads if axles.parameters.g else (), strict=False):
         for_axle = f"the {load:.5g} N that rest on it on average"
         ratio, names = float(mean / load), tuple(s.name for s in axle)
-        kind, text = sentence(ratio, axle[0], for_axle, own.remedies)
+        kind, text = sentence(ratio, axle[0], for_axle, axles.remedies)
         if kind in ("sign", "unit") or (kind == "size" and far):
             check = "weight" if kind == "size" else kind
-            found.append(Finding(check, "error", axle[0].at, text, ratio, "1", names))
-    return found
+            findings.append(Finding(check, "error", axle[0].at, text, ratio, "1", names))
+    return findings
 
 
-def _balance(own: AxleForces) -> list[Finding]:
+def _balance(axles: AxleForces) -> list[Finding]:
     """Accelerations that a vehicle cannot keep up: its fall, and its turn."""
-    found = steady(own)
-    if not found.seen.any():
+    motion = steady(axles)
+    if not motion.seen.any():
         return []
-    beyond = np.abs(found.shares) > LARGE + found.known / found.units
-    weight: Weight = "error" if (beyond & _far(own, found)).any() else "doubt"
-    excess = np.linalg.solve(own.arms, np.where(found.seen, found.accelerations, 0.0))
-    share = excess / own.loads
+    beyond = np.abs(motion.shares) > LARGE + motion.known / motion.units
+    weight: Weight = "error" if (beyond & _far(axles, motion)).any() else "doubt"
+    excess = np.linalg.solve(axles.arms, np.where(motion.seen, motion.accelerations, 0.0))
+    share = excess / axles.loads
     told = " and ".join(
         _excess(*each)
         for each in zip(("the front axle", "the rear axle"), excess, share, strict=True)
         if abs(each[2]) > SMALL / 2
     )
     text = (
-        f"On average {told} against what rests there: {_motion(own, found)}. Check calibration, zero and the "
+        f"On average {told} against what rests there: {_motion(axles, motion)}. Check calibration, zero and the "
         "vehicle's masses and a, b; a vehicle that brakes or accelerates has forces along the road, too, which "
         "this model has not."
     )
-    kind = "balance" if found.seen[1] else "weight"
-    size = float(found.shares[1] if found.seen[1] else found.shares[0])
-    return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", own.names)]
+    kind = "balance" if motion.seen[1] else "weight"
+    size = float(motion.shares[1] if motion.seen[1] else motion.shares[0])
+    return [Finding(kind, weight, "wheel forces", text, 100 * size, "%", axles.names)]
 
 
-def _far(own: AxleForces, found: Steady) -> np.ndarray:
+def _far(axles: AxleForces, motion: Steady) -> np.ndarray:
     """Which steady acceleration (2,) moves the vehicle further in the run than a road does."""
-    return found.seen & (np.abs(found.accelerations) * own.duration**2 / 2 > [HEIGHT, STEEP])
+    return motion.seen & (np.abs(motion.accelerations) * axles.duration**2 / 2 > [HEIGHT, STEEP])
 
 
 def _excess(name: str, excess: float, share: float) -> str:
     return f"{name} carries {abs(excess):.4g} N ({abs(share):.2%}) too {'much' if excess > 0 else 'little'}"
 
 
-def _motion(own: AxleForces, found: Steady) -> str:
+def _motion(axles: AxleForces, motion: Steady) -> str:
     """Where the steady accelerations take the vehicle in the run."""
-    risen, turned = found.accelerations * own.duration**2 / 2
-    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if found.seen[0] else []
-    parts += [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"] if found.seen[1] else []
-    return f"a vehicle free to move {' and '.join(parts)} in {own.duration:g} s"
+    risen, turned = motion.accelerations * axles.duration**2 / 2
+    parts = [f"{'rises' if risen > 0 else 'falls'} {abs(risen):.3g} m"] if motion.seen[0] else []
+    parts += [f"turns {abs(turned):.3g} rad nose {'up' if turned > 0 else 'down'}"] if motion.seen[1] else []
+    return f"a vehicle free to move {' and '.join(parts)} in {axles.duration:g} s"
 
 
-def _start(own: AxleForces) -> list[Finding]:
+def _start(axles: AxleForces) -> list[Finding]:
     """Forces that begin in the middle of a motion, while the run begins at rest."""
-    first = own.forces[0] / own.loads - 1
-    last = own.pitch[1][min(len(own.forces) - 1, round(own.duration / own.period))]
-    if not own.rests or own.parameters.g == 0 or np.abs(first).max() < OFF or abs(last) < max(STEEP, _noise(own)):
+    first = axles.forces[0] / axles.loads - 1
+    last = axles.pitch[1][min(len(axles.forces) - 1, round(axles.duration / axles.period))]
+    if not axles.rests or axles.parameters.g == 0 or np.abs(first).max() < OFF or abs(last) < max(STEEP, _noise(axles)):
         return []
     text = (
         f"The run begins at rest, and the wheel forces {first[0]:+.1%} in front and {first[1]:+.1%} at the rear "
         "off the static loads: they begin in the middle of a motion, or are not of this vehicle, and turn it by "
-        f"{last:+.3g} rad in {own.duration:g} s. Begin where the vehicle stands or drives on a smooth road, or "
+        f"{last:+.3g} rad in {axles.duration:g} s. Begin where the vehicle stands or drives on a smooth road, or "
         "give its state under [start]."
     )
-    return [Finding("start", "doubt", "wheel forces", text, float(last), "rad", own.names)]
+    return [Finding("start", "doubt", "wheel forces", text, float(last), "rad", axles.names)]
 
 
-def _noise(own: AxleForces) -> float:
+def _noise(axles: AxleForces) -> float:
     """Four standard deviations (rad) of the pitch that white noise of the samples makes by the end of the run.
 
     The noise is at most what the third differences of the forces have: a smooth signal has less of them.
     """
-    rough = float(np.diff(own.forces, 3, axis=0).std()) / 20**0.5
-    return 4 * (own.rigid.intensity(rough, own.period) * own.duration**3 / 3) ** 0.5
+    rough = float(np.diff(axles.forces, 3, axis=0).std()) / 20**0.5
+    return 4 * (axles.rigid.intensity(rough, axles.period) * axles.duration**3 / 3) ** 0.5
 
 
-def _dead(own: AxleForces) -> list[Finding]:
+def _dead(axles: AxleForces) -> list[Finding]:
     """An axle that never changes, beside one that does."""
-    still = np.ptp(own.forces, axis=0) == 0
+    still = np.ptp(axles.forces, axis=0) == 0
     if still.all() or not still.any():
         return []
-    axle = own.signals[int(still.argmax())][0]
+    axle = axles.signals[int(still.argmax())][0]
     text = f"{axle.name} never changes while the other axle's force does: a dead channel, or one that was filled up."
     return [Finding("balance", "doubt", axle.at, text, 0.0, "N", (axle.name,))]
 
 
-def _copied(own: AxleForces) -> list[Finding]:
+def _copied(axles: AxleForces) -> list[Finding]:
     """An axle that has the other one's samples, times a factor."""
-    off = own.forces - own.means
+    off = axles.forces - axles.means
     size = np.sqrt(np.mean(off**2, axis=0))
     if not size.all() or np.sqrt(np.mean((off[:, 1] / size[1] - off[:, 0] / size[0]) ** 2)) > COPIED:
         return []
@@ -205,30 +206,30 @@ def _copied(own: AxleForces) -> list[Finding]:
         f"The rear axle's force changes as the front axle's does, times {size[1] / size[0]:.4g}, in every sample: one "
         "channel was written twice, unless both axles were moved alike."
     )
-    return [Finding("copied", "doubt", "wheel forces", text, float(size[1] / size[0]), "1", own.names)]
+    return [Finding("copied", "doubt", "wheel forces", text, float(size[1] / size[0]), "1", axles.names)]
 
 
-def _order(own: AxleForces) -> list[Finding]:
+def _order(axles: AxleForces) -> list[Finding]:
     """Axles that feel the road in the wrong order."""
-    late, alike, other = _delay(own)
+    late, alike, other = _delay(axles)
     if alike < ALIKE or late > 0 or alike < 1.5 * other:
         return []
     text = (
         f"The rear axle feels the road {-late:.3g} s before the front axle (correlation {alike:.2f}): front and "
         "rear are exchanged, or time runs backwards, unless the vehicle drove so."
     )
-    return [Finding("swapped", "doubt", "wheel forces", text, late, "s", own.names)]
+    return [Finding("swapped", "doubt", "wheel forces", text, late, "s", axles.names)]
 
 
-def _delay(own: AxleForces) -> tuple[float, float, float]:
+def _delay(axles: AxleForces) -> tuple[float, float, float]:
     """Time (s) by which the rear axle repeats the front one, their correlation then, and the best with the other
     sign; 0 where nothing can be said."""
-    n = len(own.forces)
-    frequencies = np.fft.rfftfreq(2 * n, own.period)
+    n = len(axles.forces)
+    frequencies = np.fft.rfftfreq(2 * n, axles.period)
     band = (frequencies > BAND[0]) & (frequencies < BAND[1])
-    spectra = np.fft.rfft(own.forces - own.means, 2 * n, axis=0) * band[:, None]
+    spectra = np.fft.rfft(axles.forces - axles.means, 2 * n, axis=0) * band[:, None]
     power = np.sqrt(np.prod((np.abs(spectra) ** 2).sum(axis=0)))
-    low, high = (round(lag / own.period) for lag in LAG)
+    low, high = (round(lag / axles.period) for lag in LAG)
     if not power > 0 or n < 2 * high:
         return 0.0, 0.0, 0.0
     alike = np.fft.irfft(spectra[:, 0].conj() * spectra[:, 1]) * n / power
@@ -236,31 +237,31 @@ def _delay(own: AxleForces) -> tuple[float, float, float]:
     best = before if before.max() > after.max() else after
     sign = -1 if best is before else 1
     other = after if best is before else before
-    return sign * (low + int(best.argmax())) * own.period, float(best.max()), float(other.max())
+    return sign * (low + int(best.argmax())) * axles.period, float(best.max()), float(other.max())
 
 
-def unchecked(own: AxleForces) -> str:
+def unchecked(axles: AxleForces) -> str:
     """What these forces alone do not show of the time from axle to axle, and what would; "" of constant forces."""
-    if not np.ptp(own.forces, axis=0).any():
+    if not np.ptp(axles.forces, axis=0).any():
         return ""
-    late, alike, _ = _delay(own)
+    late, alike, _ = _delay(axles)
     seen = ""
     if late > 0 and alike >= ALIKE:
-        speed = (own.parameters.a + own.parameters.b) / late
+        speed = (axles.parameters.a + axles.parameters.b) / late
         seen = f" (the rear repeats the front {late:.3g} s later, which is right for about {speed:.2g} m/s)"
     tells = "the driven speed tells, or a measured pitch (effect kalman_filter)"
     return f"not checked: whether an axle is late{seen}; {tells}"
 
 
-def _good(own: AxleForces) -> Finding:
-    found = steady(own)
+def _good(axles: AxleForces) -> Finding:
+    motion = steady(axles)
     text = (
-        f"The mean wheel forces carry the vehicle to {found.shares[0]:+.2%} of its weight; an error of "
-        f"{100 * found.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
-        f"{100 * abs(found.known[1] / (own.arms[1] * own.loads)).max():.2g} %."
+        f"The mean wheel forces carry the vehicle to {motion.shares[0]:+.2%} of its weight; an error of "
+        f"{100 * motion.known[0] / GRAVITY:.2g} % would be seen, of one axle of "
+        f"{100 * abs(motion.known[1] / (axles.arms[1] * axles.loads)).max():.2g} %."
     )
-    return Finding("weight", "note", "", text, 100 * float(found.shares[0]), "%", own.names)
+    return Finding("weight", "note", "", text, 100 * float(motion.shares[0]), "%", axles.names)
 
 
-def _error(own: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:
-    return Finding(kind, "error", "wheel forces", text, float(size), unit, own.names)
+def _error(axles: AxleForces, kind: str, text: str, size: float, unit: str) -> Finding:
+    return Finding(kind, "error", "wheel forces", text, float(size), unit, axles.names)

@@ -36,12 +36,12 @@ class Columns(Readable):
         """Open what was begun with the same names and count, or begin anew; InputError where another was begun."""
         self.path, self.names, self.count = path, names, count
         self._journal = path.with_suffix(".json")
-        own = {"names": list(names), "count": count}
+        described = {"names": list(names), "count": count}
         if self._journal.is_file():
-            found = json.loads(self._journal.read_text())
-            if {key: found.get(key) for key in own} != own:
+            journal = json.loads(self._journal.read_text())
+            if {key: journal.get(key) for key in described} != described:
                 raise InputError(path, "", None, "holds other signals: choose another folder")
-            self.done = int(found["done"])
+            self.done = int(journal["done"])
         else:
             with path.open("wb") as file:
                 file.truncate(len(names) * count * ITEM.itemsize)

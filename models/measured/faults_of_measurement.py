@@ -58,9 +58,9 @@ def check(faults: Faults, signals: Iterable[Signal], file: str = "", place: str 
     """Raise InputError for a name that no signal has, a negative noise or a delay out of reach."""
     known = tuple(dict.fromkeys(name for signal in signals for name in _names(signal)))
     amounts, lists = {kind: getattr(faults, kind) for kind in AMOUNTS}, (faults.quantisation, faults.dropouts)
-    named = [(kind, name) for kind, own in amounts.items() for name in own]
-    for kind, own in zip(("quantisation", "dropouts"), lists, strict=True):
-        named += [(f"{kind}.channels", name) for name in own.channels] if own else []
+    named = [(kind, name) for kind, listed in amounts.items() for name in listed]
+    for kind, listed in zip(("quantisation", "dropouts"), lists, strict=True):
+        named += [(f"{kind}.channels", name) for name in listed.channels] if listed else []
     for kind, name in named:
         if name not in known:
             wrong = f"no such channel, transducer or quantity{suggestion(name, known)}"

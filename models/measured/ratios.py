@@ -34,12 +34,12 @@ def wrong(ratio: float, signal: Signal) -> tuple[Wrong, str]:
         return "sign", ""
     if abs(ratio - 1) <= GAIN:
         return "gain", ""
-    own = NAMES[signal.quantity]
+    units = NAMES[signal.quantity]
     far = {
-        (own[taken] != signal.factor, abs(np.log(ratio * own[true] / own[taken]))): f"{true} taken for {taken}"
-        for true in own
-        for taken in own
-        if true != taken and {1.0, signal.factor} & {own[true], own[taken]}
+        (units[taken] != signal.factor, abs(np.log(ratio * units[true] / units[taken]))): f"{true} taken for {taken}"
+        for true in units
+        for taken in units
+        if true != taken and {1.0, signal.factor} & {units[true], units[taken]}
     }
     near = [pair for pair in far if pair[1] <= NEAR]
     return ("unit", far[min(near)]) if near else ("size", "")
@@ -54,11 +54,11 @@ def sentence(
     """
     kind, unit = wrong(ratio, signal)
     reads = f"{signal.name} reads {ratio:.4g} times {against}"
-    own = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
+    reading = f"{signal.name} reads {abs(ratio - 1):.2%} too {'much' if ratio > 1 else 'little'} against {against}"
     texts: dict[Wrong, str] = {
         "sign": f"{reads}: its sign is wrong",
         "unit": f"{reads}, as {unit} does",
-        "gain": own,
+        "gain": reading,
         "size": f"{reads}, which no usual unit explains",
     }
     in_map: dict[Wrong, str] = {

@@ -22,11 +22,11 @@ def onto(times: np.ndarray, values: np.ndarray, period: float, grid: np.ndarray)
     times, values = times[known], values[known]
     new = float(grid[1] - grid[0]) if len(grid) > 1 else period
     if period < new * (1.0 - SAME):
-        found = _decimated(times, values, period, new, grid)
+        samples = _decimated(times, values, period, new, grid)
     else:
-        found = np.interp(grid, times, values)
-    found[_unknown(times, period, grid)] = np.nan
-    return found
+        samples = np.interp(grid, times, values)
+    samples[_unknown(times, period, grid)] = np.nan
+    return samples
 
 
 def _unknown(times: np.ndarray, period: float, grid: np.ndarray) -> np.ndarray:

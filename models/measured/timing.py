@@ -152,10 +152,10 @@ def _of_times(times: np.ndarray, place: str, signals: tuple[str, ...]) -> Timing
             say("time", "doubt", f"{text}of each the first sample is taken", float(count), "samples", (first, first))
         keep = keep[np.concatenate(([True], ~again))]
         order = keep
-    own = times[keep]
-    _gaps(own, period, say)
-    _jitter(own, period, say)
-    return Timing(own, order, period, tuple(findings))
+    kept = times[keep]
+    _gaps(kept, period, say)
+    _jitter(kept, period, say)
+    return Timing(kept, order, period, tuple(findings))
 
 
 def _step(times: np.ndarray, rising: np.ndarray) -> float:
@@ -225,8 +225,8 @@ def _gaps(times: np.ndarray, period: float, say: Say) -> None:
 
 def _jitter(times: np.ndarray, period: float, say: Say) -> None:
     steps = np.diff(times)
-    own = steps[steps <= GAP * period] - period
-    spread = float(own.std())
+    deviations = steps[steps <= GAP * period] - period
+    spread = float(deviations.std())
     if spread > EVEN * period:
         weight: Weight = "doubt" if spread > JITTER * period else "note"
         say(

@@ -55,34 +55,34 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
 
     Raises InputError at ``file`` and ``place`` for a unit that nobody knows or that is of another quantity.
     """
-    found = _parsed(unit, quantity)
-    if found is None:
+    parsed = _parsed(unit, quantity)
+    if parsed is None:
         raise InputError(file, place, unit, f"no such unit is known: write {_like(quantity)}{_meant(unit, quantity)}")
-    if not found.is_compatible_with(_si(quantity)):
+    if not parsed.is_compatible_with(_si(quantity)):
         raise InputError(
             file,
             place,
             unit,
-            f"{_kind(found)}, and the channel is mapped as {quantity}: write "
+            f"{_kind(parsed)}, and the channel is mapped as {quantity}: write "
             f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}",
         )
-    turned = bool(TURNS & set(re.split(r"[^a-z_]+", str(found))))
+    turned = bool(TURNS & set(re.split(r"[^a-z_]+", str(parsed))))
     if turned != (quantity in ("angle", "angular rate")):
         what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"
         raise InputError(file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_like(quantity)}")
-    return float(_registry().Quantity(1.0, found).to(_si(quantity)).magnitude)
+    return float(_registry().Quantity(1.0, parsed).to(_si(quantity)).magnitude)
 
 
 def quantities(unit: str) -> tuple[Quantity, ...]:
     """Quantities of which this can be the unit; none for no unit, which says nothing."""
-    found = list[Quantity]()
+    kinds = list[Quantity]()
     for kind in UNITS if unit.strip() else ():
         try:
             conversion(unit, kind, "", "")
-            found.append(kind)
+            kinds.append(kind)
         except InputError:
             pass
-    return tuple(found)
+    return tuple(kinds)
 
 
 @cache
@@ -109,14 +109,14 @@ def _parsed(unit: str, quantity: Quantity) -> Any:
         return None
 
 
-def _kind(found: Any) -> str:
+def _kind(unit: Any) -> str:
     """What a unit is of, in an engineer's words."""
-    if "volt" in str(found) or "ampere" in str(found):
-        return f"is the unit of a raw reading ({found:~P}), which needs the sensor's calibration in the logger"
-    same = [name for name in UNITS if found.is_compatible_with(_si(name))]
-    if found.dimensionless:
+    if "volt" in str(unit) or "ampere" in str(unit):
+        return f"is the unit of a raw reading ({unit:~P}), which needs the sensor's calibration in the logger"
+    same = [name for name in UNITS if unit.is_compatible_with(_si(name))]
+    if unit.dimensionless:
         return "is a pure number"
-    return f"is a unit of {same[0]}" if same else f"is {found:P}"
+    return f"is a unit of {same[0]}" if same else f"is {unit:P}"
 
 
 def _meant(unit: str, quantity: Quantity) -> str:

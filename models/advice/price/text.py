@@ -23,8 +23,8 @@ def lines(recommendation: Recommendation) -> list[str]:
         f"{recommendation.searched.uncertainty:.1e} {scene.unit}"
     )
     doubt = (
-        f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: within {recommendation.tolerance:g} "
-        f"{scene.unit} even zero would do"
+        f"  DOUBT: {scene.quantity} is at most {recommendation.truth.size:.3g} {scene.unit} itself: "
+        f"within {recommendation.tolerance:g} {scene.unit} even zero would do"
     )
     return [
         f"{scene.title}: {scene.quantity} within {recommendation.tolerance:g} {scene.unit} over {scene.whole:g} s",
@@ -128,7 +128,8 @@ def _failures(tried: tuple[Tried, ...]) -> list[str]:
         "",
         "  without an answer to rely on",
         *(
-            f"    {status:<9}{method}, {', '.join(dict.fromkeys(attempt.setting.label() for attempt in attempts))}: {attempts[-1].reason}"
+            f"    {status:<9}{method}, {', '.join(dict.fromkeys(attempt.setting.label() for attempt in attempts))}: "
+            f"{attempts[-1].reason}"
             for (status, method), attempts in known.items()
         ),
     ]

@@ -190,10 +190,10 @@ class Agreement:
             seen = set[tuple[int, ...]]()
             for names in keys:
                 for name in dict.fromkeys(names):
-                    own = tuple(i for i, other in enumerate(names) if other == name)
-                    if own not in seen and not (forces and len(own) == len(signals)):
-                        seen.add(own)
-                        yield Group(name, forces, own)
+                    of_name = tuple(i for i, other in enumerate(names) if other == name)
+                    if of_name not in seen and not (forces and len(of_name) == len(signals)):
+                        seen.add(of_name)
+                        yield Group(name, forces, of_name)
 
     @cached_property
     def _told(self) -> np.ndarray:
@@ -209,13 +209,13 @@ class Agreement:
         """Cross power (f, k) of what is left without the group with what it accounts for, and the power of that."""
         pick = list(group.own)
         if group.forces:
-            own, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
-            rest = self.between[:, :, pick] - self._told[:, :, pick] + own @ among
-            return np.einsum("fkc,fkc->fk", rest, own.conj()), _power(own, among)
+            response, among = self.response[:, :, pick], self.forces[:, pick][:, :, pick]
+            rest = self.between[:, :, pick] - self._told[:, :, pick] + response @ among
+            return np.einsum("fkc,fkc->fk", rest, response.conj()), _power(response, among)
         cross, power = np.zeros((2, *self.readings.shape), complex)
-        own = self.response[:, pick]
-        cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], own.conj())
-        power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], own.conj())
+        response = self.response[:, pick]
+        cross[:, pick] = np.einsum("fkc,fkc->fk", self.between[:, pick], response.conj())
+        power[:, pick] = np.einsum("fkc,fkc->fk", self._told[:, pick], response.conj())
         return cross, power.real
 
     def lateness(self, group: Group, weights: np.ndarray) -> tuple[float, float, float]:
@@ -300,8 +300,8 @@ class Agreement:
 
     def _exchanges(self) -> Iterator[tuple[tuple[Signal, ...], "Agreement"]]:
         """Pairs of channels of one quantity, of one place or of one axis, and this with them exchanged."""
-        for own in (self.inputs, self.outputs):
-            for pair in combinations(own, 2):
+        for side in (self.inputs, self.outputs):
+            for pair in combinations(side, 2):
                 what, at, axis = (len({getattr(s, key) for s in pair}) for key in ("quantity", "at", "component"))
                 if what == 1 and (at == 1 or axis == 1):
                     yield pair, self._crossed(pair)
@@ -329,13 +329,13 @@ class Agreement:
     def seen(self) -> dict[str, tuple[float, float]]:
         """Smallest delay (s) and error of the factor of every signal alone that would be named, by name."""
         weights, square = self.weights, (2 * np.pi * self.frequencies) ** 2
-        rest, found = WORTH * self._rest(weights), {}
+        rest, smallest = WORTH * self._rest(weights), {}
         with np.errstate(divide="ignore", invalid="ignore"):
             for group in (group for group in self.groups() if len(group.own) == 1):
                 power = weights * self.share(group)[1]
                 late, wrong = square @ power, power.sum(axis=0)
-                found[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
-        return found
+                smallest[group.name] = _least(late, rest, SMALL_DELAY), _least(wrong, rest, SMALL_FACTOR)
+        return smallest
 
     def factor(self, signal: Signal) -> tuple[float, float]:
         """Recorded by true value of a force by the motion alone, as it is now, and its standard error."""

@@ -22,8 +22,8 @@ ROUNDED = 1e-9
 
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are shares of samples, in %, and s for a channel that stands still."""
-    found = [finding for signal in evidence.recording.signals for finding in _signal(evidence, signal)]
-    return found or [Finding(NAME, "note", "", "No channel is clipped or stands still.")]
+    findings = [finding for signal in evidence.recording.signals for finding in _signal(evidence, signal)]
+    return findings or [Finding(NAME, "note", "", "No channel is clipped or stands still.")]
 
 
 def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
@@ -36,8 +36,8 @@ def _signal(evidence: Evidence, signal: Signal) -> list[Finding]:
         )
         return [Finding(NAME, "error", signal.name, text, evidence.recording.duration, "s", (signal.name,))]
     measured = len(good) and np.ptp(good) > ROUNDED * _largest(evidence, signal)
-    found = [_clipped(signal, values, good, end, period) for end in ends(values)] if measured else []
-    return found or _stuck(signal, values, period)
+    findings = [_clipped(signal, values, good, end, period) for end in ends(values)] if measured else []
+    return findings or _stuck(signal, values, period)
 
 
 def _largest(evidence: Evidence, signal: Signal) -> float:
@@ -59,19 +59,21 @@ def _piled(values: np.ndarray, good: np.ndarray, end: float) -> bool:
     next_to = others[np.argmin(np.abs(others - end))]
     if at < LEAST or at < PILE * np.count_nonzero(good == next_to):
         return False
-    own = runs(values == end)
-    return bool(np.max(own[:, 1] - own[:, 0]) >= 2)
+    at_end = runs(values == end)
+    return bool(np.max(at_end[:, 1] - at_end[:, 0]) >= 2)
 
 
 def _clipped(signal: Signal, values: np.ndarray, good: np.ndarray, end: float, period: float) -> Finding:
-    at, own = int(np.count_nonzero(good == end)), runs(values == end)
-    share, first = 100 * at / len(good), float(period * own[0, 0])
+    at, clipped_runs = int(np.count_nonzero(good == end)), runs(values == end)
+    share, first = 100 * at / len(good), float(period * clipped_runs[0, 0])
     text = (
-        f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(own)} runs, "
+        f"{signal.name} is clipped at {end:.5g} {UNITS[signal.quantity]}: {at} samples in {len(clipped_runs)} runs, "
         f"{share:.3g} % of all, the first from {first:.4g} s on. What lay beyond is lost, and damage comes out too "
         "small: measure again with a wider range, or leave these times out."
     )
-    return Finding(NAME, "doubt", signal.name, text, share, "%", (signal.name,), (first, float(period * own[0, 1])))
+    return Finding(
+        NAME, "doubt", signal.name, text, share, "%", (signal.name,), (first, float(period * clipped_runs[0, 1]))
+    )
 
 
 def _stuck(signal: Signal, values: np.ndarray, period: float) -> list[Finding]:

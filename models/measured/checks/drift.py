@@ -40,12 +40,12 @@ def check(evidence: Evidence) -> list[Finding]:
 def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
     """Middle (s) and agreement of stretches of the recording, with all corrections of the whole."""
     assert evidence.searched is not None
-    now, own = evidence.searched[0], evidence.recording
-    length = round(WINDOW / own.period)
-    firsts = np.linspace(0, own.count - length, max(min(own.count // length, MOST), 1)).astype(int)
+    now, recording = evidence.searched[0], evidence.recording
+    length = round(WINDOW / recording.period)
+    firsts = np.linspace(0, recording.count - length, max(min(recording.count // length, MOST), 1)).astype(int)
     windows, c = [], len(now.inputs)
-    for first in firsts if own.count >= length else ():
-        part = spectra(own, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
+    for first in firsts if recording.count >= length else ():
+        part = spectra(recording, (*now.inputs, *now.outputs), tuple(now.frequencies[[0, -1]]), (int(first), length))
         if part is not None:
             lines = np.abs(now.frequencies[:, None] - part.frequencies).argmin(axis=0)
             local = replace(
@@ -57,14 +57,14 @@ def _windows(evidence: Evidence) -> list[tuple[float, Agreement]]:
                 response=now.response[lines],
                 averages=part.averages,
             )
-            windows.append(((first + length / 2) * own.period, local))
+            windows.append(((first + length / 2) * recording.period, local))
     return windows
 
 
 def _finding(evidence: Evidence, windows: list[tuple[float, Agreement]], name: str, clock: str) -> Finding:
-    own = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
+    of_file = tuple(i for i, s in enumerate(windows[0][1].outputs) if s.file == name)
     signals = tuple(s.name for s in evidence.inertial if s.file == name)
-    late = np.array([part.lateness(Group(name, False, own), part.weights)[:2] for _, part in windows])
+    late = np.array([part.lateness(Group(name, False, of_file), part.weights)[:2] for _, part in windows])
     slope, error = _slope(np.array([at for at, _ in windows]), *late.T)
     apart = slope * evidence.recording.duration
     if abs(slope) > CERTAIN * error and abs(apart) > SMALL:

@@ -112,21 +112,21 @@ class Evidence:
         if self.lacking:
             return None
         assert self.vehicle is not None and self._spectra is not None
-        own, c = self._spectra, len(self.forces)
+        measured_spectra, c = self._spectra, len(self.forces)
         places = [place for s in self.inertial if (place := self.place(s)) is not None]
-        response = Response(self.vehicle, self.frame).at(own.frequencies, self.inertial, places)
+        response = Response(self.vehicle, self.frame).at(measured_spectra.frequencies, self.inertial, places)
         numbers = [number(s, self.vehicle.hubs.index(s.at)) for s in self.forces]
         forces, felt = (np.array([self.coarse.get(s, 1.0) for s in each]) for each in (self.forces, self.inertial))
         return Agreement(
-            own.frequencies,
+            measured_spectra.frequencies,
             self.forces,
             self.inertial,
-            own.cross[:, :c, :c],
-            own.cross[:, c:, :c],
-            np.einsum("fkk->fk", own.cross[:, c:, c:]).real,
+            measured_spectra.cross[:, :c, :c],
+            measured_spectra.cross[:, c:, :c],
+            np.einsum("fkk->fk", measured_spectra.cross[:, c:, c:]).real,
             response[:, :, numbers] / forces * felt[:, None],
-            own.averages,
-            own.white * np.square([noise(self.recording, s) for s in self.inertial]),
+            measured_spectra.averages,
+            measured_spectra.white * np.square([noise(self.recording, s) for s in self.inertial]),
         )
 
     @property

@@ -12,14 +12,14 @@ NAME = "gaps"
 
 def check(evidence: Evidence) -> list[Finding]:
     """One finding for each set of channels that miss the same samples; its size is the longest gap in s."""
-    own = evidence.recording
+    recording = evidence.recording
     sets: dict[tuple[tuple[int, int], ...], list[Signal]] = {}
-    for signal in own.signals:
-        lost = tuple(map(tuple, runs(~np.isfinite(own.samples(signal))).tolist()))
+    for signal in recording.signals:
+        lost = tuple(map(tuple, runs(~np.isfinite(recording.samples(signal))).tolist()))
         if lost:
             sets.setdefault(lost, []).append(signal)
     if not sets:
-        return [Finding(NAME, "note", "", f"No sample of any of the {len(own.signals)} channels is missing.")]
+        return [Finding(NAME, "note", "", f"No sample of any of the {len(recording.signals)} channels is missing.")]
     return [_finding(evidence, np.array(lost), tuple(signals)) for lost, signals in sets.items()]
 
 

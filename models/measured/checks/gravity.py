@@ -18,46 +18,46 @@ def check(evidence: Evidence) -> list[Finding]:
     signals = [s for s in evidence.recording.find("acceleration") if s.component in ("x", "y", "z")]
     if not signals:
         return [Finding(NAME, "note", "", "Not looked at: no accelerometer.")]
-    found = [finding for s in signals if (finding := _signal(s, evidence.mean(s)))]
+    findings = [finding for s in signals if (finding := _signal(s, evidence.mean(s)))]
     quiet = "Every vertical accelerometer feels gravity as its channel map says, and no other does."
-    return found or [Finding(NAME, "note", "", quiet)]
+    return findings or [Finding(NAME, "note", "", quiet)]
 
 
-def _signal(signal: Signal, found: float) -> Finding | None:
+def _signal(signal: Signal, average: float) -> Finding | None:
     if signal.component == "z":
-        return _vertical(signal, found)
-    if not abs(found) > LEVEL:
+        return _vertical(signal, average)
+    if not abs(average) > LEVEL:
         return None
     text = (
-        f"{signal.name} reads {found:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
+        f"{signal.name} reads {average:.3g} m/s^2 on average, but lies along {signal.component}: it feels gravity, "
         "so that axes are exchanged or the mount is tilted; correct component and sign in the map."
     )
-    return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
+    return Finding(NAME, "error", signal.name, text, average, "m/s^2", (signal.name,))
 
 
-def _vertical(signal: Signal, found: float) -> Finding | None:
+def _vertical(signal: Signal, average: float) -> Finding | None:
     if not signal.gravity:
-        if abs(found) < BIAS:
+        if abs(average) < BIAS:
             return None
         text = (
-            f"{signal.name} reads {found:.4g} m/s^2 on average, although the channel map says that gravity is not "
+            f"{signal.name} reads {average:.4g} m/s^2 on average, although the channel map says that gravity is not "
             "included: drop gravity = false, or take off its zero."
         )
-        return Finding(NAME, "error", signal.name, text, found, "m/s^2", (signal.name,))
-    missing = GRAVITY - found
+        return Finding(NAME, "error", signal.name, text, average, "m/s^2", (signal.name,))
+    missing = GRAVITY - average
     if abs(missing) < BIAS:
         return None
-    if abs(found) < BIAS:
+    if abs(average) < BIAS:
         text = (
-            f"{signal.name} reads {found:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
+            f"{signal.name} reads {average:.3g} m/s^2 on average: {missing:.4g} m/s^2 of gravity are not included; "
             "give gravity = false in the channel map."
         )
         return Finding(NAME, "error", signal.name, text, missing, "m/s^2", (signal.name,))
-    kind, text = sentence(found / GRAVITY, signal, "gravity, which it feels on average")
+    kind, text = sentence(average / GRAVITY, signal, "gravity, which it feels on average")
     if kind in ("sign", "unit"):
-        return Finding(kind, "error", signal.name, text, found / GRAVITY, "1", (signal.name,))
+        return Finding(kind, "error", signal.name, text, average / GRAVITY, "1", (signal.name,))
     text = (
-        f"{signal.name} reads {found:.4g} m/s^2 on average, {-missing:+.3g} m/s^2 off gravity: check its zero, its "
+        f"{signal.name} reads {average:.4g} m/s^2 on average, {-missing:+.3g} m/s^2 off gravity: check its zero, its "
         "factor and how it is mounted."
     )
     return Finding(NAME, "doubt", signal.name, text, -missing, "m/s^2", (signal.name,))

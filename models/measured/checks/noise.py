@@ -29,9 +29,9 @@ def check(evidence: Evidence) -> list[Finding]:
             )
             doubts.append(Finding(NAME, "doubt", signal.name, text, size, unit, (signal.name,)))
     notes = list[Finding]()
-    for what, own in sizes.items():
-        if np.isfinite(own).any():
-            unit, low, high = UNITS[what], float(np.nanmin(own)), float(np.nanmax(own))
+    for what, deviations in sizes.items():
+        if np.isfinite(deviations).any():
+            unit, low, high = UNITS[what], float(np.nanmin(deviations)), float(np.nanmax(deviations))
             text = f"Noise of {what} channels: {low:.3g} to {high:.3g} {unit} on every sample."
-            notes.append(Finding(NAME, "note", "", text, float(np.nanmean(own)), unit))
+            notes.append(Finding(NAME, "note", "", text, float(np.nanmean(deviations)), unit))
     return doubts + notes

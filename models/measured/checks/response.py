@@ -43,22 +43,24 @@ class Response:
 
     def at(self, frequencies: np.ndarray, signals: Sequence[Signal], places: Sequence[Place]) -> np.ndarray:
         """Transfer functions (f, signals, 6 h) at frequencies (f,) in Hz; each signal at its place."""
-        own, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
-        q = np.linalg.solve(own**2 * np.eye(n) - own * self.damped - self.stiff, self.pushed[None].astype(complex))
-        rows = np.stack([self._row(own[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
+        laplace, n = 2j * np.pi * frequencies[:, None, None], self.vehicle.size
+        q = np.linalg.solve(
+            laplace**2 * np.eye(n) - laplace * self.damped - self.stiff, self.pushed[None].astype(complex)
+        )
+        rows = np.stack([self._row(laplace[:, 0], s, place) for s, place in zip(signals, places, strict=True)], axis=1)
         return np.asarray(rows @ q)
 
-    def _row(self, own: np.ndarray, signal: Signal, place: Place) -> np.ndarray:
+    def _row(self, i_omega: np.ndarray, signal: Signal, place: Place) -> np.ndarray:
         """(f, n): reading by coordinates, at own = i omega (f, 1)."""
         axis, turn = AXES[signal.component], self.motion.turn(place.body)
         if signal.quantity == "angle":
-            return np.broadcast_to(turn[axis], (len(own), self.vehicle.size))
+            return np.broadcast_to(turn[axis], (len(i_omega), self.vehicle.size))
         if signal.quantity == "angular rate":
-            return own * turn[axis]
+            return i_omega * turn[axis]
         shift = self.motion.shift(place.body, place.position)[axis]
         weighs = signal.gravity and signal.frame in ("body", "sensor")  # a tilted sensor feels part of the weight
         tilt = GRAVITY * np.array([-turn[1], turn[0], 0 * turn[0]])[axis] if weighs else 0.0
-        return own**2 * shift + tilt
+        return i_omega**2 * shift + tilt
 
 
 def _built(vehicle: CutVehicle, frame: str) -> HubModel:

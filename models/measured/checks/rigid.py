@@ -48,18 +48,18 @@ def _body(evidence: Evidence, body: str, sensors: dict[str, tuple[Place, Axes]])
     readings = np.moveaxis(np.array(columns), 2, 0)
     sizes = [noise(recording, s) for s in signals]
     deviation = float(np.sqrt(np.nanmean(np.square(sizes)))) if np.isfinite(sizes).any() else 0.0
-    own = quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
-    if own.rigid is None:
+    rigidity = quality(array, readings[np.isfinite(readings).all(axis=(1, 2))], deviation)
+    if rigidity.rigid is None:
         return Finding(NAME, "note", body, f"{body}: {array.describe()[-1]}; a fourth sensor would tell.")
-    left = f"{100 * own.share:.2g} % of what its {len(axes)} accelerometers read against each other"
-    size, names = 100 * own.share, tuple(s.name for s in signals)
-    if own.rigid:
+    left = f"{100 * rigidity.share:.2g} % of what its {len(axes)} accelerometers read against each other"
+    size, names = 100 * rigidity.share, tuple(s.name for s in signals)
+    if rigidity.rigid:
         text = f"A rigid body explains {body} but for {left}."
         return Finding(NAME, "note", body, text, size, "%", names)
     cause = (
-        f"without {own.suspect} it is rigid: check its mount, place, axes and factor"
-        if own.suspect
+        f"without {rigidity.suspect} it is rigid: check its mount, place, axes and factor"
+        if rigidity.suspect
         else "no single sensor explains it: check places and axes of all"
     )
     text = f"No rigid body explains {left} on {body}; {cause}."
-    return Finding(NAME, "doubt", own.suspect or body, text, size, "%", names)
+    return Finding(NAME, "doubt", rigidity.suspect or body, text, size, "%", names)

@@ -55,18 +55,18 @@ def spectra(
     length = min(round(SEGMENT / recording.period), 2 * count // (LEAST + 1))
     firsts = np.arange(begin, begin + count - length + 1, max(length // 2, 1))
     frequencies = np.fft.rfftfreq(length, recording.period)
-    own = (frequencies >= band[0]) & (frequencies <= band[1])
+    in_band = (frequencies >= band[0]) & (frequencies <= band[1])
     window, names = np.hanning(length + 1)[:length, None], tuple(s.name for s in signals)
-    cross, segments = np.zeros((own.sum(), len(signals), len(signals)), complex), 0
+    cross, segments = np.zeros((in_band.sum(), len(signals), len(signals)), complex), 0
     for first in firsts[:: -(-len(firsts) // MOST)] if length > 1 else ():
         samples = recording.columns.block(names, int(first), length)
         if np.isfinite(samples).all():
-            lines = np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)[own]
+            lines = np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)[in_band]
             cross += lines[:, :, None] * lines[:, None, :].conj()
             segments += 1
-    if segments < LEAST or np.count_nonzero(own) < FEWEST:
+    if segments < LEAST or np.count_nonzero(in_band) < FEWEST:
         return None
-    return Spectra(frequencies[own], cross / segments, max(1.0, OVERLAPPING * segments), float(np.sum(window**2)))
+    return Spectra(frequencies[in_band], cross / segments, max(1.0, OVERLAPPING * segments), float(np.sum(window**2)))
 
 
 def noise(recording: Recording, signal: Signal) -> float:

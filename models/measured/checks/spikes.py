@@ -17,9 +17,11 @@ USUAL = 0.99
 
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are those of the highest spike, in the channel's unit."""
-    own = evidence.recording
-    found = [_finding(signal, own.samples(signal), own.period) for signal in own.signals]
-    return [one for one in found if one] or [Finding(NAME, "note", "", "No sample of any channel stands out alone.")]
+    recording = evidence.recording
+    findings = [_finding(signal, recording.samples(signal), recording.period) for signal in recording.signals]
+    return [finding for finding in findings if finding] or [
+        Finding(NAME, "note", "", "No sample of any channel stands out alone.")
+    ]
 
 
 def spikes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,9 +16,9 @@ def check(evidence: Evidence) -> list[Finding]:
     """Sizes are the share of the inertial readings, in %, that stays unexplained as the channels are mapped."""
     if evidence.searched is None:
         return [Finding(NAME, "note", "", f"Exchanged hubs were not looked for: this needs {evidence.lacking}.")]
-    found = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
-    found += [_pair(fault) for fault in evidence.faults if fault.kind == "crossed"]
-    return [*found, _rest(evidence), _blind(evidence)]
+    findings = [_finding(fault) for fault in evidence.faults if fault.kind == "swapped"]
+    findings += [_pair(fault) for fault in evidence.faults if fault.kind == "crossed"]
+    return [*findings, _rest(evidence), _blind(evidence)]
 
 
 def _finding(fault: Fault) -> Finding:

@@ -21,11 +21,11 @@ LATE, LINES = 1e-3, 8
 
 def check(evidence: Evidence) -> list[Finding]:
     """Sizes are the rate by the derivative of the angle, or s by which the rate is late."""
-    own = evidence.recording
+    recording = evidence.recording
     pairs = [
         (angle, rate)
-        for angle in own.find("angle")
-        for rate in own.find("angular rate")
+        for angle in recording.find("angle")
+        for rate in recording.find("angular rate")
         if rate.component == angle.component != "yaw" and _body(evidence, rate) == _body(evidence, angle)
     ]
     if not pairs:
@@ -40,18 +40,20 @@ def _body(evidence: Evidence, signal: Signal) -> str:
 
 def _pair(evidence: Evidence, angle: Signal, rate: Signal) -> Finding:
     recording, names, both = evidence.recording, f"{rate.name} and {angle.name}", (rate.name, angle.name)
-    own = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
+    pair_spectra = spectra(recording, (angle, rate), (BAND[0], min(BAND[1], 0.4 / recording.period)))
     squared = np.zeros(0)
-    if own is not None:
-        squared = np.abs(own.cross[:, 0, 1]) ** 2 / (own.cross[:, 0, 0] * own.cross[:, 1, 1]).real
+    if pair_spectra is not None:
+        squared = (
+            np.abs(pair_spectra.cross[:, 0, 1]) ** 2 / (pair_spectra.cross[:, 0, 0] * pair_spectra.cross[:, 1, 1]).real
+        )
     used = squared > COHERENT
-    if own is None or np.count_nonzero(used) < 2:
+    if pair_spectra is None or np.count_nonzero(used) < 2:
         return Finding(NAME, "note", names, f"{names} could not be compared: too little turning above their noise.")
-    omega, cross, squared = 2 * np.pi * own.frequencies[used], own.cross[used], squared[used]
+    omega, cross, squared = 2 * np.pi * pair_spectra.frequencies[used], pair_spectra.cross[used], squared[used]
     transfer = cross[:, 1, 0] / (1j * omega * cross[:, 0, 0].real)
     weight = squared / np.maximum(1 - squared, 1e-6)
     ratio = float((weight @ transfer).real / weight.sum())
-    late, error = _late(transfer, omega, weight * own.averages, ratio)
+    late, error = _late(transfer, omega, weight * pair_spectra.averages, ratio)
     wrong, text = sentence(ratio, rate, f"the derivative of {angle.name}")
     if wrong in ("sign", "unit") and _alike(transfer, weight) < ALIKE:
         text = (

@@ -54,11 +54,11 @@ def check(evidence: Evidence) -> list[Finding]:
     if evidence.plane is not None:
         forces = axles(evidence.recording, evidence.plane)
         return axle_forces.check(forces) if forces else []
-    vehicle, own = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
-    if vehicle is None or set(own) != set(vehicle.hubs):
+    vehicle, of_hub = evidence.vehicle, {evidence.hub(s): s for s in evidence.vertical().values()}
+    if vehicle is None or set(of_hub) != set(vehicle.hubs):
         text = "Not compared with the weight: this needs a vehicle in space and the vertical force of every hub."
         return [Finding(NAME, "note", "", text)]
-    signals = tuple(own[hub] for hub in vehicle.hubs)
+    signals = tuple(of_hub[hub] for hub in vehicle.hubs)
     numbers, means = _numbers(evidence, vehicle), mean(_columns(evidence, vehicle))
     loads, at = means[0][[numbers.index(WRENCH * i + 2) for i in range(len(signals))]], vehicle.loads
     coarse = [_coarse(evidence, *each) for each in zip(signals, loads, at, strict=True)]
@@ -73,8 +73,8 @@ def moments(evidence: Evidence) -> np.ndarray:
     vehicle, none = evidence.vehicle, np.zeros(2)
     if vehicle is None or evidence.frame == "inertial" or not _turns(evidence, vehicle):
         return none
-    own = _balance(vehicle, _numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
-    left, sure = own.left[1:3], np.sqrt(np.diag(np.linalg.inv(own.inverse)))[1:3]
+    balanced = _balance(vehicle, _numbers(evidence, vehicle), *mean(_columns(evidence, vehicle)))
+    left, sure = balanced.left[1:3], np.sqrt(np.diag(np.linalg.inv(balanced.inverse)))[1:3]
     return left if (np.abs(left) > SURE * sure).any() else none
 
 
@@ -86,12 +86,12 @@ def _columns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.nd
 
 def _turns(evidence: Evidence, vehicle: CutVehicle) -> list[Callable[[], np.ndarray]]:
     """Readers of the angular accelerations of roll and pitch by the chassis' gyros; none where one is missing."""
-    own = evidence.recording
+    recording = evidence.recording
 
     def slope(gyro: Signal) -> np.ndarray:
-        return np.gradient(own.samples(gyro), own.period)
+        return np.gradient(recording.samples(gyro), recording.period)
 
-    gyros = [own.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
+    gyros = [recording.find("angular rate", vehicle.chassis, axis)[:1] for axis in ("roll", "pitch")]
     return [partial(slope, gyro) for (gyro,) in gyros] if all(gyros) else []
 
 
@@ -136,16 +136,16 @@ def _fine(evidence: Evidence, balance: Balance, signals: tuple[Signal, ...], loa
     single = [balance.fit(balance.columns[:, [i]]) for i in range(len(signals))]
     worst = max(range(len(signals)), key=lambda i: single[i][2])
     force, error, fall = balance.fit(np.eye(len(balance.left))[:, :3])
-    sure = [float(own[0, 0]) ** 0.5 for _, own, _ in single]
-    share, own = float(single[worst][0][0]), sure[worst]
+    sure = [float(uncertainty[0, 0]) ** 0.5 for _, uncertainty, _ in single]
+    share, uncertainty = float(single[worst][0][0]), sure[worst]
     excess, known = float(force[0]) / weight, float(error[0, 0]) ** 0.5 / weight
-    if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * own) and single[worst][2] > fall - CERTAIN:
+    if single[worst][2] > CERTAIN and abs(share) > max(SMALL, 4 * uncertainty) and single[worst][2] > fall - CERTAIN:
         signal, size = signals[worst], share * loads[worst]
         if _moves_rightly(evidence, signal, share):
-            return _offset(signal, size, own * loads[worst])
+            return _offset(signal, size, uncertainty * loads[worst])
         _, text = sentence(1 + share, signal, f"the {loads[worst]:.0f} N that rest on {signal.at} on average")
         text += (
-            f" The mean is known to {2 * own:.2%} (95 %), and what is too much acts at this hub alone; an "
+            f" The mean is known to {2 * uncertainty:.2%} (95 %), and what is too much acts at this hub alone; an "
             f"offset of {size:+.3g} N would do the same."
         )
         return Finding("gain", "doubt", signal.name, text, 100 * share, "%", (signal.name,))

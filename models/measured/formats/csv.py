@@ -74,11 +74,11 @@ def open_csv(path: Path) -> CsvFile:
     """Read the header, count the rows and find out how they are written; raises InputError."""
     with readable(path):
         top = read_top(path)
-        head, clock, remarks, found = find_headings_of(path, top)
+        head, clock, remarks, findings = find_headings_of(path, top)
         units, more = find_units(path, top, head, clock)
         layout, notes = find_layout(path, top, head, clock, units)
         rows, count, left = find_rows(path, layout)
-        found += notes + more + _ends(path, layout, remarks, count, left)
+        findings += notes + more + _ends(path, layout, remarks, count, left)
         factor = 1.0 if layout.stamps else _factor(path, head, clock, units[clock])
         start, notes = zoned(path, remarks.start) if remarks.start else (layout.start, [])
         columns = [i for i in layout.numbers if i != clock]
@@ -110,7 +110,7 @@ def open_csv(path: Path) -> CsvFile:
             channels,
             start,
             "\n".join(remarks.comments),
-            tuple(found + notes + repeated),
+            tuple(findings + notes + repeated),
             layout,
             rows,
             places.get(clock),
@@ -122,12 +122,12 @@ def open_csv(path: Path) -> CsvFile:
 def unit_of(text: str) -> str:
     """Unit of a heading, in brackets, or in parentheses where it is the unit of something that can be mapped."""
     unit = heading(text)[1]
-    found = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
-    if found is None:
+    bracketed = re.fullmatch(r".*\(([^()]*[A-Za-z%°µ][^()]*)\)\s*", text) if "[" not in text else None
+    if bracketed is None:
         return unit
     from models.measured.units import quantities
 
-    return found[1].strip() if quantities(found[1]) else ""
+    return bracketed[1].strip() if quantities(bracketed[1]) else ""
 
 
 def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -> list[Finding]:
@@ -152,8 +152,8 @@ def _ends(path: Path, layout: Layout, remarks: Remarks, count: int, left: int) -
 
 def _factor(path: Path, head: Head, clock: int, unit: str) -> float:
     """Factor of times to seconds."""
-    name, own = clock_heading(head.names[clock])
-    if (own or unit).casefold() not in TIME_UNITS:
+    name, given = clock_heading(head.names[clock])
+    if (given or unit).casefold() not in TIME_UNITS:
         place = f"line {head.header.number} (header), column {name!r}, unit"
-        raise InputError(path, place, own or unit, f"write {name} [s]", tuple(SECONDS))
-    return TIME_UNITS[(own or unit).casefold()]
+        raise InputError(path, place, given or unit, f"write {name} [s]", tuple(SECONDS))
+    return TIME_UNITS[(given or unit).casefold()]

@@ -117,8 +117,8 @@ class Remarks:
             if not value.strip().isdecimal():
                 raise InputError(path, f"line {line}, samples", value.strip(), "a number of rows is needed")
             self.samples = int(value)
-        elif (found := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
-            self.of_channels.setdefault(_text(path, line, found[1]), []).append(found[2])
+        elif (remark := re.fullmatch(r'channel ("(?:[^"\\]|\\.)*"): ?(.*)', text)) is not None:
+            self.of_channels.setdefault(_text(path, line, remark[1]), []).append(remark[2])
         else:
             self.comments.append(value.removeprefix(" ") if key == "comment" else text)
 
@@ -192,7 +192,7 @@ def find_headings_of(path: Path, top: Top) -> tuple[Head, int, Remarks, list[Fin
             remarks.add(path, line.number, line.text.strip()[1:].strip())
         else:
             remarks.comments.append(line.text.strip(' ",;\t'))
-    foreign = {own.number: own.text.strip()[:60] for own in top.foreign if own.number <= head.line}
+    foreign = {passage.number: passage.text.strip()[:60] for passage in top.foreign if passage.number <= head.line}
     odd = "is not UTF-8 and is read as Windows-1252"
     said = [notice(path, "doubt", f"line {number} {odd}: {text!r}") for number, text in foreign.items()]
     if top.unit.itemsize > 1:
@@ -248,9 +248,9 @@ def _without_clock(path: Path, top: Top, signs: tuple[str, ...]) -> InputError:
 def clock_heading(text: str) -> tuple[str, str]:
     """Name and unit of the heading of a clock: in brackets, or as ``time (s)``, ``time / s``, ``time_s``."""
     name, unit = heading(text)
-    found = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
-    if found is not None and (found[2] is not None or found[3].casefold() in TIME_UNITS):
-        return found[1], (found[2] or found[3] or "").strip()
+    in_name = re.fullmatch(r"(.*?)\s*(?:\(([^()]*)\)|[/_,]\s*([^\W\d]+))", name) if not unit else None
+    if in_name is not None and (in_name[2] is not None or in_name[3].casefold() in TIME_UNITS):
+        return in_name[1], (in_name[2] or in_name[3] or "").strip()
     return name, unit
 
 
@@ -331,14 +331,14 @@ def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str,
     stamped = any(map(is_stamp, first_rows(top, head)[clock][:1]))
     rows = [(line, [_bare(cell) for cell in head.cells(line)]) for line in head.between]
     known = {*TIME_UNITS, "", "-"} if clock_heading(head.names[clock])[1] else set(TIME_UNITS)
-    found = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
-    if found is None:
+    unit_row = next((row for row in rows if row[1][clock].casefold() in known or stamped), None)
+    if unit_row is None:
         said = [
             notice(path, "note", f"line {line.number}, beneath the headings, is not read: {line.text.strip()[:60]!r}")
             for line, _ in rows
         ]
         return ("",) * len(head.names), said
-    line, units = found
+    line, units = unit_row
     for i, (name, unit) in enumerate(zip(head.names, units, strict=True)):
         if unit not in ("", "-") and heading(name)[1] not in ("", unit) and not (stamped and i == clock):
             raise InputError(path, f"line {line.number}", unit, f"the heading says {name!r}: name one unit")
@@ -347,5 +347,5 @@ def find_units(path: Path, top: Top, head: Head, clock: int) -> tuple[tuple[str,
 
 def _bare(cell: str) -> str:
     """A unit without the brackets around it."""
-    found = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
-    return (found[1] if found else cell).strip()
+    brackets = re.fullmatch(r"\s*[\[(](.*)[\])]\s*", cell)
+    return (brackets[1] if brackets else cell).strip()

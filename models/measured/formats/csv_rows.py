@@ -183,10 +183,10 @@ def _even(path: Path, layout: Layout, text: bytes, line: int) -> None:
     cells = np.diff(signs, prepend=0) + 1
     wrong = np.flatnonzero(cells != layout.width)
     if wrong.size:
-        found = int(cells[wrong[0]])
-        doubled = found in (2 * layout.width, 2 * layout.width - 1) and layout.separator == ","
+        width = int(cells[wrong[0]])
+        doubled = width in (2 * layout.width, 2 * layout.width - 1) and layout.separator == ","
         hint = "; where commas are decimal signs, semicolons must part the columns" if doubled else ""
-        raise _at(path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {found}{hint}")
+        raise _at(path, line, text, int(ends[wrong[0]]), f"{layout.width} values are needed, found {width}{hint}")
 
 
 def _culprit(path: Path, layout: Layout, text: bytes, line: int) -> InputError | None:

@@ -52,10 +52,10 @@ class Stamps:
 
     def _written(self, cell: str) -> str:
         """A cell as numpy reads a time; ValueError where it is of another notation or zone."""
-        found = FORMS[self.form].fullmatch(cell.strip())
-        if found is None or (found.groupdict().get("zone") or "") != self.zone:
+        matched = FORMS[self.form].fullmatch(cell.strip())
+        if matched is None or (matched.groupdict().get("zone") or "") != self.zone:
             raise ValueError(cell)
-        return _iso(found)
+        return _iso(matched)
 
     def _culprit(self, path: Path, cells: list[str], line: int, name: str) -> InputError:
         """Error at the first cell that is no time in this notation."""
@@ -77,11 +77,11 @@ def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
     """Notation of a column of times, from its first cell; InputError, with what to write, where it has two meanings."""
     cell = cell.strip()
     for form, pattern in FORMS.items():
-        found = pattern.fullmatch(cell)
-        if found is not None:
-            plain = Stamps(form, found.groupdict().get("zone") or "", 0, cell)
+        matched = pattern.fullmatch(cell)
+        if matched is not None:
+            plain = Stamps(form, matched.groupdict().get("zone") or "", 0, cell)
             try:
-                zero = int(np.datetime64(_iso(found), "ns").astype(np.int64))
+                zero = int(np.datetime64(_iso(matched), "ns").astype(np.int64))
             except ValueError:
                 raise plain._culprit(path, [cell], line, name) from None
             return Stamps(form, plain.zone, zero, cell)
@@ -94,7 +94,7 @@ def find_stamps(path: Path, cell: str, line: int, name: str) -> Stamps:
     )
 
 
-def _iso(found: re.Match[str]) -> str:
-    part = found.groupdict()
+def _iso(matched: re.Match[str]) -> str:
+    part = matched.groupdict()
     year, month, day = (part.get("y") or "1970", part.get("o") or "01", part.get("d") or "01")
     return f"{year}-{month:0>2}-{day:0>2}T{part['h']:0>2}:{part['m']}:{part['s']}.{part['f'] or '0'}"

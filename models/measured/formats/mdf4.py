@@ -124,18 +124,20 @@ def open_mdf(path: Path) -> MdfFile:
         if identification is None:
             raise InputError(path, "byte 8", None, "MDF of version 3 or 4 can be read")
         version = int(identification[1])
-        found = check_blocks(path) if version == 4 else []
+        findings = check_blocks(path) if version == 4 else []
         with opened(path) as mdf:
-            return _listed(path, mdf, version, found)
+            return _listed(path, mdf, version, findings)
 
 
-def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile:
+def _listed(path: Path, mdf: Any, version: int, findings: list[Finding]) -> MdfFile:
     """Channels that hold numbers over time."""
     left, places, channels = LeftOut(), [], []
     for g, group in enumerate(mdf.groups):
-        own = group.channel_group
-        if version == 3 and own.cycles_nr * own.samples_byte_nr > path.stat().st_size:
-            raise InputError(path, f"group {g + 1}", own.cycles_nr, "the file is too short for what its records need")
+        records = group.channel_group
+        if version == 3 and records.cycles_nr * records.samples_byte_nr > path.stat().st_size:
+            raise InputError(
+                path, f"group {g + 1}", records.cycles_nr, "the file is too short for what its records need"
+            )
         why = _useless(mdf, g, version)
         if why:
             left.add(why, f"group {g + 1}")
@@ -149,9 +151,9 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
             else:
                 places.append((g, i))
                 channels.append(channel)
-    found = found + left.findings(path)
+    findings = findings + left.findings(path)
     if not places:
-        raise without_numbers(path, found)
+        raise without_numbers(path, findings)
     groups = [_groups(mdf.groups[g].channel_group, channel) for channel, (g, _) in zip(channels, places, strict=True)]
     names, repeated = told_apart(path, [channel.name for channel in channels], *zip(*groups, strict=True))
     listed = tuple(
@@ -168,14 +170,14 @@ def _listed(path: Path, mdf: Any, version: int, found: list[Finding]) -> MdfFile
         for name, channel, (g, _), texts in zip(names, channels, places, groups, strict=True)
     )
     start, notes = _start(path, mdf.header, version)
-    return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(found + repeated + notes), tuple(places))
+    return MdfFile(path, listed, start, _plain(mdf.header.comment), tuple(findings + repeated + notes), tuple(places))
 
 
 def _groups(group: Any, channel: Any) -> tuple[str, str, str, str]:
     """What can name a channel's group: as acquired, its source, the first line of its comment, the channel's source."""
     sources = [
-        f"{getattr(one, 'name', '')} {getattr(one, 'path', '')}".strip()
-        for one in (getattr(group, "acq_source", None), getattr(channel, "source", None))
+        f"{getattr(source, 'name', '')} {getattr(source, 'path', '')}".strip()
+        for source in (getattr(group, "acq_source", None), getattr(channel, "source", None))
     ]
     comment = _plain(group.comment or "").partition("\n")[0]
     return (getattr(group, "acq_name", None) or "").strip(), sources[0], comment.strip(), sources[1]
@@ -209,16 +211,16 @@ def _unusable(group: Any, i: int, version: int) -> str:
 
 def _inside(group: Any, channel: Any, version: int) -> bool:
     """Whether a channel's bits are within its records: the library copies unchecked, and may take the process down."""
-    own, whole = group.channel_group, channel.data_type in WHOLE[version]
+    records, whole = group.channel_group, channel.data_type in WHOLE[version]
     if version == 4 and channel.channel_type == VIRTUAL_MASTER:
         return True
     begin = 8 * channel.byte_offset + channel.bit_offset if version == 4 else channel.start_offset
     begin += 8 * getattr(channel, "additional_byte_offset", 0) if version == 3 else 0
     marked = version == 4 and channel.flags & INVALIDATION
     return (
-        0 <= begin <= begin + channel.bit_count <= 8 * own.samples_byte_nr
+        0 <= begin <= begin + channel.bit_count <= 8 * records.samples_byte_nr
         and (0 < channel.bit_count <= 64 if whole else begin % 8 == 0 and channel.bit_count in (16, 32, 64))
-        and (not marked or channel.pos_invalidation_bit < 8 * own.invalidation_bytes_nr)
+        and (not marked or channel.pos_invalidation_bit < 8 * records.invalidation_bytes_nr)
     )
 
 

@@ -48,7 +48,7 @@ def check_blocks(path: Path) -> list[Finding]:
             raise InputError(path, f"byte {FIRST}", None, "the header block ##HD is needed")
     _chains(path, blocks)
     groups = [(place, block) for place, block in blocks.items() if block.kind == b"##DG"]
-    return [found for place, block in groups for found in _records(path, place, block, blocks)]
+    return [finding for place, block in groups for finding in _records(path, place, block, blocks)]
 
 
 def _walk(path: Path, data: mmap.mmap, size: int) -> Iterator[tuple[int, Block]]:
@@ -89,12 +89,12 @@ def _records(path: Path, place: int, group: Block, blocks: dict[int, Block]) -> 
     id_size = group.data[0]
     needed, loose, at = 0, False, group.links[1]
     while at:
-        one = blocks[at]
-        _, cycles, flags = struct.unpack_from("<QQH", one.data)
-        own = sum(struct.unpack_from("<II", one.data, 24))
+        block = blocks[at]
+        _, cycles, flags = struct.unpack_from("<QQH", block.data)
+        record_size = sum(struct.unpack_from("<II", block.data, 24))
         loose |= bool(flags & VLSD)
-        needed += 0 if flags & VLSD else cycles * (own + id_size)
-        at = one.links[0]
+        needed += 0 if flags & VLSD else cycles * (record_size + id_size)
+        at = block.links[0]
     if needed > there:
         allowed = f"the records of this data group need {needed} bytes, and {there} are there"
         raise InputError(path, f"byte {place}", None, allowed)

@@ -48,18 +48,20 @@ class RpcFile(Opened):
 
     def pieces(self, chosen: list[int], spans: Iterable[Span]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Read the groups that hold each span."""
-        own = self.layout
-        size = own.points * own.width * own.dtype.itemsize
+        layout = self.layout
+        size = layout.points * layout.width * layout.dtype.itemsize
         with self.path.open("rb") as file:
             for first, count in spans:
-                low, high = first // own.points, -(-(first + count) // own.points)
-                file.seek(own.begin + low * size)
-                data = np.frombuffer(file.read((high - low) * size), own.dtype).reshape(-1, own.width, own.points)
+                low, high = first // layout.points, -(-(first + count) // layout.points)
+                file.seek(layout.begin + low * size)
+                data = np.frombuffer(file.read((high - low) * size), layout.dtype).reshape(
+                    -1, layout.width, layout.points
+                )
                 samples = data[:, chosen].transpose(0, 2, 1).reshape(-1, len(chosen))
                 with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN all the same
-                    values = samples.astype(float) * own.scales[chosen]
-                skipped = first - low * own.points
-                yield own.period * np.arange(first, first + count), values[skipped : skipped + count]
+                    values = samples.astype(float) * layout.scales[chosen]
+                skipped = first - low * layout.points
+                yield layout.period * np.arange(first, first + count), values[skipped : skipped + count]
 
 
 def open_rpc(path: Path) -> RpcFile:
@@ -142,9 +144,11 @@ def _real(path: Path, parameters: dict[str, str], name: str, positive: bool) -> 
 def _layout(path: Path, parameters: dict[str, str]) -> Layout:
     """How the samples lie in the file."""
     for name, allowed in (("FILE_TYPE", ("TIME_HISTORY",)), ("TIME_TYPE", HISTORIES), ("DATA_TYPE", tuple(TYPES))):
-        found = parameters.get(name, allowed[0]).strip()
-        if found not in allowed:
-            raise InputError(path, f"header, {name}", found, "only time histories of one of these can be read", allowed)
+        type_of_file = parameters.get(name, allowed[0]).strip()
+        if type_of_file not in allowed:
+            raise InputError(
+                path, f"header, {name}", type_of_file, "only time histories of one of these can be read", allowed
+            )
     dtype = TYPES[parameters.get("DATA_TYPE", "SHORT_INTEGER").strip()]
     width = whole(path, parameters, "CHANNELS", 10**4)
     points = whole(path, parameters, "PTS_PER_GROUP", 10**7)
@@ -186,7 +190,7 @@ def _count(path: Path, parameters: dict[str, str], layout: Layout) -> tuple[int,
 
 def _numbers_of_names(path: Path, parameters: dict[str, str], width: int) -> list[Finding]:
     """Refuse names beyond the number of channels; say which channels have none."""
-    numbers = {int(found[1]) for key in parameters if (found := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
+    numbers = {int(matched[1]) for key in parameters if (matched := re.fullmatch(r"DESC\.CHAN_(\d{1,9})", key))}
     if numbers and max(numbers) > width:
         raise InputError(path, "header, CHANNELS", width, f"a channel {max(numbers)} is described as well")
     unnamed = [str(i) for i in range(1, width + 1) if i not in numbers]
@@ -198,4 +202,4 @@ def _long(parameters: dict[str, str], name: str) -> str:
     parts: list[str] = []
     while (key := f"{name}_{len(parts) + 1}") in parameters:
         parts.append(parameters[key])
-    return re.sub(r"\\(.)", lambda found: "\n" if found[1] == "n" else found[1], "".join(parts))
+    return re.sub(r"\\(.)", lambda matched: "\n" if matched[1] == "n" else matched[1], "".join(parts))

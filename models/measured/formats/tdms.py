@@ -53,7 +53,7 @@ class TdmsData(Opened):
         with Bounded(self.path) as file:
             data = opened(self.path, file)
             for first, count in spans:
-                values = [np.asarray(data[one.group][one.name].read_data(first, count), float) for one in places]
+                values = [np.asarray(data[each.group][each.name].read_data(first, count), float) for each in places]
                 least = min(len(column) for column in values)
                 place = places[0]
                 times = place.increment * np.arange(first, first + least)
@@ -129,16 +129,20 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
     if sum(len(channel) for _, channel in usable) > path.stat().st_size:
         raise InputError(path, "channels", None, "more samples are announced than the file has bytes")
     zero = min((start for _, channel in usable if (start := _started(channel)) is not None), default=None)
-    own = [(channel, place) for group, channel in usable if (place := _place(group, channel, zero, left)) is not None]
+    with_clock = [
+        (channel, place) for group, channel in usable if (place := _place(group, channel, zero, left)) is not None
+    ]
     said = [*cut, *left.findings(path)]
-    if not own:
+    if not with_clock:
         raise without_numbers(path, said)
-    clocks = [(place.group, place.clock, place.first, place.increment) for _, place in own]
-    counts = [len(channel) for channel, _ in own]
+    clocks = [(place.group, place.clock, place.first, place.increment) for _, place in with_clock]
+    counts = [len(channel) for channel, _ in with_clock]
     if cut:
         counts = [min(n for n, other in zip(counts, clocks, strict=True) if other == clock) for clock in clocks]
     keys = list(zip(clocks, counts, strict=True))
-    names, repeated = told_apart(path, [place.name for _, place in own], [place.group for _, place in own])
+    names, repeated = told_apart(
+        path, [place.name for _, place in with_clock], [place.group for _, place in with_clock]
+    )
     channels = tuple(
         Channel(
             name,
@@ -150,10 +154,10 @@ def _listed(path: Path, data: Any, cut: list[Finding]) -> TdmsData:
             _resolution(channel),
             place.group,
         )
-        for name, key, (channel, place) in zip(names, keys, own, strict=True)
+        for name, key, (channel, place) in zip(names, keys, with_clock, strict=True)
     )
     comment = str(data.properties.get("description", "")).strip()
-    return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in own))
+    return TdmsData(path, channels, zero, comment, (*said, *repeated), tuple(place for _, place in with_clock))
 
 
 def _numeric(channel: Any, left: LeftOut) -> bool:
@@ -175,9 +179,9 @@ def _place(group: Any, channel: Any, zero: datetime | None, left: LeftOut) -> Pl
     if np.isfinite(increment) and increment > 0.0:
         return Place(group.name, channel.name, "", late + float(properties.get("wf_start_offset", 0.0)), increment)
     clocks = [
-        one
-        for one in group.channels()
-        if one.name.casefold() in CLOCKS and len(one) == len(channel) and _text(one, *UNITS).casefold() in SECONDS
+        clock
+        for clock in group.channels()
+        if clock.name.casefold() in CLOCKS and len(clock) == len(channel) and _text(clock, *UNITS).casefold() in SECONDS
     ]
     if channel.name.casefold() in CLOCKS and clocks:
         return None

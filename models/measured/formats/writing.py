@@ -212,7 +212,10 @@ def write_tdms(path: Path, part: Path, groups: Sequence[Group], start: datetime 
             for first, values in group.rows(path):
                 columns = zip(group.names, np.ascontiguousarray(values.T), properties, strict=True)
                 file.write_segment(
-                    [ChannelObject(f"group {number}", name, own, {} if first else more) for name, own, more in columns]
+                    [
+                        ChannelObject(f"group {number}", name, samples, {} if first else more)
+                        for name, samples, more in columns
+                    ]
                 )
 
 
@@ -245,7 +248,7 @@ def _frames(path: Path, group: Group) -> Iterator[np.ndarray]:
 
 def _rpc_header(path: Path, group: Group, limits: np.ndarray, start: datetime | None, comment: str) -> bytes:
     """Header blocks; of the same length whatever the limits are."""
-    own: dict[str, object] = {
+    parameters: dict[str, object] = {
         "FILE_TYPE": "TIME_HISTORY",
         "TIME_TYPE": "RESPONSE",
         "DATA_TYPE": "FLOATING_POINT",
@@ -269,15 +272,15 @@ def _rpc_header(path: Path, group: Group, limits: np.ndarray, start: datetime | 
     texts = zip(group.names, group.units, limits.T, group.comments, strict=True)
     for i, (name, unit, (low, high), text) in enumerate(texts, start=1):
         told = {"DESC": name, "UNITS": unit, "SCALE": "1.0", "LOWER_LIMIT": f"{low:.9g}", "UPPER_LIMIT": f"{high:.9g}"}
-        own |= {f"{key}.CHAN_{i}": value for key, value in (told | {"MAP": str(i)}).items()}
-        own |= _long(f"COMMENT.CHAN_{i}", text)
-    count = len(own) + 3
+        parameters |= {f"{key}.CHAN_{i}": value for key, value in (told | {"MAP": str(i)}).items()}
+        parameters |= _long(f"COMMENT.CHAN_{i}", text)
+    count = len(parameters) + 3
     if count > MOST:
         text = f"the header has {MOST} parameters, {count} are needed: write fewer channels or comments, or MDF 4"
         raise InputError(path, "channels", len(group.names), text)
     blocks = -(-count // (BLOCK // RECORD))
-    own = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **own}
-    return b"".join(_record(path, key, str(value)) for key, value in own.items()).ljust(blocks * BLOCK, b"\0")
+    parameters = {"FORMAT": "BINARY", "NUM_HEADER_BLOCKS": blocks, "NUM_PARAMS": count, **parameters}
+    return b"".join(_record(path, key, str(value)) for key, value in parameters.items()).ljust(blocks * BLOCK, b"\0")
 
 
 def _record(path: Path, key: str, value: str) -> bytes:
