@@ -189,14 +189,14 @@ def parts(numbers):
     """Views of the table: head, joints, bodies, elements, hubs, inputs."""
     head = numbers[:HEADER]
     n, b, e, h = int(head[JOINTS]), int(head[BODIES]), int(head[ELEMENTS]), int(head[HUBS])
-    one = HEADER + PER_JOINT * n
-    two = one + PER_BODY * b
+    joints_end = HEADER + PER_JOINT * n
+    two = joints_end + PER_BODY * b
     three = two + PER_ELEMENT * e
     four = three + PER_HUB * h
     return (
         head,
-        numbers[HEADER:one].reshape(n, PER_JOINT),
-        numbers[one:two].reshape(b, PER_BODY),
+        numbers[HEADER:joints_end].reshape(n, PER_JOINT),
+        numbers[joints_end:two].reshape(b, PER_BODY),
         numbers[two:three].reshape(e, PER_ELEMENT),
         numbers[three:four].reshape(h, PER_HUB),
         numbers[four : four + int(head[ROWS]) * int(head[COLUMNS])].reshape(int(head[ROWS]), int(head[COLUMNS])),

@@ -31,52 +31,52 @@ def move(joints, q, v, m):
     m[0, :] = 0.0
     m[0, TURNED] = m[0, TURNED + 4] = m[0, TURNED + 8] = 1.0
     for j in range(len(joints)):
-        joint, own = joints[j], m[j + 1]
+        joint, link = joints[j], m[j + 1]
         below, k = m[int(joint[PARENT]) + 1], int(joint[AXIS])
         for i in range(PER_MOTION):
-            own[i] = below[i]
+            link[i] = below[i]
         arm, along, omega = (
             turned(below, three(joint, OFFSET)),
             (below[k], below[3 + k], below[6 + k]),
-            three(own, OMEGA),
+            three(link, OMEGA),
         )
         slides = joint[TURNS] == 0.0
         if slides:
             arm = plus(arm, times(along, q[j]))
-        put(own, ALONG, along)
-        add(own, PLACE, arm)
-        add(own, REST, cross(omega, cross(omega, arm)))
-        add(own, REST, cross(three(below, TURN_REST), arm))
+        put(link, ALONG, along)
+        add(link, PLACE, arm)
+        add(link, REST, cross(omega, cross(omega, arm)))
+        add(link, REST, cross(three(below, TURN_REST), arm))
         if slides:
-            add(own, REST, times(cross(omega, along), 2.0 * v[j]))
+            add(link, REST, times(cross(omega, along), 2.0 * v[j]))
         else:
-            add(own, TURN_REST, times(cross(omega, along), v[j]))
-            _turn(own, below, k, q[j], times(along, v[j]))
+            add(link, TURN_REST, times(cross(omega, along), v[j]))
+            _turn(link, below, k, q[j], times(along, v[j]))
 
 
 @lean
-def _turn(own, below, k, angle, rate):
+def _turn(link, below, k, angle, rate):
     """Turn a row of ``m`` about axis k of the row below by an angle (rad), at a rate (rad/s, a vector)."""
     c, s, a, b = math.cos(angle), math.sin(angle), (k + 1) % 3, (k + 2) % 3
-    add(own, OMEGA, rate)
+    add(link, OMEGA, rate)
     for i in range(0, 9, 3):
-        own[a + i] = c * below[a + i] + s * below[b + i]
-        own[b + i] = c * below[b + i] - s * below[a + i]
+        link[a + i] = c * below[a + i] + s * below[b + i]
+        link[b + i] = c * below[b + i] - s * below[a + i]
 
 
 @lean
-def locate(own, arms, i):
+def locate(link, arms, i):
     """Where a point is that lies at an arm from the origin of a row of ``m``, in its axes."""
-    return plus(turned(own, three(arms, i)), three(own, PLACE))
+    return plus(turned(link, three(arms, i)), three(link, PLACE))
 
 
 @lean
-def column(turns, own, place):
+def column(turns, link, place):
     """How a point at ``place`` moves by the rate of the joint of a row of ``m``, which carries it."""
-    along = three(own, ALONG)
+    along = three(link, ALONG)
     if turns == 0.0:
         return along
-    return plus(cross(along, place), times(cross(along, three(own, PLACE)), -1.0))
+    return plus(cross(along, place), times(cross(along, three(link, PLACE)), -1.0))
 
 
 @lean
@@ -84,31 +84,31 @@ def add_wrench(joints, m, last, place, force, moment, out):
     """Add a force (N) at ``place`` and a moment (N m) on what a joint carries to the joint forces ``out`` (n,)."""
     j = last
     while j >= 0:
-        own, turns = m[j + 1], joints[j, TURNS]
-        by, about = column(turns, own, place), times(three(own, ALONG), turns)
+        link, turns = m[j + 1], joints[j, TURNS]
+        by, about = column(turns, link, place), times(three(link, ALONG), turns)
         for k in range(3):
             out[j] += by[k] * force[k] + about[k] * moment[k]
         j = int(joints[j, PARENT])
 
 
 @lean
-def accelerated(own, arm, gravity):
+def accelerated(link, arm, gravity):
     """Acceleration without q'' of a point at an arm from the origin of a row of ``m``, less free fall."""
-    omega, rest = three(own, OMEGA), (own[REST], own[REST + 1], own[REST + 2] + gravity)
-    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(own, TURN_REST), arm))
+    omega, rest = three(link, OMEGA), (link[REST], link[REST + 1], link[REST + 2] + gravity)
+    return plus(plus(rest, cross(omega, cross(omega, arm))), cross(three(link, TURN_REST), arm))
 
 
 @lean
-def resting(own, body, gravity, tensor):
+def resting(link, body, gravity, tensor):
     """A body's arm in space, its acceleration and moment of momentum's rate without q''; writes its inertia there."""
     for i in range(3):
         for j in range(3):
             tensor[3 * i + j] = 0.0  # R T R^T
             for k in range(9):
-                tensor[3 * i + j] += own[3 * i + k // 3] * body[INERTIA + k] * own[3 * j + k % 3]
-    arm, omega = turned(own, three(body, ARM)), three(own, OMEGA)
-    momentum = plus(turned(tensor, three(own, TURN_REST)), cross(omega, turned(tensor, omega)))
-    return arm, accelerated(own, arm, gravity), momentum
+                tensor[3 * i + j] += link[3 * i + k // 3] * body[INERTIA + k] * link[3 * j + k % 3]
+    arm, omega = turned(link, three(body, ARM)), three(link, OMEGA)
+    momentum = plus(turned(tensor, three(link, TURN_REST)), cross(omega, turned(tensor, omega)))
+    return arm, accelerated(link, arm, gravity), momentum
 
 
 @lean
@@ -123,21 +123,21 @@ def inertia(joints, bodies, m, gravity, mass, force):
         arm, a, t = resting(m[j + 1], body, gravity, tensor)
         place = plus(arm, three(m[j + 1], PLACE))
         while j >= 0:
-            row, own, turns = rows[count], m[j + 1], joints[j, TURNS]
+            row, link, turns = rows[count], m[j + 1], joints[j, TURNS]
             chain[count] = j
-            by, about = column(turns, own, place), times(three(own, ALONG), turns)
+            by, about = column(turns, link, place), times(three(link, ALONG), turns)
             for k in range(3):
                 force[j] -= kg * by[k] * a[k] + about[k] * t[k]
             put(row, 0, by)
             put(row, 3, about)
             put(row, 6, turned(tensor, about))
             count, j = count + 1, int(joints[j, PARENT])
-        for one in range(count):
+        for i in range(count):
             for two in range(count):
                 both = 0.0
                 for k in range(3):
-                    both += kg * rows[one, k] * rows[two, k] + rows[one, 6 + k] * rows[two, 3 + k]
-                mass[int(chain[one]), int(chain[two])] += both
+                    both += kg * rows[i, k] * rows[two, k] + rows[i, 6 + k] * rows[two, 3 + k]
+                mass[int(chain[i]), int(chain[two])] += both
 
 
 @lean

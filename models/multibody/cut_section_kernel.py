@@ -73,9 +73,9 @@ def _accelerate(joints, m, last, qdd, place, a):
     """Acceleration of a point at ``place``, carried by joint ``last``, that without q'' is ``a``, and its turning's."""
     j, turning = last, (0.0, 0.0, 0.0)
     while j >= 0:
-        own, turns = m[j + 1], joints[j, TURNS]
-        a = plus(a, times(column(turns, own, place), qdd[j]))
-        turning = plus(turning, times(times(three(own, ALONG), turns), qdd[j]))
+        link, turns = m[j + 1], joints[j, TURNS]
+        a = plus(a, times(column(turns, link, place), qdd[j]))
+        turning = plus(turning, times(times(three(link, ALONG), turns), qdd[j]))
         j = int(joints[j, PARENT])
     return a, turning
 
@@ -98,10 +98,10 @@ def _move_bodies(joints, bodies, m, gravity, qdd, acting):
 def _load_hubs(head, hubs, m, wrenches, acting):
     """Write place, force and moment of every hub, negative: they act from outside."""
     for i in range(len(hubs)):
-        hub, row, own = hubs[i], acting[i], m[frame(head, hubs[i])]
+        hub, row, body_frame = hubs[i], acting[i], m[frame(head, hubs[i])]
         put(row, 0, locate(m[int(hub[LAST]) + 1], hub, ARM))
-        put(row, 3, times(turned(own, three(wrenches[i], 0)), -1.0))
-        put(row, 6, times(turned(own, three(wrenches[i], 3)), -1.0))
+        put(row, 3, times(turned(body_frame, three(wrenches[i], 0)), -1.0))
+        put(row, 6, times(turned(body_frame, three(wrenches[i], 3)), -1.0))
 
 
 @lean
@@ -141,10 +141,10 @@ def _sum_up(acting, carried, point):
 def _feel_point(joints, m, point, gravity, qdd):
     """Acceleration of a point in the axes of what carries it."""
     last = int(point[JOINT])
-    own = m[last + 1]
-    arm = turned(own, three(point, POINT_ARM))
-    a = accelerated(own, arm, gravity * point[WEIGHT])
-    return into(own, _accelerate(joints, m, last, qdd, plus(three(own, PLACE), arm), a)[0], 0)
+    link = m[last + 1]
+    arm = turned(link, three(point, POINT_ARM))
+    a = accelerated(link, arm, gravity * point[WEIGHT])
+    return into(link, _accelerate(joints, m, last, qdd, plus(three(link, PLACE), arm), a)[0], 0)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -190,8 +190,8 @@ def felt(numbers, every, states, places, own_axes, out):
 
 
 @lean
-def _written(own, force, moment, row, at):
+def _written(frame, force, moment, row, at):
     """Write force and moment of space in the axes of a row of ``m``; where the next ones go."""
-    put(row, at, into(own, force, 0))
-    put(row, at + 3, into(own, moment, 0))
+    put(row, at, into(frame, force, 0))
+    put(row, at + 3, into(frame, moment, 0))
     return at + WRENCH

@@ -93,9 +93,9 @@ def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray
 
 
 def _element(e: Element, joined: Joints) -> list[float]:
-    one, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
+    first, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
     law = (e.held, e.stiffness, e.damping, joined.last[e.frame], e.friction, e.friction_rate, 0.0, 0.0)
-    return [joined.last[e.one], *one, joined.last[e.two], *two, *e.axis, e.design, *law]
+    return [joined.last[e.one], *first, joined.last[e.two], *two, *e.axis, e.design, *law]
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:

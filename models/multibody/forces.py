@@ -249,9 +249,9 @@ def turn_wheel(tyre, braking, driving, vehicle, wheel):
 
 
 @lean
-def _hold(torque, axle, own, carrying):
+def _hold(torque, axle, link, carrying):
     """A torque about the axle from what carries the wheel to the chassis."""
-    add(own, TWISTED, times(axle, -torque))
+    add(link, TWISTED, times(axle, -torque))
     add(carrying, TWISTED, times(axle, torque))
 
 
@@ -373,9 +373,9 @@ def set_forces(block, t, n):
 
 
 @lean
-def reports(numbers, times, q, v, found, ledgers):
+def reports(numbers, times, q, v, forces, ledgers):
     """Fill reports (m, tyres, REPORTED) and ledgers (m, LEDGER) of states (m, n) at ``times`` (m,)."""
     f = array(doubles(q.shape[1]), (q.shape[1],))
     f[:] = 0.0
     for i in range(len(times)):
-        all_forces(numbers, times[i], q[i], v[i], f, found[i], ledgers[i])
+        all_forces(numbers, times[i], q[i], v[i], f, forces[i], ledgers[i])

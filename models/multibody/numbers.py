@@ -83,11 +83,11 @@ class Handling:
     numbers: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        own = self.tyres
+        tyres = self.tyres
         names = tuple(tyre.name for tyre in self.given.tyres)
-        for name in set(own.fixed) - set(names):
+        for name in set(tyres.fixed) - set(names):
             raise InputError(self.given.name, "fixed", name, "no such tyre", names)
-        free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), own.spin_inertia, own.fixed)
+        free = free_vehicle(self.given, GRAVITY * float(np.cos(self.slope)), tyres.spin_inertia, tyres.fixed)
         object.__setattr__(self, "vehicle", free)
         object.__setattr__(self, "held", preloads(free))
         object.__setattr__(self, "numbers", table(self))
@@ -117,12 +117,20 @@ class Handling:
         return np.zeros(len(places)), v
 
 
-def table(own: Handling) -> np.ndarray:
+def table(handling: Handling) -> np.ndarray:
     """All numbers, in the order that ``forces`` names."""
-    free, chassis, of, points = own.vehicle, chassis_of(own.given), net(own.tyres.cells), _Points(own.vehicle)
-    parts = [*_springs(own, points), *_bars(own, points)]
-    tyres, knots = [_tyre(own, i, points) for i in range(len(free.tyres))], _knots(own.controls, own.pushes)
-    pushes = _pushes(own)
+    free, chassis, of, points = (
+        handling.vehicle,
+        chassis_of(handling.given),
+        net(handling.tyres.cells),
+        _Points(handling.vehicle),
+    )
+    parts = [*_springs(handling, points), *_bars(handling, points)]
+    tyres, knots = (
+        [_tyre(handling, i, points) for i in range(len(free.tyres))],
+        _knots(handling.controls, handling.pushes),
+    )
+    pushes = _pushes(handling)
     held = {*pushes[at.PUSHED_BY : -1 : at.PER_PUSH], *(row[tree.JOINT] for row in points.rows)}
     sections = [
         _joints(free, held),
@@ -131,14 +139,14 @@ def table(own: Handling) -> np.ndarray:
         np.ravel(tyres),
         pushes,
         knots.ravel(),
-        own.waves.ravel(),
+        handling.waves.ravel(),
         of.cells.ravel(),
         of.strips.ravel(),
     ]
     begins = at.HEADER + np.cumsum([0, *(section.size for section in sections)])
     curves = _put_curves(parts, sections[2], int(begins[-1]))
     joint, place = _place(free, chassis.name, chassis.position)
-    drag = own.given.drags[0].coefficient / 2.0 if own.given.drags else 0.0
+    drag = handling.given.drags[0].coefficient / 2.0 if handling.given.drags else 0.0
     counts = [
         begins[-1] + curves.size,
         len(free.coordinates()),
@@ -146,7 +154,7 @@ def table(own: Handling) -> np.ndarray:
         len(parts),
         len(free.tyres),
         knots.shape[2],
-        len(own.waves),
+        len(handling.waves),
     ]
     places = [*begins[1:4], *begins[5:-1]]  # pushes are found from the controls
     head = [*counts, joint, drag, *place, of.cells.shape[1], of.strips.shape[1], of.middle, *places]
@@ -190,56 +198,56 @@ _Part = tuple[list[float], tuple[Curve | None, ...]]
 """A row of ``parts`` and its curves."""
 
 
-def _springs(own: Handling, points: _Points) -> Iterator[_Part]:
-    for s in own.vehicle.springs:
+def _springs(handling: Handling, points: _Points) -> Iterator[_Part]:
+    for s in handling.vehicle.springs:
         if s.two is None:
             raise InputError(
-                own.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
+                handling.vehicle.name, f"springs[{s.name}].bodies", s.name, "a free vehicle is not tied to the ground"
             )
         if s.frame != CARRIER:
             allowed = "must be left out: in handling the axes of springs are fixed in the carrier, which only yaws"
-            raise InputError(own.vehicle.name, f"springs[{s.name}].frame", s.frame, allowed)
+            raise InputError(handling.vehicle.name, f"springs[{s.name}].frame", s.frame, allowed)
         ends = points.number(s.one, s.point_one), points.number(s.two, s.point_two)
         rest = float(np.dot(np.subtract(s.point_two, s.point_one), s.axis))
-        law = [s.stiffness, s.damping, own.held.parts[s.name], s.friction, s.friction_rate, rest]
+        law = [s.stiffness, s.damping, handling.held.parts[s.name], s.friction, s.friction_rate, rest]
         yield [*law, -1.0, 0.0, *ends, *s.axis, 0.0, 0.0], (s.travel_force, s.rate_force)
 
 
-def _bars(own: Handling, points: _Points) -> Iterator[_Part]:
-    for bar in own.vehicle.bars:
+def _bars(handling: Handling, points: _Points) -> Iterator[_Part]:
+    for bar in handling.vehicle.bars:
         ends = points.number(bar.left, bar.point_left), points.number(bar.right, bar.point_right)
         rest, rolls = (bar.point_right[2] - bar.point_left[2]) / bar.track, (bar.body, "rx")
-        law = [bar.stiffness, bar.damping, own.held.parts[bar.name], 0.0, 1.0, rest]
-        turns = [float(own.vehicle.coordinates().index(rolls)), 1.0]
+        law = [bar.stiffness, bar.damping, handling.held.parts[bar.name], 0.0, 1.0, rest]
+        turns = [float(handling.vehicle.coordinates().index(rolls)), 1.0]
         yield [*law, *turns, *ends, 0.0, 0.0, 1.0 / bar.track, 0.0, 0.0], (None, None)
 
 
 def _put_curves(parts: list[_Part], rows: np.ndarray, first: int) -> np.ndarray:
     """Numbers of all curves, and into the rows of their parts where they are, of which the first is at ``first``."""
-    found = np.empty(0)
+    laid_curves = np.empty(0)
     for row, (_, curves) in zip(rows.reshape(-1, PER_PART), parts, strict=True):
         for column, curve in zip((ON_TRAVEL, ON_RATE), curves, strict=True):
             if curve is not None:
-                row[column] = first + found.size
-                found = np.concatenate((found, curve_numbers(curve)))
-    return found
+                row[column] = first + laid_curves.size
+                laid_curves = np.concatenate((laid_curves, curve_numbers(curve)))
+    return laid_curves
 
 
-def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
+def _tyre(handling: Handling, i: int, points: _Points) -> list[float]:
     """One tyre; its bristles are those with which it has the ride vehicle's cornering stiffness at its static load."""
-    free, of = own.vehicle, own.tyres
+    free, of = handling.vehicle, handling.tyres
     tyre, places = free.tyres[i], free.coordinates()
     joint, _ = _place(free, tyre.body, tyre.point)
-    load = own.held.tyres[tyre.name]
+    load = handling.held.tyres[tyre.name]
     if not load > 0.0:
         raise InputError(free.name, f"tyres[{tyre.name}]", load, "carries no weight: it must press on the road at rest")
     sunk = load / tyre.stiffness
     radius = tyre.point[2] + sunk
-    cornering = next(force.stiffness for force in own.given.side_forces if force.name == tyre.name)
+    cornering = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
     bristles = cornering / (shape_factor(of.cells) * radius * sunk * of.half_width)
     spins = (rotor(tyre.name), "ry")
     axle = [t for t in free.tyres if t.axle == tyre.axle]
-    share, front, c = 1.0 / len(axle), tyre.axle == 0, own.controls
+    share, front, c = 1.0 / len(axle), tyre.axle == 0, handling.controls
     rear = max(t.axle for t in free.tyres) or 1  # all axles behind the first share evenly
     brake = share * (c.front_brake if front else (1.0 - c.front_brake) / rear)
     drive = share * (c.front_drive if front else (1.0 - c.front_drive) / rear)
@@ -264,16 +272,16 @@ def _tyre(own: Handling, i: int, points: _Points) -> list[float]:
     ]
 
 
-def _pushes(own: Handling) -> np.ndarray:
+def _pushes(handling: Handling) -> np.ndarray:
     """A row of each push, and how many there are."""
-    names = tuple(body.name for body in own.vehicle.bodies)
-    for push in own.pushes:
+    names = tuple(body.name for body in handling.vehicle.bodies)
+    for push in handling.pushes:
         if push.body not in names:
-            raise InputError(own.given.name, "pushes", push.body, "no such body", names)
+            raise InputError(handling.given.name, "pushes", push.body, "no such body", names)
     rows = [
         [joint, *place, *push.axis]
-        for push in own.pushes
-        for joint, place in [_place(own.vehicle, push.body, push.point)]
+        for push in handling.pushes
+        for joint, place in [_place(handling.vehicle, push.body, push.point)]
     ]
     return np.array([*np.ravel(rows), len(rows)])
 

@@ -42,12 +42,12 @@ def press(numbers, first, count, spots, q, v, f):
     energy = power = 0.0
     for i in range(count):
         e = row(beyond(numbers, first), PER_PART, i)
-        one, two, axis = row(spots, PER_SPOT, int(e[ONE])), row(spots, PER_SPOT, int(e[TWO])), three(e, AXIS)
-        travel = dot(axis, plus(three(two, WHERE), times(three(one, WHERE), -1.0))) - e[REST]
-        rate = dot(axis, plus(three(two, RATE), times(three(one, RATE), -1.0)))
-        own = int(e[OWN])
-        if own >= 0:
-            travel, rate = travel + e[OWN_GAIN] * q[own], rate + e[OWN_GAIN] * v[own]
+        from_spot, to_spot, axis = row(spots, PER_SPOT, int(e[ONE])), row(spots, PER_SPOT, int(e[TWO])), three(e, AXIS)
+        travel = dot(axis, plus(three(to_spot, WHERE), times(three(from_spot, WHERE), -1.0))) - e[REST]
+        rate = dot(axis, plus(three(to_spot, RATE), times(three(from_spot, RATE), -1.0)))
+        coordinate = int(e[OWN])
+        if coordinate >= 0:
+            travel, rate = travel + e[OWN_GAIN] * q[coordinate], rate + e[OWN_GAIN] * v[coordinate]
         spring, other = e[HELD] + e[STIFFNESS] * travel, e[DAMPING] * rate
         if e[FRICTION] != 0.0:
             other += e[FRICTION] * math.tanh(rate / e[FRICTION_RATE])
@@ -57,11 +57,11 @@ def press(numbers, first, count, spots, q, v, f):
             other += on_curve(beyond(numbers, int(e[ON_RATE])), rate)
         energy += (e[HELD] + 0.5 * e[STIFFNESS] * travel) * travel
         power -= other * rate
-        if own >= 0:
-            f[own] -= (spring + other) * e[OWN_GAIN]
+        if coordinate >= 0:
+            f[coordinate] -= (spring + other) * e[OWN_GAIN]
         force = times(axis, spring + other)
-        add(one, PUSH, force)
-        add(two, PUSH, times(force, -1.0))
+        add(from_spot, PUSH, force)
+        add(to_spot, PUSH, times(force, -1.0))
     return energy, power
 
 

@@ -103,15 +103,15 @@ def _follow(joints, first, end, below, q, v, links):
         else:
             turning, speed = plus(turning, times(axis, v[j])), plus(speed, times(cross(place, axis), v[j]))
             x, y, z = _turned(along, x, y, z, math.cos(q[j]), math.sin(q[j]))
-    own = row(links, PER_LINK, end - 1)
-    put(own, TURNED, x)
-    put(own, TURNED + 3, y)
-    put(own, TURNED + 6, z)
-    put(own, PLACE, place)
-    put(own, SPEED, speed)
-    put(own, TURNING, turning)
-    put(own, PUSHED, (0.0, 0.0, 0.0))
-    put(own, TWISTED, (0.0, 0.0, 0.0))
+    link = row(links, PER_LINK, end - 1)
+    put(link, TURNED, x)
+    put(link, TURNED + 3, y)
+    put(link, TURNED + 6, z)
+    put(link, PLACE, place)
+    put(link, SPEED, speed)
+    put(link, TURNING, turning)
+    put(link, PUSHED, (0.0, 0.0, 0.0))
+    put(link, TWISTED, (0.0, 0.0, 0.0))
 
 
 @lean
@@ -125,11 +125,11 @@ def _turned(along, x, y, z, cosine, sine):
 
 
 @lean
-def out(own, local, first):
+def out(link, local, first):
     """Three numbers along a link's axes as a vector of the carrier's."""
     return plus(
-        plus(times(three(own, TURNED), local[first]), times(three(own, TURNED + 3), local[first + 1])),
-        times(three(own, TURNED + 6), local[first + 2]),
+        plus(times(three(link, TURNED), local[first]), times(three(link, TURNED + 3), local[first + 1])),
+        times(three(link, TURNED + 6), local[first + 2]),
     )
 
 
@@ -138,26 +138,26 @@ def locate(points, count, links, spots):
     """Fill all spots of ``points``, the table's rows at a pointer; no forces yet."""
     for i in range(count):
         of, spot = row(points, PER_POINT, i), row(spots, PER_SPOT, i)
-        own = row(links, PER_LINK, int(of[JOINT]))
-        place = plus(three(own, PLACE), out(own, of, LOCAL))
+        link = row(links, PER_LINK, int(of[JOINT]))
+        place = plus(three(link, PLACE), out(link, of, LOCAL))
         put(spot, WHERE, place)
-        put(spot, RATE, plus(three(own, SPEED), cross(three(own, TURNING), place)))
+        put(spot, RATE, plus(three(link, SPEED), cross(three(link, TURNING), place)))
         put(spot, PUSH, (0.0, 0.0, 0.0))
 
 
 @lean
-def push(own, ground, force, place):
+def push(link, ground, force, place):
     """A force from outside at a place on the body behind a link."""
-    twist(own, ground, cross(place, force))
-    add(own, PUSHED, force)
+    twist(link, ground, cross(place, force))
+    add(link, PUSHED, force)
     ground[AHEAD] += force[0]
     ground[ASIDE] += force[1]
 
 
 @lean
-def twist(own, ground, moment):
+def twist(link, ground, moment):
     """A moment from outside on the body behind a link."""
-    add(own, TWISTED, moment)
+    add(link, TWISTED, moment)
     ground[TURN] += moment[2]
 
 
@@ -169,17 +169,17 @@ def inwards(joints, n, points, count, tree, f):
     """
     links, spots = tree.links, tree.spots
     for i in range(count):
-        spot, own = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(points, PER_POINT, i)[JOINT]))
+        spot, link = row(spots, PER_SPOT, i), row(links, PER_LINK, int(row(points, PER_POINT, i)[JOINT]))
         force = three(spot, PUSH)
-        add(own, PUSHED, force)
-        add(own, TWISTED, cross(three(spot, WHERE), force))
+        add(link, PUSHED, force)
+        add(link, TWISTED, cross(three(spot, WHERE), force))
     j = n - 1
     while j > 2:
-        of, own = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
+        of, link = row(joints, PER_JOINT, j), row(links, PER_LINK, j)
         first = j + 1 - int(of[COUNT])
         if of[KIND] != LOOSE:
-            pushed, twisted = three(own, PUSHED), three(own, TWISTED)
-            moment = plus(twisted, cross(pushed, three(own, PLACE)))
+            pushed, twisted = three(link, PUSHED), three(link, TWISTED)
+            moment = plus(twisted, cross(pushed, three(link, PLACE)))
             for k in range(first, j + 1):
                 turns = row(joints, PER_JOINT, k)[KIND] >= 3.0
                 f[k] += dot(three(row(links, PER_LINK, k), AXIS), moment if turns else pushed)

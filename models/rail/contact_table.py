@@ -326,17 +326,17 @@ class Contact:
         )
 
 
-def _standing(found: Placed) -> Placed:
+def _standing(placed: Placed) -> Placed:
     """The contact itself, unless a wheel stands on the top of its flange."""
-    for name, places in (("right", found.right), ("left", found.left)):
+    for name, places in (("right", placed.right), ("left", placed.left)):
         least = min(place.below_tip for place in places)
         if least < CLIMBED:
             raise RunFailed(
                 "contact table",
-                f"at {1e3 * found.shift:g} mm the {name} wheel has climbed its flange and "
+                f"at {1e3 * placed.shift:g} mm the {name} wheel has climbed its flange and "
                 f"touches {1e3 * least:.1f} mm below the tip: no wheelset stays there",
             )
-    return found
+    return placed
 
 
 def rolling_radius_difference(placed_at: Placed) -> float:

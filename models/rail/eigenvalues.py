@@ -19,8 +19,8 @@ def free(wheelset: Wheelset) -> Wheelset:
 
 def wavelength(kind: type[Equations], wheelset: Wheelset) -> float:
     """Wavelength (m) of the free wheelset by the slowest oscillation of all its motions."""
-    found = values(kind, free(wheelset), SLOW)
-    return 2.0 * math.pi * SLOW / min(found[found.imag > 0.0], key=abs).imag
+    roots = values(kind, free(wheelset), SLOW)
+    return 2.0 * math.pi * SLOW / min(roots[roots.imag > 0.0], key=abs).imag
 
 
 def values(kind: type[Equations], wheelset: Wheelset, speed: float) -> np.ndarray:
@@ -48,5 +48,5 @@ def locus(kind: type[Equations], wheelset: Wheelset, speeds: Iterable[float]) ->
 def hunting(values: np.ndarray) -> np.ndarray:
     """Of eigenvalues (..., 9), the least damped one with an imaginary part above 0; NaN if there is none."""
     oscillates = np.where(values.imag > 0.0, values.real, -math.inf)
-    found = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
-    return np.where(np.isfinite(oscillates.max(axis=-1)), found, math.nan)
+    root = np.take_along_axis(values, oscillates.argmax(axis=-1)[..., None], -1)[..., 0]
+    return np.where(np.isfinite(oscillates.max(axis=-1)), root, math.nan)

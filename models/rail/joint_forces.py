@@ -60,9 +60,9 @@ def rails_at(numbers):
 
 def to_joints(states: Array) -> Array:
     """Positions and rates of the joints (..., 10) of states (..., 10)."""
-    found = states[..., _POSITIONS + _RATES]
-    found[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
-    return found
+    of_joints = states[..., _POSITIONS + _RATES]
+    of_joints[..., -1] -= states[..., YAW_RATE] * np.sin(states[..., ROLL])
+    return of_joints
 
 
 def from_joints(joints: Array) -> Array:

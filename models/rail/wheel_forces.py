@@ -149,8 +149,8 @@ def rails_of(wheelset: Wheelset, law: str = "linear", cells: int = LEAST_CELLS) 
     wheels = np.array([(*shape, w.friction, w.contact_damping, w.flange_clearance, w.flange_stiffness)], WHEELS)
     profile = laid_profile(w.profiles, w.radius) if w.profiles else no_profile()
     net = grid(cells, int(strips_of(np.asarray(ellipse.a / ellipse.b), cells)), "intermediate")
-    own = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
-    return Rails(wheels, own, net.strips, net.cells, net.middle, LAWS[law])
+    laid = LaidProfile(*(values.copy() for values in profile))  # of one type for numba, kept and made at a pointer
+    return Rails(wheels, laid, net.strips, net.cells, net.middle, LAWS[law])
 
 
 def plain(rails: Rails) -> tuple[Any, ...]:
@@ -190,13 +190,13 @@ def contact_points(pose, rails, touches):
     """Fill ``touches``, TOUCH (patches,), the right wheel's first; without a normal where nothing is near."""
     each, wheels = len(touches) // 2, rails.wheels[0]
     for k in range(2):
-        side, own = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
+        side, of_side = RIGHT if k == 0 else LEFT, touches[k * each : (k + 1) * each]
         if rails.profile.nodes.size > 0:
-            profile_on_rail(side, pose, rails.profile, wheels.modulus, own)
+            profile_on_rail(side, pose, rails.profile, wheels.modulus, of_side)
             continue
         cone = Cone(wheels.radius, wheels.half_gauge, wheels.conicity, wheels.head)
         depth, rolling, n_y, n_z, cx, cy, cz = cone_on_rail(side, pose, cone)
-        touch = own[0]
+        touch = of_side[0]
         touch.depth, touch.n_y, touch.n_z, touch.x, touch.y, touch.z = depth, n_y, n_z, cx, cy, cz
         touch.along, touch.across = _along(rolling, wheels.conicity), 0.5 / wheels.head
 
@@ -226,7 +226,7 @@ def _linear(a, b, motion, shear, poisson):
 
 
 @inlined
-def _one_way(sign, contacts, slip, speed, rails, found):
+def _one_way(sign, contacts, slip, speed, rails, wheel_forces):
     """Fill fx, fy, mz of wheels that roll forwards (sign 1), or of the mirror image of those that roll backwards."""
     by = max(abs(speed), REGULAR)
     for k in range(len(contacts)):
@@ -234,11 +234,11 @@ def _one_way(sign, contacts, slip, speed, rails, found):
         contact.xi_x, contact.xi_y = sign * slip[k].vx / by, slip[k].aside / by
         contact.spin = sign * slip[k].turn / by
     if rails.law == FASTSIM:
-        forces(contacts, strips_in(rails.strips), cells_in(rails.cells, rails.middle), BLEND, ORDER, found)
+        forces(contacts, strips_in(rails.strips), cells_in(rails.cells, rails.middle), BLEND, ORDER, wheel_forces)
     else:
         shear, poisson = rails.wheels[0].shear, rails.wheels[0].nu
         for k in range(len(contacts)):
-            c, force = contacts[k], found[k]
+            c, force = contacts[k], wheel_forces[k]
             force.fx, force.fy, force.mz = _linear(c.a, c.b, (c.xi_x, c.xi_y, c.spin), shear, poisson)
 
 

@@ -84,10 +84,10 @@ class Wheelset(Strict):
     def coned(self, equivalent: float) -> "Wheelset":
         """The same wheelset with cones of this equivalent conicity, as profiles have one at some amplitude."""
         most = min(LARGEST_CONICITY, 0.999 * self.half_gauge / self.radius)
-        found = brentq(
+        conicity = brentq(
             lambda c: self.changed(conicity=c).equivalent_conicity - equivalent, LEAST_CONICITY, most, xtol=1e-15
         )
-        return self.changed(conicity=float(found))
+        return self.changed(conicity=float(conicity))
 
     def changed(self, **values: Any) -> "Wheelset":
         """The same wheelset but for some values, read as strictly."""

@@ -69,9 +69,9 @@ def half_car_acceleration(corner: QuarterCar, q: float, a: float, b: float, spee
     share of the mass, front b / (a + b), rear a / (a + b); ``corner`` is the quarter car of either, to that scale.
     """
     base = a + b
-    own = corner.body_acceleration(q)
+    at_axle = corner.body_acceleration(q)
     after = corner.correlation_of_acceleration(q, base / speed)
-    return ((a**2 + b**2) * own + 2 * a * b * after) / base**2
+    return ((a**2 + b**2) * at_axle + 2 * a * b * after) / base**2
 
 
 def split_half_car(corner: QuarterCar, a: float, b: float) -> tuple[QuarterCar, QuarterCar, float]:

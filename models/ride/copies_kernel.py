@@ -167,8 +167,8 @@ def march(states, roads, step, first, every, laws, sums):
     the outputs, their squares, cubes and fourth powers before step ``first`` and each ``every``-th after it.
     """
     for copy in range(0, states.shape[1], TOGETHER):
-        own = slice(copy, min(copy + TOGETHER, states.shape[1]))
-        x, road = states[:, own].copy(), roads[:, :, own].copy()
+        columns = slice(copy, min(copy + TOGETHER, states.shape[1]))
+        x, road = states[:, columns].copy(), roads[:, :, columns].copy()
         k1, k2, k3, k4, moved = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
         forces = laws.rows.shape[0] + laws.tyres.wheel.size
         force, room = np.empty((forces, x.shape[1])), np.empty((2, x.shape[1]))
@@ -187,4 +187,4 @@ def march(states, roads, step, first, every, laws, sums):
             for j in range(x.shape[0]):
                 for c in range(x.shape[1]):
                     x[j, c] += step / 6.0 * (k1[j, c] + 2.0 * (k2[j, c] + k3[j, c]) + k4[j, c])
-        states[:, own] = x
+        states[:, columns] = x

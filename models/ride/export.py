@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 def matrices(system: DelayedSystem, covariance: Covariance) -> dict[str, Any]:
     """A, C, B and D of every axle (B1, D1, ...), delays (s), names, covariance P and standard deviations."""
-    found: dict[str, Any] = {"A": system.A, "C": system.C}
+    named: dict[str, Any] = {"A": system.A, "C": system.C}
     for i, (B, D) in enumerate(zip(system.B, system.D, strict=True), start=1):
-        found |= {f"B{i}": B, f"D{i}": D}
-    return found | {
+        named |= {f"B{i}": B, f"D{i}": D}
+    return named | {
         "delays": np.array(system.delays),
         "independent": system.independent,
         "outputs": np.array(system.names),

@@ -174,25 +174,25 @@ def _integrals(
     parts: np.ndarray, centre: np.ndarray, half: np.ndarray, excitation: Excitation, speed: float
 ) -> np.ndarray:
     """Variances (panels, p) of the sum of delayed parts (a, panels, nodes, p, k); both signs of the frequency."""
-    found = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
+    integrals = np.einsum("ambpk,ambpk,b->mp", parts, parts.conj(), GAUSS).real
     for j in range(1, len(parts)) if not excitation.independent else ():
         for i in range(j):
             gap = (excitation.lengths[j] - excitation.lengths[i]) / speed
             moments = 2 * 1j**DEGREES * spherical_jn(DEGREES, (half * gap)[:, None])
             weight = np.exp(1j * centre * gap)[:, None] * (moments @ TO_LEGENDRE)
-            found += 2 * np.einsum("mbpk,mbpk,mb->mp", parts[i], parts[j].conj(), weight).real
-    return found * half[:, None] / np.pi
+            integrals += 2 * np.einsum("mbpk,mbpk,mb->mp", parts[i], parts[j].conj(), weight).real
+    return integrals * half[:, None] / np.pi
 
 
 def _breaks(vehicle: LinearVehicle, excitation: Excitation, speed: float) -> np.ndarray:
     """Edges (rad/s) of the first panels: doublings from almost 0 to beyond all, and the undamped frequencies."""
     squares = abs(np.linalg.eigvals(np.linalg.solve(vehicle.mass, vehicle.stiffness)))
-    own = np.sqrt(squares[squares > 1e-8 * squares.max()])
+    natural = np.sqrt(squares[squares > 1e-8 * squares.max()])
     corners = speed * abs(np.linalg.eigvals(excitation.F))
-    marks = np.concatenate([own, corners[corners > 0]])
+    marks = np.concatenate([natural, corners[corners > 0]])
     low, high = LOW * marks.min(), HIGH * marks.max()
     doublings = np.geomspace(low, high, int(np.ceil(np.log2(high / low))))
-    return np.unique(np.concatenate([[0.0], doublings, own]))
+    return np.unique(np.concatenate([[0.0], doublings, natural]))
 
 
 Densities = Callable[[np.ndarray], np.ndarray]

@@ -140,20 +140,20 @@ def _zeros_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarra
 
     Null space, then null space of what remains, until nothing remains to be found: the staircase of Jordan chains.
     """
-    Q, form, found, left = np.eye(len(A)), A.copy(), 0, 0.0
-    while found < len(A):
-        small = [value for value in svdvals(form[found:, found:]) if value <= tolerance]
+    Q, form, nullity, left = np.eye(len(A)), A.copy(), 0, 0.0
+    while nullity < len(A):
+        small = [value for value in svdvals(form[nullity:, nullity:]) if value <= tolerance]
         null = len(small)
         if null == 0:
             break
         left = max(left, *small)
-        turn = svd(form[found:, found:])[2][::-1].T  # null space first
-        Q[:, found:] = Q[:, found:] @ turn
-        form[:, found:] = form[:, found:] @ turn
-        form[found:, found:] = turn.T @ form[found:, found:]
-        form[found:, found : found + null] = 0.0
-        found += null
-    return Q, form, found, left
+        turn = svd(form[nullity:, nullity:])[2][::-1].T  # null space first
+        Q[:, nullity:] = Q[:, nullity:] @ turn
+        form[:, nullity:] = form[:, nullity:] @ turn
+        form[nullity:, nullity:] = turn.T @ form[nullity:, nullity:]
+        form[nullity:, nullity : nullity + null] = 0.0
+        nullity += null
+    return Q, form, nullity, left
 
 
 def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -166,12 +166,12 @@ def _undamped_first(A: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.nda
         return (im != 0) & (abs(re) <= tolerance)
 
     values = np.linalg.eigvals(A)
-    own = on_axis(values.real, values.imag)
-    growing = values[~own & (values.real >= 0)]
+    on_the_axis = on_axis(values.real, values.imag)
+    growing = values[~on_the_axis & (values.real >= 0)]
     if len(growing):
         worst = growing[growing.real.argmax()]
         raise Unstable(worst.real, abs(worst.imag) / (2 * np.pi))
-    if not own.any():
+    if not on_the_axis.any():
         return np.eye(len(A)), A, 0
     form, U, undamped = schur(A, output="real", sort=on_axis)
     return U, form, undamped

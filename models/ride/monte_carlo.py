@@ -184,8 +184,8 @@ class _Cells:
 
     def estimate(self, time: np.ndarray, rows: np.ndarray, copies: int) -> Estimate:
         """From variances and their errors (N, 2, p), inf where an output has none."""
-        found = np.where(self.finite, rows, np.inf)
-        return Estimate(self.one.names, time, found[:, 0], found[:, 1], copies)
+        moments = np.where(self.finite, rows, np.inf)
+        return Estimate(self.one.names, time, moments[:, 0], moments[:, 1], copies)
 
 
 def _legendre() -> np.ndarray:

@@ -210,8 +210,8 @@ def laws_of(vehicle: SpatialVehicle, plain: LinearVehicle, springs: tuple[Spring
     heights = np.array([kinematics.shift(tyre.body, tyre.point)[2] for tyre in pushing]).reshape(-1, n)
     forced = (-plain.stiffness, -plain.damping, plain.road_stiffness, plain.road_damping, -rows.T, heights.T)
     motion = np.linalg.solve(plain.mass, np.hstack(forced))
-    own = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
-    read = np.array([[float((o.kind, _part(o)) == force) for force in own] for o in vehicle.outputs])
+    named_forces = [*(("force", s.name) for s in springs), *(("tyre force", tyre.name) for tyre in pushing)]
+    read = np.array([[float((o.kind, _part(o)) == force) for force in named_forces] for o in vehicle.outputs])
     read = np.hstack(
         [
             [np.concatenate([o.displacement, o.rate, o.road, o.road_rate, o.acceleration]) for o in plain.outputs],

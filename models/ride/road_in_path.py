@@ -50,20 +50,20 @@ def road_in_path(
 
     A system is linear in v (its noise in sqrt(v)), so two speeds tell all.
     """
-    one, two = (at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
+    at_1, at_2 = (at_speed(vehicle, excitation, v, weightings) for v in (1.0, 2.0))
     first, (m, axles) = 2 * len(vehicle.mass), (len(excitation.F), len(excitation.heights))
     road = np.arange(first, first + axles * m)
-    rest = np.setdiff1d(np.arange(len(one.A)), road)
-    steady, by_speed = 2.0 * one.A - two.A, two.A - one.A
+    rest = np.setdiff1d(np.arange(len(at_1.A)), road)
+    steady, by_speed = 2.0 * at_1.A - at_2.A, at_2.A - at_1.A
     A = steady[np.ix_(rest, rest)]
     known = np.linalg.pinv(np.hstack([excitation.F, excitation.G]))
     T = np.hstack(
         [
             np.hstack([by_speed[np.ix_(rest, at)], B[rest]]) @ known
-            for at, B in zip(road.reshape(axles, m), one.B, strict=True)
+            for at, B in zip(road.reshape(axles, m), at_1.B, strict=True)
         ]
     )
-    basis = np.zeros_like(one.A)
+    basis = np.zeros_like(at_1.A)
     basis[rest, : len(rest)], basis[road, len(rest) :] = np.eye(len(rest)), np.eye(len(road))
     basis[np.ix_(rest, np.arange(len(rest), len(basis)))] = T
     inputs = steady[np.ix_(rest, road)] + A @ T
@@ -71,9 +71,9 @@ def road_in_path(
         A,
         inputs.reshape(-1, axles, m),
         basis,
-        (2.0 * one.C - two.C) @ basis,
-        (two.C - one.C) @ basis,
-        one.names,
+        (2.0 * at_1.C - at_2.C) @ basis,
+        (at_2.C - at_1.C) @ basis,
+        at_1.names,
         excitation,
     )
 
@@ -136,8 +136,8 @@ class Responses:
         motion = self.motion[axle].reshape(TERMS, self.n, self.m).transpose(1, 0, 2).reshape(self.n, -1)
         out[: self.n] = (motion @ columns).reshape(self.n, -1, k)
         now = powers(self.path(end) - self.path(met), TERMS) @ self.noise
-        own = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
-        out[own] = now.reshape(-1, self.m, k).transpose(1, 0, 2)
+        rows = slice(self.n + axle * self.m, self.n + (axle + 1) * self.m)
+        out[rows] = now.reshape(-1, self.m, k).transpose(1, 0, 2)
         return out
 
 

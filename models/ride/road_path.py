@@ -58,11 +58,13 @@ class RoadPath:
         met = np.empty((0, len(F), copies))
         while True:
             fresh = 2 * steps + (0 if len(met) else 1 + max(lags))
-            own = normal(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
-            own = np.concatenate([met[-1:] if len(met) else _start(F, G) @ own[:1].mT, root @ own[len(met) == 0 :].mT])
-            for before, after in pairwise(own):
+            drawn = normal(seed, path, fresh * copies, len(F), source=ROAD).reshape(fresh, copies, -1)
+            drawn = np.concatenate(
+                [met[-1:] if len(met) else _start(F, G) @ drawn[:1].mT, root @ drawn[len(met) == 0 :].mT]
+            )
+            for before, after in pairwise(drawn):
                 after += move @ before
-            met = np.concatenate([met[:-1], own])
+            met = np.concatenate([met[:-1], drawn])
             yield self._under(F, heights, met, lags, 2 * steps + 1)
             met, path = met[2 * steps :], path + 1
 
@@ -100,8 +102,8 @@ def _axles(excitation: Excitation) -> tuple[np.ndarray, np.ndarray, tuple[np.nda
     F, G, heights = excitation.F, excitation.G, excitation.heights
     if not excitation.independent:
         return F, G, heights
-    own = [np.hstack([H if i == j else 0.0 * H for j in range(len(heights))]) for i, H in enumerate(heights)]
-    return block_diag(*[F] * len(heights)), block_diag(*[G] * len(heights)), tuple(own)
+    rows = [np.hstack([H if i == j else 0.0 * H for j in range(len(heights))]) for i, H in enumerate(heights)]
+    return block_diag(*[F] * len(heights)), block_diag(*[G] * len(heights)), tuple(rows)
 
 
 def _over(F: np.ndarray, G: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:

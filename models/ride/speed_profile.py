@@ -118,15 +118,15 @@ def nodes(profile: SpeedProfile, ends: np.ndarray, distances: Sequence[float]) -
     ``distances`` (m) of axles behind others: at such a place the other one's speed may bend, or it may have stood.
     Towards a place of standstill, where its time goes like the root of the distance, cells shrink.
     """
-    path, own = profile.path(ends), ends[ends >= profile.times[0]]
+    path, ends_after = profile.path(ends), ends[ends >= profile.times[0]]
     stops = _passing(profile, path[profile.speed(ends) == 0.0], distances)
-    shrinking = (stops[:, None] + np.diff(own).max() * SHRINKING).ravel()
+    shrinking = (stops[:, None] + np.diff(ends_after).max() * SHRINKING).ravel()
     more = np.sort(np.concatenate([_passing(profile, path, distances), shrinking]))
-    more = more[(more > own[0]) & (more < own[-1])]
-    after = np.searchsorted(own, more)
-    apart = np.minimum(own[after] - more, more - own[after - 1]) > CLOSE
+    more = more[(more > ends_after[0]) & (more < ends_after[-1])]
+    after = np.searchsorted(ends_after, more)
+    apart = np.minimum(ends_after[after] - more, more - ends_after[after - 1]) > CLOSE
     apart &= np.diff(more, prepend=-np.inf) > CLOSE
-    cuts = np.sort(np.concatenate([own, more[apart]]))
+    cuts = np.sort(np.concatenate([ends_after, more[apart]]))
     time = cuts[:-1, None] + np.diff(cuts)[:, None] * POINTS
     weight = np.diff(cuts)[:, None] * WEIGHTS * profile.speed(time)
     moving = weight.any(axis=1)

@@ -138,8 +138,8 @@ class _Search:
         watched = [PartOutput(f"{kind} of {s.name}", kind, s.name) for kind in kinds for s in self.springs]
         self.watched = replace(vehicle, outputs=(*vehicle.outputs, *watched))
         self.plain = linearise(self.watched, speed, {s.name: (s.stiffness, s.damping) for s in self.springs})
-        own = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
-        self.rows = np.array([output.displacement for output in own]).reshape(-1, len(self.plain.mass))
+        with_forces = self.plain.outputs[len(vehicle.outputs) :][: len(self.springs)]
+        self.rows = np.array([output.displacement for output in with_forces]).reshape(-1, len(self.plain.mass))
 
     def found(self, scale: float) -> StatisticallyLinear:
         """Iterate to the fixed point."""
@@ -270,12 +270,12 @@ def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
     return HARMONIC * np.divide(upper, lower, out=np.ones_like(upper), where=lower > 0)
 
 
-def _forced(linear: LinearVehicle, rows: np.ndarray, own: np.ndarray) -> LinearVehicle:
-    """The vehicle with forces along rows (f, n) in the place of the road's heights; ``own`` (p, f): read at once."""
+def _forced(linear: LinearVehicle, rows: np.ndarray, reading: np.ndarray) -> LinearVehicle:
+    """The vehicle with forces along rows (f, n) in place of the road's heights; ``reading`` (p, f): read at once."""
     none = np.zeros(len(rows))
     outputs = tuple(
         Output(o.name, o.unit, o.kind, o.acceleration, o.rate, o.displacement, read, none)
-        for o, read in zip(linear.outputs, own, strict=True)
+        for o, read in zip(linear.outputs, reading, strict=True)
     )
     wheels = tuple(Wheel(str(i), 0.0, 0.0, 0) for i in range(len(rows)))
     return replace(linear, road_stiffness=-rows.T, road_damping=np.zeros(rows.T.shape), wheels=wheels, outputs=outputs)

@@ -141,11 +141,11 @@ def modes(A: np.ndarray) -> Modes:
     for part in range(count):
         at = np.flatnonzero(label == part)
         balanced, (scale, _) = matrix_balance(A[np.ix_(at, at)], permute=False, separate=True)
-        values[at], own = np.linalg.eig(balanced)
-        worst = max(worst, np.linalg.cond(own))
+        values[at], vectors = np.linalg.eig(balanced)
+        worst = max(worst, np.linalg.cond(vectors))
         if not np.isfinite(worst) or worst * EPS > 1:
             return Modes(A, values, V, inverse, np.inf)
-        V[np.ix_(at, at)], inverse[np.ix_(at, at)] = scale[:, None] * own, np.linalg.inv(own) / scale
+        V[np.ix_(at, at)], inverse[np.ix_(at, at)] = scale[:, None] * vectors, np.linalg.inv(vectors) / scale
     return Modes(A, values, V, inverse, worst)
 
 
@@ -189,30 +189,30 @@ def modal(system: DelayedSystem, vehicle: int, road: np.ndarray, speed: float, s
     axles = len(system.B)
     last = vehicle + axles * len(road)
     A = system.A
-    own = shared.of(A[:vehicle, :vehicle])
+    vehicle_modes = shared.of(A[:vehicle, :vehicle])
     path = shared.of(road)
     behind = shared.of(A[last:, last:])
-    if max(each.condition for each in (own, path, behind)) * EPS > 1e-6:
+    if max(each.condition for each in (vehicle_modes, path, behind)) * EPS > 1e-6:
         return "eigenvectors are nearly parallel"
-    values = [own.values, np.tile(speed * path.values, axles), behind.values]
+    values = [vehicle_modes.values, np.tile(speed * path.values, axles), behind.values]
     if max(each.real.max(initial=-np.inf) for each in values) > -1e-6:
         return "a motion does not die out"
-    if max(each.blurred for each in (own, path, behind)) > BLURRED:
+    if max(each.blurred for each in (vehicle_modes, path, behind)) > BLURRED:
         return "rates lie too far apart"
     V, back = np.kron(np.eye(axles), path.V), np.kron(np.eye(axles), path.inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        met = _joined(own, A[:vehicle, vehicle:last] @ V, values[1])
-        felt = _joined(behind, A[last:, :vehicle] @ own.V, values[0])
+        met = _joined(vehicle_modes, A[:vehicle, vehicle:last] @ V, values[1])
+        felt = _joined(behind, A[last:, :vehicle] @ vehicle_modes.V, values[0])
         heard = _joined(behind, A[last:, :vehicle] @ met + A[last:, vehicle:last] @ V, values[1])
     C0, C1, C2 = system.C[:, :vehicle], system.C[:, vehicle:last], system.C[:, last:]
-    C = np.hstack([C0 @ own.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
+    C = np.hstack([C0 @ vehicle_modes.V + C2 @ felt, C0 @ met + C1 @ V + C2 @ heard, C2 @ behind.V])
     arrivals, inputs = hits(system), []
     for b in arrivals.B:
         of_road = back @ b[vehicle:last]
-        of_vehicle = own.inverse @ (b[:vehicle] - met @ of_road)
+        of_vehicle = vehicle_modes.inverse @ (b[:vehicle] - met @ of_road)
         of_weighting = behind.inverse @ (b[last:] - felt @ of_vehicle - heard @ of_road)
         inputs.append(np.vstack([of_vehicle, of_road, of_weighting]))
-    condition = own.condition * path.condition * behind.condition
+    condition = vehicle_modes.condition * path.condition * behind.condition
     return _summed(np.concatenate(values), C, inputs, arrivals.delays, arrivals.independent, condition)
 
 

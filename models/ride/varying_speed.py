@@ -129,13 +129,13 @@ def quasi_stationary(
     form = road_in_path(vehicle, excitation, weightings)
     different, which = np.unique(speeds, return_inverse=True)
     moving = different > 0.0
-    found = np.empty((len(different), len(form.names)))
+    deviations = np.empty((len(different), len(form.names)))
     if moving.any():
         over = sweep(lambda _: vehicle, {"road": excitation}, different[moving].tolist(), weightings, accuracy)
-        found[moving] = over.deviation[0]
+        deviations[moving] = over.deviation[0]
     if not moving.all():
-        found[~moving] = np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[: len(form.names)]
-    return found[which]
+        deviations[~moving] = np.sqrt(_seen(form, _at_rest(form), 0.0, [FINITE] * len(form.names)))[: len(form.names)]
+    return deviations[which]
 
 
 def _moments(
@@ -161,7 +161,7 @@ def _moments(
             queue.move(E, step)
         if end > profile.times[0]:
             b, weight = [hit.of(step) for hit in hits], points.weight[hits[0].within(step)]
-            half = [_product(own, own, weight) / 2.0 for own in b]
+            half = [_product(block, block, weight) / 2.0 for block in b]
             half += [_product(queue.take(len(weight)), b[queue.last], weight) for queue in queues]
             Q = np.sum(half, axis=0)
             P = E @ P @ E.T + Q + Q.T
@@ -216,10 +216,10 @@ class _Queue:
         return taken
 
 
-def _product(one: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _product(first: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Sum over points and channels of one times other, both (n, c, k), with the points' weights (c,)."""
-    n = len(one)
-    return (one * weight[:, None]).reshape(n, -1) @ other.reshape(n, -1).T
+    n = len(first)
+    return (first * weight[:, None]).reshape(n, -1) @ other.reshape(n, -1).T
 
 
 def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
@@ -229,9 +229,9 @@ def _met_before(form: RoadInPath, axle: int, behind: np.ndarray) -> np.ndarray:
     n, axles, m = form.inputs.shape
     if not len(behind):
         return np.zeros((n + axles * m, 0, G.shape[1]))  # of a vehicle that may know no rest
-    own = np.zeros((axles * m, len(behind), G.shape[1]))
-    own[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
-    return np.tensordot(_rest(form), own, 1)
+    after = np.zeros((axles * m, len(behind), G.shape[1]))
+    after[axle * m : (axle + 1) * m] = road.transpose(1, 0, 2)
+    return np.tensordot(_rest(form), after, 1)
 
 
 def _rest(form: RoadInPath) -> np.ndarray:
@@ -251,13 +251,13 @@ def _rest(form: RoadInPath) -> np.ndarray:
 def _at_rest(form: RoadInPath) -> np.ndarray:
     """Covariance of (y, f) where the vehicle stands, at rest."""
     road = form.excitation
-    own, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
+    stationary, m = solve_continuous_lyapunov(road.F, -road.G @ road.G.T), len(road.F)
     axles = range(len(road.heights))
     P = np.zeros((len(axles), m, len(axles), m))
     for i in axles:
         for j in axles[i:]:
             if i == j or not road.independent:
-                P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ own
+                P[i, :, j] = expm(road.F * (road.lengths[j] - road.lengths[i])) @ stationary
                 P[j, :, i] = P[i, :, j].T
     rest = _rest(form)
     return rest @ P.reshape(rest.shape[1], -1) @ rest.T
@@ -268,6 +268,6 @@ def _seen(form: RoadInPath, P: np.ndarray, speed: float, status: Sequence[str]) 
     n, C = len(form.A), form.C + speed * form.rate
     H = np.hstack(form.excitation.heights)
     variance = ((C @ P) * C).sum(axis=1)
-    lost = [found == DIFFUSING or (found == INFINITE and speed > 0.0) for found in status]
+    lost = [state == DIFFUSING or (state == INFINITE and speed > 0.0) for state in status]
     height = ((H @ P[n:, n:]) * H).sum(axis=1)
     return np.concatenate([np.where(lost, np.inf, np.maximum(variance, 0.0)), np.maximum(height, 0.0)])

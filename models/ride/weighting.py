@@ -105,8 +105,12 @@ def weighted(system: DelayedSystem, filters: Mapping[str, str]) -> DelayedSystem
     if not filters:
         return system
     rows = [system.names.index(output) for output in filters]
-    own = [WEIGHTINGS[name].matrices() for name in filters.values()]
-    A, inputs, C = block_diag(*(a for a, _, _ in own)), _columns([b for _, b, _ in own]), _columns([c for *_, c in own])
+    sections = [WEIGHTINGS[name].matrices() for name in filters.values()]
+    A, inputs, C = (
+        block_diag(*(a for a, _, _ in sections)),
+        _columns([b for _, b, _ in sections]),
+        _columns([c for *_, c in sections]),
+    )
     n, p = len(system.A), len(filters)
     corner, silent = np.zeros((n, len(A))), np.zeros((p, system.B[0].shape[1]))
     return DelayedSystem(

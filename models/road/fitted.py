@@ -60,18 +60,18 @@ def fit(
     ------
     InputError : too few windows, fewer than four bands to fit two numbers to, or no mean process at all
     """
-    found = spectra(tracks, window_length)
+    measured = spectra(tracks, window_length)
     height = max(float(np.abs(tracks.left).max()), float(np.abs(tracks.right).max()))
     if float(np.ptp(tracks.left + tracks.right)) <= 1e-12 * height:
         raise InputError(tracks.name, "heights", None, "left and right have the same mean all along: there is no road")
-    least = 2.0 * float(found.wavenumber[0]) if low is None else low
-    most = min(HIGHEST, 0.5 * float(found.wavenumber[-1])) if high is None else high
-    mean = _fit(found.wavenumber, found.mean, found.freedom, least, most, tracks.name)
+    least = 2.0 * float(measured.wavenumber[0]) if low is None else low
+    most = min(HIGHEST, 0.5 * float(measured.wavenumber[-1])) if high is None else high
+    mean = _fit(measured.wavenumber, measured.mean, measured.freedom, least, most, tracks.name)
     apart = float(np.abs(tracks.left - tracks.right).max())
-    roll = _fit(found.wavenumber, found.roll, found.freedom, least, most, tracks.name) if apart > 0.0 else None
+    roll = _fit(measured.wavenumber, measured.roll, measured.freedom, least, most, tracks.name) if apart > 0.0 else None
     silent = ShapeFilter(mean.filter.corner, 0.0)
     road = TwoTrackRoad(mean.filter, silent if roll is None else roll.filter)
-    return FittedRoad(road, mean, roll, (*_limits(tracks, found), *_doubts(found, mean, roll)), found)
+    return FittedRoad(road, mean, roll, (*_limits(tracks, measured), *_doubts(measured, mean, roll)), measured)
 
 
 def _fit(k: np.ndarray, density: np.ndarray, freedom: float, low: float, high: float, name: str) -> FilterFit:
@@ -114,39 +114,39 @@ def _bands(
     return np.array(middles), np.array(values)
 
 
-def _limits(tracks: MeasuredTracks, found: TrackSpectra) -> list[str]:
+def _limits(tracks: MeasuredTracks, measured: TrackSpectra) -> list[str]:
     """What no fit could change."""
-    least = found.wavenumber[0]
-    low, high = found.band()
+    least = measured.wavenumber[0]
+    low, high = measured.band()
     return [
-        f"{tracks.length:g} m in {found.windows} windows: nothing is known of waves longer than "
+        f"{tracks.length:g} m in {measured.windows} windows: nothing is known of waves longer than "
         f"{2.0 * math.pi / least:.3g} m ({least:.3g} rad/m)",
         f"every single density is known to a factor {low:.2f} to {high:.2f} (95 %)",
-        f"a coherency below {found.chance_coherency():.2f} cannot be told from none (95 %)",
+        f"a coherency below {measured.chance_coherency():.2f} cannot be told from none (95 %)",
     ]
 
 
-def _doubts(found: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
+def _doubts(measured: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> list[str]:
     """Where the fitted road is not the measured one."""
     said = []
-    for name, one in (("mean", mean), ("roll", roll)):
-        if one is None:
+    for name, fitted in (("mean", mean), ("roll", roll)):
+        if fitted is None:
             said.append(
                 "left and right are the same heights: there is no roll process, and the file says nothing of it"
             )
             continue
-        if not one.resolved:
+        if not fitted.resolved:
             said.append(
                 f"the corner of the {name} process is not told by this road: only its level above "
-                f"{one.low:.3g} rad/m is; do not read its variance"
+                f"{fitted.low:.3g} rad/m is; do not read its variance"
             )
-        if one.residual > math.log(2.0):
+        if fitted.residual > math.log(2.0):
             said.append(
-                f"the {name} process is not of first order: the fit is off by a factor {_factor(one):.1f} (rms)"
+                f"the {name} process is not of first order: the fit is off by a factor {_factor(fitted):.1f} (rms)"
             )
-    shared = np.abs(found.mean_roll) / np.sqrt(found.mean * np.maximum(found.roll, 1e-300))
-    used = (found.wavenumber >= mean.low) & (found.wavenumber <= mean.high)
-    often = float(np.mean(shared[used] > found.chance_coherency()))
+    shared = np.abs(measured.mean_roll) / np.sqrt(measured.mean * np.maximum(measured.roll, 1e-300))
+    used = (measured.wavenumber >= mean.low) & (measured.wavenumber <= mean.high)
+    often = float(np.mean(shared[used] > measured.chance_coherency()))
     if roll is not None and often > 0.2:
         said.append(
             f"mean and roll are coherent at {100.0 * often:.0f} % of the wavenumbers (5 % by chance): the tracks "
@@ -155,5 +155,5 @@ def _doubts(found: TrackSpectra, mean: FilterFit, roll: FilterFit | None) -> lis
     return said
 
 
-def _factor(one: FilterFit) -> float:
-    return math.exp(one.residual)
+def _factor(fitted: FilterFit) -> float:
+    return math.exp(fitted.residual)

@@ -121,11 +121,11 @@ def spectral_matrix(road: IsotropicRoad | TwoTrackRoad, wheels: Sequence[Wheel],
     the transfer functions H_i has the density sum_ij conj(H_i) S_ij H_j.
     """
     out = np.empty((len(wavenumber), len(wheels), len(wheels)), complex)
-    for i, one in enumerate(wheels):
+    for i, first in enumerate(wheels):
         for j, two in enumerate(wheels):
             if isinstance(road, TwoTrackRoad):
-                side = road.cross_spectrum(wavenumber, one.y, two.y)
+                side = road.cross_spectrum(wavenumber, first.y, two.y)
             else:
-                side = road.cross_spectrum(wavenumber, one.y - two.y)
-            out[:, i, j] = side * np.exp(1j * wavenumber * (two.x - one.x))
+                side = road.cross_spectrum(wavenumber, first.y - two.y)
+            out[:, i, j] = side * np.exp(1j * wavenumber * (two.x - first.x))
     return out

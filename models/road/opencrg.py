@@ -173,8 +173,8 @@ def _records(path: str | Path, header: IplData) -> int:
     if cut_block(header.struct, "ROAD_CRG_FILE")[0] is not None:
         raise InputError(path, "$ROAD_CRG_FILE", None, "the data must be in the same file as the header")
     block, _ = cut_block(header.struct, "ROAD_CRG")
-    found = [_KEYWORD.match(line.lower()) for line in block or []]
-    values = {match[1]: match[2] for match in found if match}
+    matches = [_KEYWORD.match(line.lower()) for line in block or []]
+    values = {match[1]: match[2] for match in matches if match}
     start = _value(path, values, "reference_line_start_u", "0")
     end = _value(path, values, "reference_line_end_u")
     increment = _value(path, values, "reference_line_increment")
@@ -215,9 +215,9 @@ def _check_text(path: str | Path, promise: _Promise, data: bytes) -> None:
     per_record = math.ceil(promise.channels / per_line)
     wanted = promise.records * per_record
     if len(lines) != wanted or not ended:
-        found = len(lines) if ended else f"{len(lines)}, the last without a line end"
+        counted = len(lines) if ended else f"{len(lines)}, the last without a line end"
         allowed = f"{promise.records} cross sections need {wanted} lines: the file is cut off or damaged"
-        raise InputError(path, f"lines of data from byte {promise.offset}", found, allowed)
+        raise InputError(path, f"lines of data from byte {promise.offset}", counted, allowed)
     last = promise.channels - (per_record - 1) * per_line
     for i, line in enumerate(lines):
         width = (last if i % per_record == per_record - 1 else per_line) * promise.width

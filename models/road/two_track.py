@@ -148,14 +148,14 @@ def input_covariance(
     """Covariance (w, w) in m^2 of the heights under the wheels, in closed form; arguments and errors as above."""
     behind = excitation(road, wheels, left_right, front_rear).lengths
     out = np.zeros((len(wheels), len(wheels)))
-    for i, one in enumerate(wheels):
+    for i, first in enumerate(wheels):
         for j, two in enumerate(wheels):
-            if left_right == "uncorrelated" and (one.y < 0.0) != (two.y < 0.0):
+            if left_right == "uncorrelated" and (first.y < 0.0) != (two.y < 0.0):
                 continue
-            if front_rear == "uncorrelated" and one.axle != two.axle:
+            if front_rear == "uncorrelated" and first.axle != two.axle:
                 continue
-            y1, y2 = (abs(one.y), abs(two.y)) if left_right == "equal" else (one.y, two.y)
-            out[i, j] = float(road.covariance(np.array(behind[one.axle] - behind[two.axle]), y1, y2))
+            y1, y2 = (abs(first.y), abs(two.y)) if left_right == "equal" else (first.y, two.y)
+            out[i, j] = float(road.covariance(np.array(behind[first.axle] - behind[two.axle]), y1, y2))
     return out
 
 
@@ -170,14 +170,14 @@ def _row(wheel: Wheel, mean: np.ndarray, roll: np.ndarray, left_right: str, whee
     """Factors of the filter's states in the height under one wheel."""
     if left_right == "equal":
         return mean + abs(wheel.y) * roll
-    own = mean + wheel.y * roll
+    height = mean + wheel.y * roll
     if left_right == "modelled":
-        return own
+        return height
     if wheel.y == 0.0 and any(other.y for other in wheels):
         allowed = f"wheel {wheel.name!r} stands at y = 0, neither left nor right"
         raise InputError("", "left_right", left_right, allowed)
-    other = np.zeros(len(own))
-    return np.concatenate([own, other] if wheel.y >= 0.0 else [other, own])
+    other = np.zeros(len(height))
+    return np.concatenate([height, other] if wheel.y >= 0.0 else [other, height])
 
 
 def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
@@ -186,10 +186,10 @@ def _lengths(wheels: Sequence[Wheel]) -> tuple[float, ...]:
     if not axles or axles != list(range(len(axles))):
         raise InputError("", "axles", axles, "must be numbered 0, 1, ... from the front, each with a wheel")
     places = [{wheel.x for wheel in wheels if wheel.axle == axle} for axle in axles]
-    for axle, found in enumerate(places):
-        if len(found) > 1:
-            raise InputError("", f"axle {axle}, x", sorted(found), "the wheels of an axle must stand at one x")
-    behind = tuple(min(places[0]) - min(found) for found in places)
+    for axle, places_of_axle in enumerate(places):
+        if len(places_of_axle) > 1:
+            raise InputError("", f"axle {axle}, x", sorted(places_of_axle), "the wheels of an axle must stand at one x")
+    behind = tuple(min(places[0]) - min(places_of_axle) for places_of_axle in places)
     for axle in range(1, len(behind)):
         if behind[axle] < behind[axle - 1]:
             raise InputError("", f"axle {axle}, x", min(places[axle]), f"must not lie before axle {axle - 1}")

@@ -93,12 +93,12 @@ def _exponentials(m: np.ndarray) -> np.ndarray:
     scipy's own goes matrix by matrix through a threaded library, and takes many times as long where others run.
     """
     squarings = max(0, int(np.ceil(np.log2(2 * np.abs(m).sum(axis=-1).max(initial=0.5)))))
-    small, found = m / 2**squarings, np.broadcast_to(np.eye(3), m.shape)
+    small, exponential = m / 2**squarings, np.broadcast_to(np.eye(3), m.shape)
     for k in range(16, 0, -1):  # (1/2)^17 / 17! is below 1e-19
-        found = np.eye(3) + small @ found / k
+        exponential = np.eye(3) + small @ exponential / k
     for _ in range(squarings):
-        found = found @ found
-    return found
+        exponential = exponential @ exponential
+    return exponential
 
 
 def spread(walks: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ class _Rates(ExtendedKalmanFilter):
 
 
 def filter_rates(
-    found: Spin, period: float, start: np.ndarray, noise: float, deviation: float = 0.0
+    spins: Spin, period: float, start: np.ndarray, noise: float, deviation: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Local rates (n, 3) in rad/s and their stated standard deviations (n, 3).
 
@@ -39,17 +39,17 @@ def filter_rates(
             "the standard deviation of the readings must be above 0 (m/s^2): it weighs integration against measurement"
         )
         raise InputError("", "noise", noise, allowed)
-    frame, planar = found.array.frame, found.array.planar
+    frame, planar = spins.array.frame, spins.array.planar
     pairs = PAIRS[: 3 if planar else 6]
     indices = tuple(np.array(pairs).T)
     filter_ = _Rates(3, len(pairs))
     filter_.x, filter_.P = np.asarray(start) @ frame, deviation**2 * EYE
-    filter_.Q = np.diag((period * noise * found.array.own_gains(planar)) ** 2)
-    squares = found.array.inverse_squares
+    filter_.Q = np.diag((period * noise * spins.array.own_gains(planar)) ** 2)
+    squares = spins.array.inverse_squares
     spreads = [float(np.sqrt(squares[i] if i == j else (squares[i] + squares[j]) / 4)) for i, j in pairs]
     filter_.R = np.diag([(noise * spread) ** 2 for spread in spreads])  # noise of each entry per unit of the readings'
-    values = np.column_stack([0.5 * (found.gradient[:, i, j] + found.gradient[:, j, i]) for i, j in pairs])
-    known, rows = own_acceleration(found, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
+    values = np.column_stack([0.5 * (spins.gradient[:, i, j] + spins.gradient[:, j, i]) for i, j in pairs])
+    known, rows = own_acceleration(spins, np.zeros((1, 3))), [(filter_.x.copy(), filter_.P)]
     for i in range(1, len(values)):
         _predict(filter_, 0.5 * (known[i - 1] + known[i]), period, planar)
         filter_.update(values[i], _jacobian, _entries, args=indices, hx_args=indices)
@@ -69,11 +69,11 @@ def _predict(filter_: _Rates, alpha: np.ndarray, period: float, planar: bool) ->
     filter_.predict(period * change)
 
 
-def _entries(w: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _entries(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Entries of skew(w)^2 = w w^T - |w|^2 I."""
-    return w[one] * w[other] - (one == other) * (w @ w)
+    return w[first] * w[other] - (first == other) * (w @ w)
 
 
-def _jacobian(w: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _jacobian(w: np.ndarray, first: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Their derivatives (entries, 3) by w."""
-    return w[one, None] * EYE[other] + w[other, None] * EYE[one] - 2 * (one == other)[:, None] * w
+    return w[first, None] * EYE[other] + w[other, None] * EYE[first] - 2 * (first == other)[:, None] * w

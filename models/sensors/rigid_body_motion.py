@@ -130,33 +130,33 @@ def spin(array: SensorArray, readings: np.ndarray) -> Spin:
     return Spin(array, relative @ array.weights, relative)
 
 
-def angular_acceleration(found: Spin, rates: np.ndarray) -> np.ndarray:
+def angular_acceleration(spins: Spin, rates: np.ndarray) -> np.ndarray:
     """Local angular acceleration (n, 3) in rad/s^2, eq. (20); rates (n, 3) in rad/s, local.
 
     The rates are read by the formula for a plane alone: alpha_1 = n.M e2 - w2 w3, alpha_2 = -n.M e1 + w1 w3.
     """
-    return own_acceleration(found, rates @ found.array.frame) @ found.array.frame.T
+    return own_acceleration(spins, rates @ spins.array.frame) @ spins.array.frame.T
 
 
-def own_acceleration(found: Spin, w: np.ndarray) -> np.ndarray:
+def own_acceleration(spins: Spin, w: np.ndarray) -> np.ndarray:
     """Angular acceleration (n, 3) in the array's axes; w (n, 3) in them too."""
-    m = found.gradient
+    m = spins.gradient
     about_normal = 0.5 * (m[:, 1, 0] - m[:, 0, 1])
-    if found.array.planar:
-        one, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
+    if spins.array.planar:
+        about_first, two = m[:, 2, 1] - w[:, 1] * w[:, 2], -m[:, 2, 0] + w[:, 0] * w[:, 2]
     else:
-        one, two = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
-    return np.column_stack([one, two, about_normal])
+        about_first, two = 0.5 * (m[:, 2, 1] - m[:, 1, 2]), 0.5 * (m[:, 0, 2] - m[:, 2, 0])
+    return np.column_stack([about_first, two, about_normal])
 
 
-def rates_up_to_sign(found: Spin) -> np.ndarray:
+def rates_up_to_sign(spins: Spin) -> np.ndarray:
     """Local rates (n, 3) in rad/s from the symmetric part alone: no integration, no drift, but no sign.
 
     w w^T = M+ - (tr M+ / 2) I, of which the nearest matrix of rank one is taken. For sensors in a plane the part
     along the normal has a sign of its own, apart from that of the other two.
     """
-    unsigned = _unsigned_in_plane if found.array.planar else _unsigned_in_space
-    return unsigned(found.gradient) @ found.array.frame.T
+    unsigned = _unsigned_in_plane if spins.array.planar else _unsigned_in_space
+    return unsigned(spins.gradient) @ spins.array.frame.T
 
 
 def _unsigned_in_space(m: np.ndarray) -> np.ndarray:
@@ -176,28 +176,28 @@ def _unsigned_in_plane(m: np.ndarray) -> np.ndarray:
     return np.hstack([within, about_normal])
 
 
-def unexplained(found: Spin) -> np.ndarray:
+def unexplained(spins: Spin) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) in m/s^2 that no rigid motion explains, in the array's axes.
 
     Of the rates that space and plane offer, with each sign about the normal, those that leave least at each sample.
     """
-    flat = _unsigned_in_plane(found.gradient)
+    flat = _unsigned_in_plane(spins.gradient)
     offers = [flat, flat * [1.0, 1.0, -1.0]]
-    offers += [] if found.array.flat else [_unsigned_in_space(found.gradient)]
-    left = np.stack([found.relative - _nearest_rigid(found, w) for w in offers])
+    offers += [] if spins.array.flat else [_unsigned_in_space(spins.gradient)]
+    left = np.stack([spins.relative - _nearest_rigid(spins, w) for w in offers])
     least = np.argmin(np.sum(left**2, axis=(2, 3)), axis=0)
     return left[least, np.arange(len(least))]
 
 
-def _nearest_rigid(found: Spin, w: np.ndarray) -> np.ndarray:
+def _nearest_rigid(spins: Spin, w: np.ndarray) -> np.ndarray:
     """Relative accelerations (n, 3, sensors) of the rates w with the angular acceleration that fits best.
 
     By least squares: each pair of entries counts with the squared spreads of the sensors that it comes from.
     """
-    array, square = found.array, skew(w) @ skew(w)
+    array, square = spins.array, skew(w) @ skew(w)
     weights = np.where(np.arange(3) < array.weights.shape[1], array.spreads, 0.0) ** 2
     rest = np.zeros_like(square)
-    rest[:, :, : array.weights.shape[1]] = found.gradient
+    rest[:, :, : array.weights.shape[1]] = spins.gradient
     moment = weights * (rest - square)
     turned = (moment - np.swapaxes(moment, 1, 2)) / (weights[:, None] + weights + np.eye(3))  # no 0 / 0
     return (turned + square) @ ((array.positions - array.positions.mean(axis=0)) @ array.frame).T
@@ -217,10 +217,10 @@ def quality(array: SensorArray, readings: np.ndarray, noise: float = 0.0) -> Qua
 
 
 def _judged(array: SensorArray, readings: np.ndarray, noise: float) -> Quality:
-    found = spin(array, readings)
-    left = unexplained(found)
+    spins = spin(array, readings)
+    left = unexplained(spins)
     count = 3 * len(array.names)
-    size = float(np.sqrt(np.mean(found.relative**2)))
+    size = float(np.sqrt(np.mean(spins.relative**2)))
     misfit = np.sqrt(np.sum(left**2, axis=(1, 2)) / count)
     share = float(np.sqrt(np.mean(misfit**2))) / size if size > 0 else 0.0
     return Quality(misfit, share, noise * float(np.sqrt(array.redundancy / count)), array.redundancy)
@@ -241,22 +241,22 @@ def integrated(values: np.ndarray, period: float, start: np.ndarray) -> np.ndarr
     return start + np.concatenate([np.zeros_like(values[:1]), np.cumsum(integrals(values, period), axis=0)])
 
 
-def integrate_rates(found: Spin, period: float, start: np.ndarray) -> np.ndarray:
+def integrate_rates(spins: Spin, period: float, start: np.ndarray) -> np.ndarray:
     """Local rates (n, 3) in rad/s by integration (20), from (3,) at the first sample; they drift with every error.
 
     In a plane alpha_1 and alpha_2 depend on the rates: c = w1 + i w2 obeys c' = mu + i w3 c with
     mu = n.M e2 - i n.M e1, which w3 solves by quadratures alone.
     """
-    if len(found.gradient) < 4:
-        raise InputError("", "readings", len(found.gradient), "at least four samples are needed to integrate them")
-    first = np.asarray(start) @ found.array.frame
-    if not found.array.planar:
-        return integrated(own_acceleration(found, np.zeros((1, 3))), period, first) @ found.array.frame.T
-    m = found.gradient
+    if len(spins.gradient) < 4:
+        raise InputError("", "readings", len(spins.gradient), "at least four samples are needed to integrate them")
+    first = np.asarray(start) @ spins.array.frame
+    if not spins.array.planar:
+        return integrated(own_acceleration(spins, np.zeros((1, 3))), period, first) @ spins.array.frame.T
+    m = spins.gradient
     w3 = integrated(0.5 * (m[:, 1, 0] - m[:, 0, 1]), period, first[2])
     turn = np.exp(1j * integrated(w3, period, np.array(0.0)))
     c = turn * integrated((m[:, 2, 1] - 1j * m[:, 2, 0]) / turn, period, first[0] + 1j * first[1])
-    return np.column_stack([c.real, c.imag, w3]) @ found.array.frame.T
+    return np.column_stack([c.real, c.imag, w3]) @ spins.array.frame.T
 
 
 def motion(
@@ -276,13 +276,13 @@ def motion(
     Raises InputError for unusable readings, GimbalLock if angles are filtered where they are not defined.
     """
     start, cut_offs = start or Start(), cut_offs or CutOffs()
-    found = spin(array, readings)
-    w = integrate_rates(found, period, np.array(start.rates)) if rates is None else rates
+    spins = spin(array, readings)
+    w = integrate_rates(spins, period, np.array(start.rates)) if rates is None else rates
     w = _filtered(w, period, cut_offs.turning)
     orientation = integrate(w, period, np.array(start.orientation))
     if cut_offs.turning is not None:
         orientation = from_cardan(*high_pass(np.unwrap(cardan(orientation), axis=0), period, cut_offs.turning).T)
-    alpha = angular_acceleration(found, w)
+    alpha = angular_acceleration(spins, w)
     down = np.array([0.0, 0.0, GRAVITY])
     acceleration = reference_acceleration(array, readings - down if zeroed else readings, orientation, alpha, w, down)
     velocity = _filtered(integrated(acceleration, period, np.array(start.velocity)), period, cut_offs.position)

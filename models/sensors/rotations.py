@@ -47,9 +47,9 @@ class GimbalLock(InputError):
 
 def skew(v: np.ndarray) -> np.ndarray:
     """Matrices (..., 3, 3) of the vector product, skew(v) x = v x x, eq. (19); v (..., 3)."""
-    found = np.zeros((*v.shape, 3))
-    found[..., 2, 1], found[..., 0, 2], found[..., 1, 0] = np.moveaxis(v, -1, 0)
-    return found - np.swapaxes(found, -1, -2)
+    matrix = np.zeros((*v.shape, 3))
+    matrix[..., 2, 1], matrix[..., 0, 2], matrix[..., 1, 0] = np.moveaxis(v, -1, 0)
+    return matrix - np.swapaxes(matrix, -1, -2)
 
 
 def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -140,10 +140,10 @@ def integrate(rates: np.ndarray, period: float, start: np.ndarray, rule: Rule = 
 @njit(cache=True)
 def _chain(start, steps):
     """Normalised running products start steps[0] steps[1] ..., shapes (m, 4) and (n, m, 4) -> (n + 1, m, 4)."""
-    found = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
+    attitudes = np.empty((steps.shape[0] + 1, steps.shape[1], 4))
     for j in range(steps.shape[1]):
         a, b, c, d = start[j]
-        found[0, j] = start[j]
+        attitudes[0, j] = start[j]
         for i in range(steps.shape[0]):
             e, f, g, h = steps[i, j]
             a, b, c, d = (
@@ -154,8 +154,8 @@ def _chain(start, steps):
             )
             size = np.sqrt(a * a + b * b + c * c + d * d)
             a, b, c, d = a / size, b / size, c / size, d / size
-            found[i + 1, j, 0], found[i + 1, j, 1], found[i + 1, j, 2], found[i + 1, j, 3] = a, b, c, d
-    return found
+            attitudes[i + 1, j, 0], attitudes[i + 1, j, 1], attitudes[i + 1, j, 2], attitudes[i + 1, j, 3] = a, b, c, d
+    return attitudes
 
 
 def matrix(q: np.ndarray) -> np.ndarray:

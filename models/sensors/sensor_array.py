@@ -55,14 +55,16 @@ class SensorArray:
 
         For independent noise, the same on all axes of all sensors; the plain formula's are infinite in a plane.
         """
-        own = self.own_gains(self.planar if planar is None else planar) ** 2
+        squares = self.own_gains(self.planar if planar is None else planar) ** 2
         shares = np.where(np.abs(self.frame) > PLANE, self.frame**2, 0.0)  # infinity times a rounding error
-        return np.sqrt(np.multiply(shares, own, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
+        return np.sqrt(np.multiply(shares, squares, out=np.zeros((3, 3)), where=shares > 0).sum(axis=1))
 
     def own_gains(self, planar: bool) -> np.ndarray:
         """The same about e1, e2, n."""
-        one, two, three = self.inverse_squares
-        return np.sqrt([two, one, (one + two) / 4] if planar else np.array([two + three, one + three, one + two]) / 4)
+        first, two, three = self.inverse_squares
+        return np.sqrt(
+            [two, first, (first + two) / 4] if planar else np.array([two + three, first + three, first + two]) / 4
+        )
 
     @property
     def inverse_squares(self) -> np.ndarray:

@@ -15,5 +15,5 @@ def run(scene: Any, engine: str = "", **how: Any) -> Result:
 
     Raises InputError, Refused or RunFailed, never returns a partial run.
     """
-    found: Result = import_module(f"{SYSTEMS[scene.system].package}.run").run(scene, engine, **how)
-    return found
+    result: Result = import_module(f"{SYSTEMS[scene.system].package}.run").run(scene, engine, **how)
+    return result

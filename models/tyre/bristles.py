@@ -52,15 +52,15 @@ def shape_factor(cells: int) -> float:
 
 
 @lean
-def tyre_forces(contacts, slides, strips, cells, middle, found):
-    """Fill ``found`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning. No array is made.
+def tyre_forces(contacts, slides, strips, cells, middle, answer):
+    """Fill ``answer`` (w, 4) with fx, fy (N) and mz (N m) on tyres; the last column is of no meaning. No array is made.
 
     contacts (w, 10) : a, b, load, mu, three numbers that are filled in here, and three times 1/k (m^3/N); slides
     (w, 4) : velocity on the road along x and y (m/s), turning about its normal (1/s), speed of the tread (m/s);
     strips, cells, middle : the patch's net as ``Grid`` holds it.
     """
     w = len(contacts)
-    patches, answers = records(start(contacts), w, CONTACT), records(start(found), w, FORCES)
+    patches, answers = records(start(contacts), w, CONTACT), records(start(answer), w, FORCES)
     lines, along = strips_in(strips), cells_in(cells, middle)
     room, slowest = Workspace(stacked(w, SLIP), stacked(1, BLOCK)), SLOW
     for i in range(w):
@@ -101,9 +101,9 @@ def brush(
     load in N; mu; half_length, half_width of the patch in m; stiffness of its bristles in N/m^3.
     """
     slides = np.atleast_2d(np.asarray(slides, float))
-    contacts, found, of = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
+    contacts, forces, of = np.zeros((len(slides), 10)), np.empty((len(slides), 4)), net(cells)
     patches = contacts.view(CONTACT)
     patches["a"], patches["b"], patches["load"], patches["mu"] = half_length, half_width, load, mu
     patches["l1"] = patches["l2"] = patches["l3"] = 1.0 / stiffness
-    tyre_forces(contacts, slides, of.strips, of.cells, of.middle, found)
-    return found[:, :3]
+    tyre_forces(contacts, slides, of.strips, of.cells, of.middle, forces)
+    return forces[:, :3]

@@ -150,7 +150,12 @@ def surface(name: str, scale: float = 1.0, load: float = 1e4, fall: float = 0.0)
         raise InputError(name, "fall", fall, "must be from 0 to below 1")
     loads = load * np.array([0.25, 1.0, 2.0]) if fall > 0.0 else np.array([load])
 
-    def times(own: float) -> float:
-        return scale * (1.0 - fall * (own / load - 1.0))
+    def times(load_there: float) -> float:
+        return scale * (1.0 - fall * (load_there / load - 1.0))
 
-    return by_similarity(lambda k, own: times(own) * along(k), lambda k, own: times(own) * across(k), loads, name=name)
+    return by_similarity(
+        lambda k, load_there: times(load_there) * along(k),
+        lambda k, load_there: times(load_there) * across(k),
+        loads,
+        name=name,
+    )

@@ -41,16 +41,16 @@ class Property:
 
 def tir_table(path: str | Path) -> TyreTable:
     """Table of the tyre in a `.tir` file; raises InputError that names file, line, key, value and what is allowed."""
-    found = _properties(path)
-    _check(path, found)
-    named = (name for name in found if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name))
-    c = defaultdict(float, dict.fromkeys(ONE, 1.0)) | {name: _number(path, found, name) for name in named}
+    properties = _properties(path)
+    _check(path, properties)
+    named = (name for name in properties if name in (*NEEDED, *ONE) or COEFFICIENT.fullmatch(name))
+    c = defaultdict(float, dict.fromkeys(ONE, 1.0)) | {name: _number(path, properties, name) for name in named}
     least, most, nominal = c["FZMIN"], c["FZMAX"], c["FNOMIN"]
     for name in ("FNOMIN", "FZMIN", "FZMAX"):
         if not 0.0 < c[name] <= 1e7:
-            raise _wrong(path, found, name, "must be a load above 0 and at most 1e7 N")
+            raise _wrong(path, properties, name, "must be a load above 0 and at most 1e7 N")
     if not least < most:
-        raise _wrong(path, found, "FZMAX", f"must be above FZMIN, {least:g}")
+        raise _wrong(path, properties, "FZMAX", f"must be above FZMIN, {least:g}")
     loads = np.unique(np.concatenate((np.linspace(least, most, LOADS), np.clip([nominal], least, most))))
     curves = {load: (along(c, load), across(c, load)) for load in loads}
     _check_curves(path, curves)
@@ -88,47 +88,50 @@ def _excess(c: dict[str, float], load: float) -> tuple[float, float]:
 
 def _properties(path: str | Path) -> dict[str, Property]:
     """Keys of all sections, in capitals."""
-    found: dict[str, Property] = {}
+    properties: dict[str, Property] = {}
     for line, row in enumerate(whole_text(path).splitlines(), start=1):
         plain = row.partition("$")[0].partition("!")[0].strip()
         name, equals, value = plain.partition("=")
         if equals:
             key = name.strip().upper()
-            if key in found and key in (*NEEDED, *UNITS):
+            if key in properties and key in (*NEEDED, *UNITS):
                 raise InputError(
-                    path, f"line {line}, {key}", value.strip(), f"stands in line {found[key].line} already"
+                    path, f"line {line}, {key}", value.strip(), f"stands in line {properties[key].line} already"
                 )
-            found[key] = Property(value.strip().strip("'\""), line)
-    return found
+            properties[key] = Property(value.strip().strip("'\""), line)
+    return properties
 
 
-def _check(path: str | Path, found: dict[str, Property]) -> None:
+def _check(path: str | Path, properties: dict[str, Property]) -> None:
     for name, allowed in UNITS.items():
-        if name not in found:
+        if name not in properties:
             raise InputError(path, f"[UNITS] {name}", None, f"is missing: write {name} = '{allowed[0]}'")
-        if found[name].text.lower() not in allowed:
-            raise _wrong(path, found, name, f"must be '{allowed[0]}'")
-    if "FITTYP" in found and _number(path, found, "FITTYP") not in VERSIONS:
+        if properties[name].text.lower() not in allowed:
+            raise _wrong(path, properties, name, f"must be '{allowed[0]}'")
+    if "FITTYP" in properties and _number(path, properties, "FITTYP") not in VERSIONS:
         raise _wrong(
-            path, found, "FITTYP", "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)"
+            path,
+            properties,
+            "FITTYP",
+            "is of other equations; read are those of MF-Tyre 5.x and PAC2002 (5, 6, 50, 51, 52)",
         )
     for name in NEEDED:
-        if name not in found:
+        if name not in properties:
             raise InputError(path, name, None, "is missing; needed are " + ", ".join(NEEDED))
 
 
-def _number(path: str | Path, found: dict[str, Property], name: str) -> float:
+def _number(path: str | Path, properties: dict[str, Property], name: str) -> float:
     try:
-        value = float(found[name].text)
+        value = float(properties[name].text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _wrong(path, found, name, "must be a finite number")
+        raise _wrong(path, properties, name, "must be a finite number")
     return value
 
 
-def _wrong(path: str | Path, found: dict[str, Property], name: str, allowed: str) -> InputError:
-    return InputError(path, f"line {found[name].line}, {name}", found[name].text, allowed)
+def _wrong(path: str | Path, properties: dict[str, Property], name: str, allowed: str) -> InputError:
+    return InputError(path, f"line {properties[name].line}, {name}", properties[name].text, allowed)
 
 
 def _check_curves(path: str | Path, curves: dict[float, tuple[Curve, Curve]]) -> None:

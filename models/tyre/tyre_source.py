@@ -22,8 +22,8 @@ def from_file(path: Path) -> TyreTable:
 
 def named(name: str, rear: bool = False) -> TyreTable:
     """Table of a surface; the one of the rear tyre if there is one of its own and it is wanted."""
-    own = f"{name}/rear"
-    return surface(own if rear and own in PACEJKA else name)
+    rear_name = f"{name}/rear"
+    return surface(rear_name if rear and rear_name in PACEJKA else name)
 
 
 NAMES = tuple(name for name in SURFACES if "/" not in name)

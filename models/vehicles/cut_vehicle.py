@@ -96,10 +96,12 @@ def cut(vehicle: SpatialVehicle, chassis: str) -> CutVehicle:
     whole = replace(guided(vehicle, chassis), gravity=GRAVITY, drags=()).in_frame(chassis)
     held = preloads(whole)
 
-    def element(part: SpringDamper | AntiRollBar, one: str, two: str, *places: Vector) -> Element:
+    def element(part: SpringDamper | AntiRollBar, first_body: str, two: str, *places: Vector) -> Element:
         first, second, axis = map(np.array, places)
         force = held.parts[part.name]
-        return Element(part.name, one, two, first, second, axis, part.stiffness, part.damping, force, str(part.frame))
+        return Element(
+            part.name, first_body, two, first, second, axis, part.stiffness, part.damping, force, str(part.frame)
+        )
 
     def bent(s: SpringDamper) -> Element:
         straight = element(s, s.one, str(s.two), s.point_one, s.point_two, s.axis)

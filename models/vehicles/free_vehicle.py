@@ -84,11 +84,11 @@ def rotor(tyre: str) -> str:
 
 def anchor(vehicle: SpatialVehicle, body: str) -> tuple[int, Vector]:
     """Last coordinate that moves a body, -1 if none does, and where (m) its joint lies in the design position."""
-    own = vehicle.body(body)
+    given_body = vehicle.body(body)
     last = [i for i, (name, _) in enumerate(vehicle.coordinates()) if name == body]
     if last:
-        return last[-1], own.position
-    return (-1, (0.0, 0.0, 0.0)) if own.parent is None else anchor(vehicle, own.parent)
+        return last[-1], given_body.position
+    return (-1, (0.0, 0.0, 0.0)) if given_body.parent is None else anchor(vehicle, given_body.parent)
 
 
 def joints(vehicle: SpatialVehicle) -> np.ndarray:
@@ -109,13 +109,13 @@ def _swaying(bar: AntiRollBar) -> AntiRollBar:
 
 def _walked(bodies: list[Body]) -> tuple[Body, ...]:
     """Every body right before all that ride on it: the order in which engines number them."""
-    found: list[Body] = []
+    walked: list[Body] = []
 
     def walk(parent: str | None) -> None:
         for body in bodies:
             if body.parent == parent:
-                found.append(body)
+                walked.append(body)
                 walk(body.name)
 
     walk(None)
-    return tuple(found)
+    return tuple(walked)

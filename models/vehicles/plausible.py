@@ -55,8 +55,8 @@ class Whole:
     def wheels(self) -> dict[str, tuple[Tyre, ...]]:
         """Bodies that carry tyres, and these; not the one that is carried."""
         names = dict.fromkeys(tyre.body for tyre in self.vehicle.tyres)
-        own = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
-        return own if len(own) < len(self.vehicle.bodies) else {}
+        tyres_of = {name: tuple(t for t in self.vehicle.tyres if t.body == name) for name in names}
+        return tyres_of if len(tyres_of) < len(self.vehicle.bodies) else {}
 
     @cached_property
     def carried(self) -> Body:
@@ -71,8 +71,8 @@ class Whole:
     @cached_property
     def held(self) -> dict[str, float]:
         """Static force of every tyre and part, N: InputError where nothing carries a weight."""
-        own = preloads(replace(self.vehicle, gravity=GRAVITY))
-        return own.parts | own.tyres
+        preloaded = preloads(replace(self.vehicle, gravity=GRAVITY))
+        return preloaded.parts | preloaded.tyres
 
     @cached_property
     def wheelbase(self) -> float:
@@ -96,8 +96,8 @@ class Whole:
 def plausible(vehicle: SpatialVehicle, accept: Sequence[str] = ()) -> tuple[Finding, ...]:
     """All queries about a vehicle, in SI, but for those of checks that the user accepts; empty for a usual one."""
     whole = Whole(vehicle)
-    found = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
-    return tuple(query for query in found if query.check not in accept)
+    queries = (query for look in (_masses, _sizes, _inertias, _struts, _statics) for query in look(whole))
+    return tuple(query for query in queries if query.check not in accept)
 
 
 def _query(check: str, place: str, said: str, size: float, unit: str) -> Finding:
@@ -155,16 +155,16 @@ def _inertias(whole: Whole) -> Iterator[Finding]:
     body, spans = whole.carried, {"rx": whole.track, "ry": whole.wheelbase, "rz": whole.wheelbase}
     about = dict(zip(GYRATION, np.diag(body.inertia).tolist(), strict=True))
     for freedom, usual in GYRATION.items():
-        span, own = spans[freedom], about[freedom]
-        radius = (own / body.mass) ** 0.5
-        if span and freedom in body.freedoms and own and _beyond(radius / span, usual):
+        span, inertia = spans[freedom], about[freedom]
+        radius = (inertia / body.mass) ** 0.5
+        if span and freedom in body.freedoms and inertia and _beyond(radius / span, usual):
             yield _query(
                 "inertia",
                 f"bodies[{body.name}].inertia",
-                f"{own:.4g} kg m^2 about {freedom[1]} is a radius "
+                f"{inertia:.4g} kg m^2 about {freedom[1]} is a radius "
                 f"of gyration of {radius:.3g} m, {radius / span:.2g} of the "
                 f"{'track' if freedom == 'rx' else 'wheelbase'}; usual are {usual[0]:g} to {usual[1]:g}",
-                own,
+                inertia,
                 "kg m^2",
             )
     for each in whole.vehicle.bodies:
@@ -253,14 +253,14 @@ def _loads(whole: Whole) -> Iterator[Finding]:
                 sum(loads),
                 "N",
             )
-        for what, unit, own in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
-            if min(own) >= 0 and max(own) > UNEVEN * min(own):
+        for what, unit, values in (("load", "N", loads), ("stiffness", "N/m", [tyre.stiffness for tyre in tyres])):
+            if min(values) >= 0 and max(values) > UNEVEN * min(values):
                 yield _query(
                     what,
                     f"tyres[{names}]",
-                    f"the {what}s {min(own):.4g} and {max(own):.4g} {unit} of one "
+                    f"the {what}s {min(values):.4g} and {max(values):.4g} {unit} of one "
                     f"axle differ by more than {UNEVEN:g} times",
-                    max(own) / max(min(own), 1e-300),
+                    max(values) / max(min(values), 1e-300),
                     "1",
                 )
 

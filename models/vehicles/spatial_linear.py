@@ -88,16 +88,16 @@ class Kinematics:
         """(3, n): change of an axis that is fixed in a body, by the coordinates; zeros for the space, None."""
         return np.zeros((3, self.size)) if frame is None else np.cross(self.turn(frame), axis, axisa=0).T
 
-    def travel_bend(self, one: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
+    def travel_bend(self, first: End, two: End, axis: Vector, frame: str | None) -> np.ndarray:
         """(n, n): second derivatives of axis . (point two - point one), the axis fixed in a body or in the space."""
-        ends, second = self.shift(*two) - self.shift(*one), self.bend(*two) - self.bend(*one)
+        ends, second = self.shift(*two) - self.shift(*first), self.bend(*two) - self.bend(*first)
         total = np.tensordot(axis, second, 1)
         if frame is None:
             return total
         mixed, (x, y, z) = self.turned_axis(frame, axis).T @ ends, self._bodies[frame].position
         beyond = x + axis[0], y + axis[1], z + axis[2]
         bent = self.bend(frame, beyond) - self.bend(frame, (x, y, z))
-        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], one[1]), bent, 1))
+        return np.asarray(total + mixed + mixed.T + np.tensordot(np.subtract(two[1], first[1]), bent, 1))
 
     def _motions(self, body: str | None) -> list[tuple[Body, str, int]]:
         """Coordinates that move a body, from the ground outwards: (the body that has it, freedom, index)."""

@@ -36,9 +36,9 @@ def _bodies(vehicle: SpatialVehicle, file: str) -> None:
 def _connected(vehicle: SpatialVehicle, file: str) -> None:
     """Every body reaches the ground through springs, tyres and bars, and none that moves hangs on its joint alone."""
     beside = defaultdict[str, set[str]](set)
-    for one, two in _links(vehicle):
-        beside[one].add(two)
-        beside[two].add(one)
+    for first, two in _links(vehicle):
+        beside[first].add(two)
+        beside[two].add(first)
     touched = set(beside)
     for body in vehicle.bodies:
         if body.parent is not None:
@@ -66,8 +66,8 @@ def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
 def _inert(vehicle: SpatialVehicle, file: str) -> None:
     """Every freedom moves some inertia: the mass matrix, scaled to a unit diagonal, is positive definite."""
     matrix, coordinates = mass(vehicle), vehicle.coordinates()
-    for (name, freedom), own in zip(coordinates, matrix.diagonal(), strict=True):
-        if own <= 0:
+    for (name, freedom), inertia in zip(coordinates, matrix.diagonal(), strict=True):
+        if inertia <= 0:
             said = f"nothing inert moves with the freedom {freedom}: give an inertia or leave the freedom out"
             raise InputError(file, f"bodies[{name}].inertia", None, said)
     scale = 1 / np.sqrt(matrix.diagonal())

@@ -155,7 +155,7 @@ def _by_fewer(path: Path, steps: int, others: list[Path], step: float) -> dict[s
     for name in [name for name in fine if name in coarse]:
         order = CAREFUL
         if len(others) > 1 and name != DISTANCE:
-            gaps = [_rms(one[name] - two[name]) for one, two in itertools.pairwise(seen)]
+            gaps = [_rms(first[name] - two[name]) for first, two in itertools.pairwise(seen)]
             order = observed(gaps[0], gaps[1], counts)
         least = 0.0
         if name == DISTANCE:

@@ -121,7 +121,7 @@ def describe(scene: BrakingScene) -> str:
     lines.append(_line("step", f"{length}; order two, wheels exact within it"))
     if file is not None:
         lines += [_line(*line) for line in _shares(scene)]
-    assumed = {one.says: one for name in scene.procedures for one in _assumed(scene, name)}
+    assumed = {assumption.says: assumption for name in scene.procedures for assumption in _assumed(scene, name)}
     return "\n".join([scene.title, *lines, *assumption_lines(assumed.values()), *effect_lines(scene)])
 
 

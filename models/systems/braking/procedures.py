@@ -108,7 +108,7 @@ def answers(
             usual.sample(Sample(k, round(time * 1e9), rims[k], True, supply, float(known[k])))
             for k, time in enumerate(times)
         ]
-    return np.array([one.valves if one.pressures is None else one.pressures for one in commands])
+    return np.array([command.valves if command.pressures is None else command.pressures for command in commands])
 
 
 def port_of(scene: BrakingScene, name: str, vehicle: Braked, engine: str) -> Run:

@@ -94,8 +94,8 @@ def chances(scatters: Mapping[str, Scatter]) -> dict[str, Estimate]:
     """Standard errors of the means, as shares of these or of a course that is told apart."""
     units = {key: label.partition("[")[2][:-1] for key, label in KEPT.items()}
     return {
-        key: by_chance(one.error, max(abs(one.mean), COURSE.get(key, 0.0)), units[key], one.count)
-        for key, one in scatters.items()
+        key: by_chance(scatter.error, max(abs(scatter.mean), COURSE.get(key, 0.0)), units[key], scatter.count)
+        for key, scatter in scatters.items()
         if key in units
     }
 

@@ -78,8 +78,8 @@ def _by_radii(scene: ContactScene, body: Contact) -> Callable[[Result], Watched]
             x0, x1, y0, y1 = part.box
             shares[f"patch {k} along"] = np.array([0.5 * (x1 - x0) * along])
             shares[f"patch {k} across"] = np.array([0.5 * (y1 - y0) * across])
-    found = {where: np.atleast_1d(share) for where, share in shares.items()}
-    return lambda run: found
+    arrays = {where: np.atleast_1d(share) for where, share in shares.items()}
+    return lambda run: arrays
 
 
 def _elastic(watched: Callable[[Result], Watched]) -> Assumption:

@@ -53,7 +53,7 @@ class Radii(Strict):
         for name, radius in self:
             if radius == 0:
                 raise InputError(file, f"radii.{name}", radius, "must not be 0 (radius in m, negative if concave)")
-        found = []
+        both = []
         for axis in ("x", "y"):
             value = sum(1.0 / radius for name, radius in self if radius is not None and name.endswith(axis)) / 2
             if value <= 0:
@@ -64,8 +64,8 @@ class Radii(Strict):
                     f"are flat or conform along {axis}: "
                     f"half the sum of their curvatures is {value:.4g} 1/m and must be above 0",
                 )
-            found.append(value)
-        return found[0], found[1]
+            both.append(value)
+        return both[0], both[1]
 
 
 class Profiles(Strict):

@@ -98,7 +98,7 @@ def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
     """
     contact = case.contact(ExactOnEllipse)
     scale = case.limit * np.array([1.0, 1.0, np.sqrt(case.a * case.b)])
-    found, error = np.full(3, np.nan), np.inf
+    best, error = np.full(3, np.nan), np.inf
     for fine in finest:
         try:
             rolled = [contact.roll(case.motion, cells) for cells in (fine // 4, fine // 2, fine)]
@@ -106,10 +106,10 @@ def exact(case: Case, finest: tuple[int, ...] = FINEST) -> Case:
             if fine == finest[0]:
                 raise
             break
-        found, error = without_grid([np.array([one.fx, one.fy, one.mz]) / scale for one in rolled])
+        best, error = without_grid([np.array([rolling.fx, rolling.fy, rolling.mz]) / scale for rolling in rolled])
         if error < ENOUGH:
             break
-    return replace(case, fx=float(found[0]), fy=float(found[1]), mz=float(found[2]), error=error)
+    return replace(case, fx=float(best[0]), fy=float(best[1]), mz=float(best[2]), error=error)
 
 
 def without_grid(grids: list[Array]) -> tuple[Array, float]:
@@ -120,8 +120,8 @@ def without_grid(grids: list[Array]) -> tuple[Array, float]:
     """
     coarse, middle, fine = grids
     told = [(fine + (fine - middle) / part, middle + (middle - coarse) / part) for part in (1.0, 3.0)]
-    found, before = min(told, key=lambda two: float(np.hypot(*(two[0] - two[1])[:2])))
-    return found, float(np.hypot(*(found - before)[:2]))
+    finest, before = min(told, key=lambda two: float(np.hypot(*(two[0] - two[1])[:2])))
+    return finest, float(np.hypot(*(finest - before)[:2]))
 
 
 @dataclass(frozen=True)

@@ -205,8 +205,8 @@ class Again:
             base, coarse = self.twice, self._with_net(other, 2.0)
         except RunFailed:
             base, coarse = principal(self.drive), self._with_net(other, 1.0)
-        own, fewer, more = (self._creep(count) for count in (cells, other, finer))
-        apart, error = np.linalg.norm(own - fewer), np.linalg.norm(own - more) / (1.0 - 0.5**NET_ORDER)
+        creepages, fewer, more = (self._creep(count) for count in (cells, other, finer))
+        apart, error = np.linalg.norm(creepages - fewer), np.linalg.norm(creepages - more) / (1.0 - 0.5**NET_ORDER)
         share, told = error / apart if apart > 0.0 else 0.0, dict[str, Estimate]()
         for name in names:
             values = base.channels[name]
@@ -239,8 +239,13 @@ def _later(handling: Handling, since: float) -> Handling:
     def moved(control: Control) -> Control:
         return tuple((time - since, value) for time, value in control)
 
-    own = handling.controls
-    controls = replace(own, steer=moved(own.steer), brake=moved(own.brake), drive=moved(own.drive))
+    controls_then = handling.controls
+    controls = replace(
+        controls_then,
+        steer=moved(controls_then.steer),
+        brake=moved(controls_then.brake),
+        drive=moved(controls_then.drive),
+    )
     return handling.changed(
         controls=controls, pushes=tuple(replace(push, size=moved(push.size)) for push in handling.pushes)
     )

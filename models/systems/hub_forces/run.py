@@ -149,16 +149,18 @@ def errors_of_steps(
     step, steps = float(run.times[1]), len(run.times) - 1
 
     def again(factor: float, share: float) -> Series:
-        own, count = factor * step, max(1, int(share * steps / factor + 1e-9))
-        if factor > 2.0 or (factor > 1.0 and period and not divides(own, period)):
-            raise InputError("", "run.step", own, "is not taken: longer steps must divide the period of the samples")
+        tried_step, count = factor * step, max(1, int(share * steps / factor + 1e-9))
+        if factor > 2.0 or (factor > 1.0 and period and not divides(tried_step, period)):
+            raise InputError(
+                "", "run.step", tried_step, "is not taken: longer steps must divide the period of the samples"
+            )
         row = 0 if factor > 1.0 else round(MIDDLE * steps)  # a road begins gently
         first = round(row / factor)
-        inputs = drive(own, first + count)
+        inputs = drive(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
         part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
-        path = build(engine, vehicle, part, own, count * own, forces).run(run.states[row])
-        return principal(vehicle, path, first * own)
+        path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(run.states[row])
+        return principal(vehicle, path, first * tried_step)
 
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
     units |= {element.name: element.unit for element in vehicle.elements}
@@ -206,16 +208,16 @@ def run(
     begun = time.process_time()
     path = model.run(measurement.start(drive))
     seconds = time.process_time() - begun
-    found = labelled(measurement, path, engine, method, seconds)
+    result = labelled(measurement, path, engine, method, seconds)
     if not error:
-        return found
+        return result
     vehicle, period = measurement.vehicle, measurement.forces.period
     told, how = errors_of_steps(engine, vehicle, path, partial(measurement.drive, method), period, kind)
     if (
         before := measurement.errors
     ):  # in roll and pitch moments that are measured wrong add up: nobody can tell by how much
         told = {name: summed(told[name], before[name]) for name in told if name in before and name not in ANGLES}
-    return stated(found, told, how)
+    return stated(result, told, how)
 
 
 def labelled(

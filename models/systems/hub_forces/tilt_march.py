@@ -59,15 +59,15 @@ def _learn(p, gain, j, variance, kept):
     leaves in another state, gain^2 variance, is left there even where rounding is larger than that.
     """
     for m in range(4):
-        own = p[j, m]
+        before = p[j, m]
         for k in range(4):
-            p[k, m] -= gain[k] * own
-        p[j, m] = kept * own
+            p[k, m] -= gain[k] * before
+        p[j, m] = kept * before
     for k in range(4):
-        own = p[k, j]
+        before = p[k, j]
         for m in range(4):
-            p[k, m] -= gain[m] * own
-        p[k, j] = kept * own
+            p[k, m] -= gain[m] * before
+        p[k, j] = kept * before
         for m in range(4):
             p[k, m] += gain[k] * variance * gain[m]
     for k in range(4):

@@ -121,9 +121,9 @@ def record(
 def _referred(scene: MeasuredScene, signals: Sequence[Signal], columns: Columns) -> None:
     """Moments about points above or below hubs, brought to the hubs: (Mx - r Fy, My + r Fx) of a point r above."""
     for hub, lever in scene.levers.items():
-        own = {(s.quantity, s.component): s.name for s in signals if s.at == hub and not s.check}
+        of_component = {(s.quantity, s.component): s.name for s in signals if s.at == hub and not s.check}
         for axis, across, sign in (("x", "y", -1.0), ("y", "x", 1.0)):
-            moment, force = own.get(("moment", axis)), own.get(("force", across))
+            moment, force = of_component.get(("moment", axis)), of_component.get(("force", across))
             if moment is not None and force is not None:
                 values = columns.read(moment) + sign * lever * columns.read(force)
                 columns.put((moment,), 0, values[:, None])
@@ -165,47 +165,48 @@ def _groups(source: Source, signals: Sequence[Signal], shift: float, drift: floa
     for first, *others in mapped.values():
         times = np.concatenate([block.times for block in source.blocks([first.channel])])
         where = source.path.name if len(set(of.values())) == 1 else f"{source.path.name}, {first.channel} ..."
-        own = timing(times, where, (first.name,))
-        slowed = replace(own, times=own.times / (1 + drift) + shift, period=own.period / (1 + drift))
+        clock = timing(times, where, (first.name,))
+        slowed = replace(clock, times=clock.times / (1 + drift) + shift, period=clock.period / (1 + drift))
         yield Group(source, (first, *others), slowed)
 
 
 def _of_group(group: Group) -> Iterator[Finding]:
     """What was found in the times of a group, and whether they seem to be of another unit."""
     yield from group.timing.findings
-    own, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
+    clock, where = group.timing, f"{group.source.path.name}, {group.names[0]}{' ...' if len(group.names) > 1 else ''}"
     slowest = min(SLOW.get(s.quantity, np.inf) for s in group.signals)
-    slow = own.period > slowest
-    if not slow and own.rate < FAST:
+    slow = clock.period > slowest
+    if not slow and clock.rate < FAST:
         return
     true, written = ("milliseconds", "seconds") if slow else ("seconds", "milliseconds")
     text = (
-        f"{where}: the samples lie {own.period:.4g} s apart ({own.rate:.4g} Hz) and last for "
-        f"{own.end - own.times[0]:.4g} s, which is too {'slow' if slow else 'fast'} for {group.signals[0].quantity}: "
+        f"{where}: the samples lie {clock.period:.4g} s apart ({clock.rate:.4g} Hz) and last for "
+        f"{clock.end - clock.times[0]:.4g} s, which is too {'slow' if slow else 'fast'} for "
+        f"{group.signals[0].quantity}: "
         f"if its times are in {true}, not in {written}, correct the unit that heads them."
     )
-    weight: Weight = "error" if own.period > 10 * slowest else "doubt"
-    yield Finding("times", weight, where, text, own.period, "s", (group.signals[0].name,))
+    weight: Weight = "error" if clock.period > 10 * slowest else "doubt"
+    yield Finding("times", weight, where, text, clock.period, "s", (group.signals[0].name,))
 
 
 def _grid(scene: MeasuredScene, leading: list[Group]) -> Grid:
     """Times of the recording; InputError for a clock that the wheel forces do not bear out."""
-    own, file, timings = scene.clock, scene.file, [group.timing for group in leading]
+    settings, file, timings = scene.clock, scene.file, [group.timing for group in leading]
     fastest = min(timings, key=lambda timing: timing.period)
-    period = 1.0 / own.rate if own.rate else fastest.period
+    period = 1.0 / settings.rate if settings.rate else fastest.period
     if period < fastest.period * (1 - SAME):
         slower = f"is faster than the wheel forces, {fastest.rate:g} Hz, which adds nothing"
-        raise InputError(file, "clock.rate", own.rate, slower)
+        raise InputError(file, "clock.rate", settings.rate, slower)
     first, last = max(timing.times[0] for timing in timings), min(timing.end for timing in timings)
     if first >= last:
         spans = "; ".join(f"{g.source.path.name}: {g.timing.times[0]:.6g} to {g.timing.end:.6g} s" for g in leading)
         raise InputError(file, "files", None, f"the wheel forces do not overlap in time ({spans}): set offset")
     times = fastest.times
-    start = float(times[min(np.searchsorted(times, first + own.start - EVEN * period), len(times) - 1)])
-    end = last if own.duration is None else min(last, start + own.duration)
+    start = float(times[min(np.searchsorted(times, first + settings.start - EVEN * period), len(times) - 1)])
+    end = last if settings.duration is None else min(last, start + settings.duration)
     count = int(np.floor((end - start) / period + EVEN)) + 1
-    if own.duration is not None and start + own.duration > last + period:
-        raise InputError(file, "clock.duration", own.duration, f"the wheel forces last {last - start:.6g} s")
+    if settings.duration is not None and start + settings.duration > last + period:
+        raise InputError(file, "clock.duration", settings.duration, f"the wheel forces last {last - start:.6g} s")
     if count < LEAST:
         few = f"{count} sample(s) of wheel forces are left: at least {LEAST} are needed"
         raise InputError(file, "clock", None, few)
@@ -234,8 +235,8 @@ def _columns(
 ) -> Columns:
     """Columns of this recording, or those begun from the same files; InputError where the folder holds others."""
     files = {source.path.name: [(at := source.path.stat()).st_size, at.st_mtime_ns] for source in sources}
-    own = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
-    now = {"files": files, "map": own, "clock": [grid.start, grid.period], "levers": scene.levers}
+    channels = [[s.channel, s.sign, s.factor, s.zero] for s in signals]
+    now = {"files": files, "map": channels, "clock": [grid.start, grid.period], "levers": scene.levers}
     path = folder / SOURCES
     if path.is_file() and json.loads(path.read_text()) != now:
         raise InputError(path, "", None, "was written from other files or by another map: choose a new folder")
@@ -245,11 +246,13 @@ def _columns(
 
 def _even(group: Group, grid: Grid) -> bool:
     """Whether the samples of a group are those of the clock."""
-    own = group.timing
-    at = grid.places(own.times)
+    clock = group.timing
+    at = grid.places(clock.times)
     inside = (at >= 0) & (at < grid.count)
-    off = np.abs(own.times[inside] - grid.start - grid.period * at[inside])
-    return own.order is None and abs(own.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
+    off = np.abs(clock.times[inside] - grid.start - grid.period * at[inside])
+    return (
+        clock.order is None and abs(clock.period / grid.period - 1) <= EVEN and bool((off <= EVEN * grid.period).all())
+    )
 
 
 def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
@@ -283,15 +286,15 @@ def _direct(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Fi
 def _resampled(group: Group, grid: Grid, columns: Columns, folder: Path) -> list[Finding]:
     """Samples of another clock, first as they are, then one signal after another onto this one; what of them is
     absurd."""
-    own, absurd = group.timing, list[Finding]()
+    clock, absurd = group.timing, list[Finding]()
     count = next(channel.count for channel in group.source.channels if channel.name == group.names[0])
     raw = Columns(folder / RAW, group.names, count)
     for block in group.source.blocks(group.names):
         raw.put(group.names, block.first, group.si(block.values))
     for signal in group.signals:
-        values = raw.read(signal.channel)[slice(None) if own.order is None else own.order]
-        values, finding = without_absurd(signal, values, own.times - grid.start)
+        values = raw.read(signal.channel)[slice(None) if clock.order is None else clock.order]
+        values, finding = without_absurd(signal, values, clock.times - grid.start)
         absurd += [finding] if finding else []
-        columns.put((signal.name,), 0, onto(own.times, values, own.period, grid.times)[:, None])
+        columns.put((signal.name,), 0, onto(clock.times, values, clock.period, grid.times)[:, None])
     raw.remove()
     return absurd

@@ -97,24 +97,24 @@ def consequences(
     return tuple(consequence(number, finding) for number, finding in enumerate(_different(findings)))
 
 
-def judged(verdict: Verdict, found: Sequence[Consequence]) -> Verdict:
+def judged(verdict: Verdict, consequences: Sequence[Consequence]) -> Verdict:
     """The verdict on a run that is accepted but for what its findings do."""
-    worst = max((one.grade for one in found), default=0)
+    worst = max((consequence.grade for consequence in consequences), default=0)
     if verdict.word != "accepted" or worst == 0:
         return verdict
-    reason = "; ".join(told(one for one in found if one.grade == worst))
+    reason = "; ".join(told(consequence for consequence in consequences if consequence.grade == worst))
     bounds = f"accepted up to {FORCE[0]:.0%} and {DAMAGE[0]:.0%}, rejected beyond {FORCE[1]:.0%} and {DAMAGE[1]:.0%}"
     return Verdict("rejected" if worst > 1 else "accepted with doubt", f"{reason} ({bounds})")
 
 
-def told(found: Iterable[Consequence]) -> list[str]:
+def told(consequences: Iterable[Consequence]) -> list[str]:
     """A text each; where more than FEW are of one check only the worst, which says of how many."""
     kinds: dict[str, list[Consequence]] = {}
-    for consequence in found:
+    for consequence in consequences:
         kinds.setdefault(consequence.finding.check, []).append(consequence)
     out = list[str]()
     for alike in kinds.values():
-        worst = max(alike, key=lambda one: (one.grade, np.nan_to_num(abs(one.force))))
+        worst = max(alike, key=lambda each: (each.grade, np.nan_to_num(abs(each.force))))
         out += [f"{worst}, the worst of {len(alike)}"] if len(alike) > FEW else map(str, alike)
     return out
 
@@ -147,14 +147,14 @@ def _worst(finding: Finding, recorded: Outcome, right: Outcome, answers: Sequenc
     """The section force that differs most, of those that carry anything."""
     first = min(round(SETTLING / right.period), right.done // 4)
     pairs = {a: (recorded.samples(a)[first:], right.samples(a)[first:]) for a in answers}
-    size = {a: rms(own - own.mean()) for a, (_, own) in pairs.items()}
+    size = {a: rms(measured - measured.mean()) for a, (_, measured) in pairs.items()}
     most = {unit: max(size[a] for a in pairs if a.unit == unit) for unit in {a.unit for a in pairs}}
     every = [
-        Consequence(finding, a.name, rms(one - own) / size[a], damage_ratio(one, own, SLOPE))
-        for a, (one, own) in pairs.items()
+        Consequence(finding, a.name, rms(computed - measured) / size[a], damage_ratio(computed, measured, SLOPE))
+        for a, (computed, measured) in pairs.items()
         if size[a] > SMALL * most[a.unit]
     ]
-    return max(every, key=lambda one: (one.grade, abs(one.force)), default=Consequence(finding))
+    return max(every, key=lambda computed: (computed.grade, abs(computed.force)), default=Consequence(finding))
 
 
 def _late(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:

@@ -38,9 +38,11 @@ def errors_of_steps(
     fine = march(replace(part, step=0.5 * grid.step), folder / "half")
     every, told = round(coarse.period / fine.period), dict[str, Estimate]()
     for name, element in _principal(job, outcome, bool(before)).items():
-        one = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), ORDER, grid.step)
-        own = replace(one, error=one.error * 2.0**one.order, unit="rad" if not element else _unit(job, element))
-        told[name] = rescaled(own, size_of(outcome.samples(name)), grid.step)
+        error = estimate(fine.samples(name)[::every][: coarse.done], coarse.samples(name), ORDER, grid.step)
+        scaled = replace(
+            error, error=error.error * 2.0**error.order, unit="rad" if not element else _unit(job, element)
+        )
+        told[name] = rescaled(scaled, size_of(outcome.samples(name)), grid.step)
         if element in before:
             told[name] = summed(told[name], before[element])
     shutil.rmtree(folder, ignore_errors=True)

@@ -76,11 +76,11 @@ def labelled(
                 name = answer.name.replace("/", "|")  # which would be a group of the file
                 channels[name] = Channel("time", outcome.samples(answer), answer.unit, answer.comment)
     if outcome is not None and counted:
-        unit, damage = "that of the section force", [list(own.damage.values()) for own in counted.values()]
+        unit, damage = "that of the section force", [list(counts.damage.values()) for counts in counted.values()]
         slopes = list(next(iter(counted.values())).damage)
         axes["section_force"] = Channel("section_force", [answer.name for answer in counted])
         axes["slope"] = Channel("slope", slopes, "1", "Woehler exponent")
-        figures = {name: [getattr(own, name) for own in counted.values()] for name in FIGURES}
+        figures = {name: [getattr(counts, name) for counts in counted.values()] for name in FIGURES}
         figures["rms"] = [rms(outcome.samples(answer)) for answer in counted]
         channels |= {name: Channel("section_force", values, "", unit) for name, values in figures.items()}
         channels["unit"] = Channel("section_force", [answer.unit for answer in counted])

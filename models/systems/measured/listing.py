@@ -186,21 +186,21 @@ def scene_text(source: Source) -> str:
     return "\n".join([SCENE.format(title=source.path.stem, file=source.path.name), *rows, "]", ""])
 
 
-def _row(name: str, own: Guess | None) -> str:
+def _row(name: str, guess: Guess | None) -> str:
     """An entry of the map, as a comment where anything is missing."""
-    if own is None:
+    if guess is None:
         return f"  # {{ channel = {_quoted(name)} }},  # not known"
-    free = own.quantity in ("travel", "strain") or bool(own.left_out and not own.at)
+    free = guess.quantity in ("travel", "strain") or bool(guess.left_out and not guess.at)
     entries = {
         "channel": name,
-        "quantity": own.quantity,
-        "at": own.at or "?",
-        "component": own.component or ("" if free else "?"),
-        "unit": own.unit,
+        "quantity": guess.quantity,
+        "at": guess.at or "?",
+        "component": guess.component or ("" if free else "?"),
+        "unit": guess.unit,
     }
     text = ", ".join(f"{key} = {_quoted(value)}" for key, value in entries.items() if value)
-    told = " ".join(word for word in (own.doubt, own.left_out) if word)
-    unsure = own.left_out or "?" in entries.values()
+    told = " ".join(word for word in (guess.doubt, guess.left_out) if word)
+    unsure = guess.left_out or "?" in entries.values()
     return f"  {'# ' if unsure else ''}{{ {text} }},{f'  # {told}' if told else ''}"
 
 

@@ -81,12 +81,12 @@ def run(job: PlaneJob, folder: Path, limits: Limits | None = None, error: bool =
     limited = trusted(scene, job.hold.force)
     if limited and job.recording.find("angle", CHASSIS, "pitch"):
         limited = replace(limited, unchecked="")  # the run is compared with it
-    own = score.own_figures(result, scene.vehicle_parameters())
+    figures = score.own_figures(result, scene.vehicle_parameters())
     until = limited.until[1] if limited and limited.until else result.times[-1]
     effects = [job.effect] if job.effect else []
     # whether the filter's innovations are as large as stated is not asked: deviations of a recording are estimates
     verdict = score.blind_verdict(
-        own, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
+        figures, effects, result.times[-1], limits or Limits(), until, uncertainty=score.uncertainty(result)
     )
     if job.effect is None and verdict.word == "accepted":
         verdict = _beside_pitch(job, result, limits or Limits(), verdict)
@@ -138,8 +138,8 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
         "run": {"duration": job.recording.duration, "step": step},
     }
     scene = build(table, job.file, folder)
-    own = axles(job.recording, scene.vehicle_parameters())
-    errors = [each.text for each in axle_forces.check(own) if each.weight == "error"] if own else []
+    recorded = axles(job.recording, scene.vehicle_parameters())
+    errors = [each.text for each in axle_forces.check(recorded) if each.weight == "error"] if recorded else []
     if errors:  # doubts are told by the checks of the recording
         raise InputError(job.file, "vehicle.parameters", job.parameters, " ".join(errors))
     return scene, tuple(said)
@@ -149,11 +149,11 @@ def trusted(scene: Scene, deviation: float) -> Trust | None:
     """What limits the run of a scene whose forces have noise of this standard deviation (N) already; None where it is
     held to a measured pitch."""
     assembly = assemble(scene)
-    found = drift_trust.trust(assembly)
-    if found is None or deviation <= 0:
-        return found
-    noise = drift_trust.noise(assembly, deviation).passes(found.angle)
-    return replace(found, times={**found.times, f"noise of {deviation:g} N": noise})
+    bounds = drift_trust.trust(assembly)
+    if bounds is None or deviation <= 0:
+        return bounds
+    noise = drift_trust.noise(assembly, deviation).passes(bounds.angle)
+    return replace(bounds, times={**bounds.times, f"noise of {deviation:g} N": noise})
 
 
 def _axle(job: PlaneJob, axle: str, said: list[Finding]) -> np.ndarray:

@@ -57,8 +57,8 @@ def _check_names(scene: MeasuredScene, rig: Rig) -> None:
     bodies = rig.places.bodies
     named = [
         *(
-            (f"sensors.{name}.body", own.body, "the vehicle has no such body", bodies)
-            for name, own in scene.sensors.items()
+            (f"sensors.{name}.body", sensor.body, "the vehicle has no such body", bodies)
+            for name, sensor in scene.sensors.items()
         ),
         *(("levers", name, "the vehicle has no such hub", rig.hubs) for name in scene.levers),
         *(
@@ -86,7 +86,7 @@ def describe(scene: MeasuredScene) -> str:
     _check_names(scene, rig)
     size = f"{rig.vehicle.size} freedoms, cut at {', '.join(rig.hubs)}" if rig.vehicle else "the pitch plane"
     lines = [scene.title, _line("scene", f"{scene.file}, study {scene.study}"), _line("vehicle", f"{rig.name}: {size}")]
-    virtual, own, wanted = scene.virtual, scene.stabilise, scene.hand_on
+    virtual, stabilised, wanted = scene.virtual, scene.stabilise, scene.hand_on
     if virtual is None:
         lines += _files(scene, rig)
     else:
@@ -94,13 +94,13 @@ def describe(scene: MeasuredScene) -> str:
         told = f"virtually: {road}, {virtual.sampling_rate:g} Hz, as {virtual.format} and back"
         lines.append(_line("measured", told))
     how = {
-        "kalman": f"Kalman filter of roll and pitch, a moment towards it of {own.bandwidth:g} Hz",
-        "prescribed": f"measured roll and pitch enforced, smoothed at {own.smoothing:g} Hz",
+        "kalman": f"Kalman filter of roll and pitch, a moment towards it of {stabilised.bandwidth:g} Hz",
+        "prescribed": f"measured roll and pitch enforced, smoothed at {stabilised.smoothing:g} Hz",
         "none": "nothing",
     }
     sections, slopes = ", ".join(wanted.sections or ["every section"]), ", ".join(f"{each:g}" for each in wanted.slopes)
     lines += [
-        _line("runs", f"free, and held by: {how[own.method]}; {scene.run.engine}"),
+        _line("runs", f"free, and held by: {how[stabilised.method]}; {scene.run.engine}"),
         _line("hand on", f"{sections}; as {', '.join(wanted.formats)}; damage of slopes {slopes}"),
     ]
     return "\n".join([*lines, *effect_lines(scene), *assumption_lines(assumptions(scene, rig.vehicle))])

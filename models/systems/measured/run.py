@@ -191,8 +191,8 @@ def _judged_by_assumptions(run: Result, exam: Examination) -> Result:
         return run
     judged(run, assumptions(exam.scene, exam.rig.vehicle, exam))
     if exam.plane is not None:
-        own, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
-        run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *own[key]] for key in own})
+        run_said, said = (json.loads(each.data.attrs["assumptions"]) for each in (run, exam.plane))
+        run.data.attrs["assumptions"] = json.dumps({key: [*said[key], *run_said[key]] for key in run_said})
         run.data.attrs["error"] = exam.plane.data.attrs["error"]
     return run
 
@@ -237,9 +237,13 @@ def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Rec
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
     """How each run is held: free, and by the stabiliser that the scene names."""
-    own, deviations = scene.stabilise, noise_of(scene.noise, recording)
-    held = {own.method: Hold(own.method, own.bandwidth, own.model, own.smoothing, **deviations)}
-    return {FREE: Hold("none", **deviations)} | ({} if own.method == "none" else held)
+    stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
+    held = {
+        stabilised.method: Hold(
+            stabilised.method, stabilised.bandwidth, stabilised.model, stabilised.smoothing, **deviations
+        )
+    }
+    return {FREE: Hold("none", **deviations)} | ({} if stabilised.method == "none" else held)
 
 
 def noise_of(stated: Deviations, recording: Recording) -> dict[str, float]:

@@ -152,12 +152,12 @@ class MeasuredScene(SceneFile):
 
     def rig(self) -> Rig:
         """The vehicle that is driven, the pitch plane at its axles or at the wheels of each; raises InputError."""
-        own = self.vehicle
-        if own.file is None:
+        given_vehicle = self.vehicle
+        if given_vehicle.file is None:
             hubs, springs = tuple(hub for axle in AXLES.values() for hub in axle), tuple(SPRINGS.values())
             places = Places(hubs, (CHASSIS,), springs)
-            return Rig(str(own.parameters), CHASSIS, places, springs, ("pitch",), None)
-        vehicle = cut(load_vehicle(own.file, self.folder, self.file, "vehicle.file"), own.chassis)
+            return Rig(str(given_vehicle.parameters), CHASSIS, places, springs, ("pitch",), None)
+        vehicle = cut(load_vehicle(given_vehicle.file, self.folder, self.file, "vehicle.file"), given_vehicle.chassis)
         bodies, elements = (tuple(each.name for each in parts) for parts in (vehicle.whole.bodies, vehicle.elements))
         places = Places(vehicle.hubs, bodies, elements, tuple(self.sensors))
         return Rig(vehicle.tree.name, vehicle.chassis, places, names(vehicle), ("roll", "pitch"), vehicle)
@@ -169,20 +169,20 @@ class MeasuredScene(SceneFile):
 
     def plane(self) -> Parameters | None:
         """Parameters of the pitch-plane vehicle that is driven; None of a vehicle in space; raises InputError."""
-        own = self.vehicle.parameters
-        return None if own is None else parameter_set(own, self.file, Path(self.folder))
+        parameters = self.vehicle.parameters
+        return None if parameters is None else parameter_set(parameters, self.file, Path(self.folder))
 
 
 def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> MeasuredScene:
     """A checked scene from nested tables; raises InputError for anything that is not understood."""
     scene = checked(MeasuredScene, table, file, folder)
-    own, names = scene.vehicle, [each.file for each in scene.files]
-    if (own.file is None) == (own.parameters is None):
+    vehicle, names = scene.vehicle, [each.file for each in scene.files]
+    if (vehicle.file is None) == (vehicle.parameters is None):
         what = "name either file, of a vehicle in space, or parameters, of the pitch-plane vehicle"
         raise InputError(file, "vehicle", None, what)
-    if own.parameters is not None and "chassis" in own.model_fields_set:
-        raise InputError(file, "vehicle.chassis", own.chassis, "belongs to a vehicle file: drop it")
-    if own.parameters is not None and scene.virtual is not None:
+    if vehicle.parameters is not None and "chassis" in vehicle.model_fields_set:
+        raise InputError(file, "vehicle.chassis", vehicle.chassis, "belongs to a vehicle file: drop it")
+    if vehicle.parameters is not None and scene.virtual is not None:
         raise InputError(file, "virtual", None, "is of a vehicle file: the pitch plane needs [[files]]")
     if bool(names) == (scene.virtual is not None):
         raise InputError(file, "files", None, "give either [[files]] that were measured, or a table [virtual]")

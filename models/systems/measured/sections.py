@@ -178,10 +178,14 @@ def _guides(vehicle: CutVehicle, joined: Joints) -> tuple[np.ndarray, np.ndarray
 
 def points(vehicle: CutVehicle, signals: Iterable[Signal], places: Mapping[str, Place]) -> tuple[Point, ...]:
     """Where accelerations are measured: at sensors, which ``places`` knows, and at centres of bodies."""
-    found = dict[str, Point]()
+    section_points = dict[str, Point]()
     for signal in (signal for signal in signals if signal.quantity == "acceleration"):
         if signal.at in places:
-            found[signal.at] = Point(signal.at, places[signal.at].body, places[signal.at].position, signal.gravity)
+            section_points[signal.at] = Point(
+                signal.at, places[signal.at].body, places[signal.at].position, signal.gravity
+            )
         elif signal.at in {body.name for body in vehicle.whole.bodies}:
-            found[signal.at] = Point(signal.at, signal.at, vehicle.whole.body(signal.at).position, signal.gravity)
-    return tuple(found.values())
+            section_points[signal.at] = Point(
+                signal.at, signal.at, vehicle.whole.body(signal.at).position, signal.gravity
+            )
+    return tuple(section_points.values())

@@ -70,7 +70,9 @@ class Drift:
         """
         from scipy.special import ndtr
 
-        mean = sum((own for name, own in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3)))
+        mean = sum(
+            (means for name, means in self.means.items() if source in (None, name)), np.zeros((len(self.times), 3))
+        )
         spread = self.deviations if source in (None, "noise") else np.zeros_like(self.deviations)
         mean, deviation = mean[:, :2], np.maximum(spread[:, :2], 1e-300)
         inside = np.prod(ndtr((angle - mean) / deviation) - ndtr((-angle - mean) / deviation), axis=1)
@@ -97,12 +99,12 @@ class Drift:
 
 def drift(vehicle: CutVehicle, level: Level, period: float, duration: float, frame: str) -> Drift:
     """Drift of a free run on hub forces sampled every ``period`` (s), over a duration (s), forces in a frame."""
-    own, law = rigid(vehicle), _Law(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
-    noise = period * own.turning(level.deviations(vehicle))
+    body, law = rigid(vehicle), _Law(rigid(vehicle), frame, np.linspace(0.0, duration, POINTS + 1))
+    noise = period * body.turning(level.deviations(vehicle))
     spread = np.sqrt(np.diagonal(law.summed(law.impulse @ noise @ law.impulse.transpose(0, 2, 1)), axis1=1, axis2=2))
     means = dict[str, np.ndarray]()
     if level.bias is not None:
-        turning = np.linalg.solve(own.inertia, own.moments(np.asarray(level.bias, float)[None])[0])
+        turning = np.linalg.solve(body.inertia, body.moments(np.asarray(level.bias, float)[None])[0])
         means["bias"] = law.summed(law.impulse) @ turning
     for name, start, response in (("tilt", level.tilt, "step"), ("rate", level.rate, "impulse")):
         if np.any(start):
@@ -116,16 +118,16 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
     Forces that turn with the vehicle carry it off by gravity, g tilt t^2 / 2; frame "inertial" has force noise and
     bias alone. One standard deviation of the noise beside the others' means.
     """
-    own, deviation = rigid(vehicle), level.deviations(vehicle)
+    body, deviation = rigid(vehicle), level.deviations(vehicle)
     mean = np.zeros((len(times), 3))
     bias = np.zeros(len(deviation)) if level.bias is None else np.asarray(level.bias, float)
-    mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / own.mass)
+    mean += np.outer(times**2 / 2, bias.reshape(-1, WRENCH)[:, :3].sum(axis=0) / body.mass)
     if frame != "inertial":
-        turning = np.linalg.solve(own.inertia, own.moments(bias[None])[0])
+        turning = np.linalg.solve(body.inertia, body.moments(bias[None])[0])
         for axis, about, sign in ((0, 1, 1.0), (1, 0, -1.0)):
             tilt = level.tilt[about] * times**2 / 2 + level.rate[about] * times**3 / 6 + turning[about] * times**4 / 24
             mean[:, axis] += sign * GRAVITY * tilt
-    return np.sqrt(mean**2 + own.position_variance(deviation, period, times, frame))
+    return np.sqrt(mean**2 + body.position_variance(deviation, period, times, frame))
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,10 @@ def compare(
         offset,
         _bands(measured, error, run.period),
         1.0 - float(np.var(error[known])) / size**2 if size > 0 else math.nan,
-        {slope: pseudo_damage(computed[known], slope) / own if own > 0 else math.nan for slope, own in true.items()},
+        {
+            slope: pseudo_damage(computed[known], slope) / damage if damage > 0 else math.nan
+            for slope, damage in true.items()
+        },
         _trusted(error - offset, size, run.period),
     )
 
@@ -169,7 +172,9 @@ def judge(
     trusted : s, predicted for a free run (``trust``), None if not known.
     compared : check channels beside the run; noise : name -> standard deviation of the white noise of each, in SI.
     """
-    shares = {own.signal.name: disagreement(own, (noise or {}).get(own.signal.name, 0.0)) for own in compared}
+    shares = {
+        channel.signal.name: disagreement(channel, (noise or {}).get(channel.signal.name, 0.0)) for channel in compared
+    }
     off = {name: share for name, share in shares.items() if not share <= DISAGREES}
     if off:
         told = ", ".join(f"{name} by {share:.0%}" for name, share in off.items())
@@ -223,7 +228,7 @@ def own_figures(run: Outcome, vehicle: CutVehicle) -> Own:
         moment, turning = 0.5 * (moment[1:] + moment[:-1]), inertia[i] * np.diff(rate) / run.period
         shares = _share(moment, turning), _share(low_pass(moment, run.period), low_pass(turning, run.period))
         figures.append(Own(rms(moment), float(np.abs(moment).max()), *shares, 0.0, tilt, 0.0, 0, 0))
-    return max(figures, key=lambda own: own.moment_share_band)
+    return max(figures, key=lambda each: each.moment_share_band)
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:
@@ -269,13 +274,13 @@ def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Erro
     return Errors(damage, force, {}, float(tilt.max()), rms(tilt), float(height.max()))
 
 
-def disagreement(own: Compared, noise: float = 0.0) -> float:
+def disagreement(compared_channel: Compared, noise: float = 0.0) -> float:
     """Rms of the error of a check channel by that of the channel, its noise (standard deviation) taken off both.
 
     0 of a channel that is more than a third noise: it can contradict nothing. Noise that is not known, NaN, is none.
     """
     noise = 0.0 if math.isnan(noise) else noise
-    error, whole = (sum(getattr(band, name) ** 2 for band in own.bands) for name in ("error", "measured"))
+    error, whole = (sum(getattr(band, name) ** 2 for band in compared_channel.bands) for name in ("error", "measured"))
     if whole <= 0.0 or noise > LOUD * math.sqrt(whole):
         return 0.0
     return math.sqrt(max(error - noise**2, 0.0) / (whole - noise**2))

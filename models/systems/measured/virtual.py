@@ -97,53 +97,59 @@ class VirtualMeasurement:
 
 
 def virtual_measurement(
-    vehicle: CutVehicle, own: VirtualTable, engine: str, file: str = "", error: bool = False
+    vehicle: CutVehicle, virtual: VirtualTable, engine: str, file: str = "", error: bool = False
 ) -> VirtualMeasurement:
     """Run the vehicle on its road in an engine and read all transducers; raises InputError, Refused, RunFailed.
 
     error : whether the error of the steps on the road is estimated, by further runs.
     """
-    signals = check(vehicle, own, file)
-    run, told = on_road(vehicle, own.road, own.frame, (engine, own.step, own.duration, "compiled"), error)
+    signals = check(vehicle, virtual, file)
+    run, told = on_road(
+        vehicle, virtual.road, virtual.frame, (engine, virtual.step, virtual.duration, "compiled"), error
+    )
     hubs = run.wrenches.reshape(len(run.times), -1)
     elements = [element.name for element in vehicle.elements]
-    moved = travels(vehicle, run) if own.travels else {}
-    checks = [run.elements[:, [elements.index(name)]] for name in own.sections]
-    checks += [moved[name][:, None] for name in own.travels]
-    values = np.hstack([hubs, _motion(vehicle, run, own.accelerometers), *checks])
-    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (own.sampling_rate * own.step)), told)
+    moved = travels(vehicle, run) if virtual.travels else {}
+    checks = [run.elements[:, [elements.index(name)]] for name in virtual.sections]
+    checks += [moved[name][:, None] for name in virtual.travels]
+    values = np.hstack([hubs, _motion(vehicle, run, virtual.accelerometers), *checks])
+    return VirtualMeasurement(vehicle, run, signals, values, round(1.0 / (virtual.sampling_rate * virtual.step)), told)
 
 
-def check(vehicle: CutVehicle, own: VirtualTable, file: str = "") -> tuple[Signal, ...]:
+def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[Signal, ...]:
     """Signals of all channels; InputError for steps that do not fit one another, and for names that nothing has."""
-    period, whole = 1.0 / own.sampling_rate, f"divide virtual.duration = {own.duration:g} s"
-    if not divides(own.step, own.duration):
-        fit = f"must {whole}, as {fitting(own.step, own.duration)} s does"
-        raise InputError(file, "virtual.step", own.step, fit)
-    if not (divides(own.step, period) and divides(period, own.duration)):
-        fit = f"its period must be a multiple of virtual.step = {own.step:g} s and {whole}"
-        raise InputError(file, "virtual.sampling_rate", own.sampling_rate, fit)
+    period, whole = 1.0 / virtual.sampling_rate, f"divide virtual.duration = {virtual.duration:g} s"
+    if not divides(virtual.step, virtual.duration):
+        fit = f"must {whole}, as {fitting(virtual.step, virtual.duration)} s does"
+        raise InputError(file, "virtual.step", virtual.step, fit)
+    if not (divides(virtual.step, period) and divides(period, virtual.duration)):
+        fit = f"its period must be a multiple of virtual.step = {virtual.step:g} s and {whole}"
+        raise InputError(file, "virtual.sampling_rate", virtual.sampling_rate, fit)
     known = tuple(element.name for element in vehicle.elements)
     for place in ("travels", "sections"):
-        for name in (name for name in getattr(own, place) if name not in known):
+        for name in (name for name in getattr(virtual, place) if name not in known):
             raise InputError(file, f"virtual.{place}", name, "the vehicle has no such spring, mount or bar", known)
-    signals = _signals(vehicle, own)
-    check_faults(own.faults, signals, file)
+    signals = _signals(vehicle, virtual)
+    check_faults(virtual.faults, signals, file)
     return signals
 
 
-def _signals(vehicle: CutVehicle, own: VirtualTable) -> tuple[Signal, ...]:
+def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
     """Of hubs, motion and check channels, in the order of their columns."""
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
-        (f"{hub}_{name.lower()}", what, hub, axis, own.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB
+        (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB
     ]
     rows += [(name, "angle", body, name, "inertial") for name in ("roll", "pitch")]
     rows += [(f"{name}_rate", "angular rate", body, name, "body") for name in ("roll", "pitch", "yaw")]
-    rows += [(f"{name}_a{axis}", "acceleration", name, axis, "body") for name in own.accelerometers for axis in "xyz"]
+    rows += [
+        (f"{name}_a{axis}", "acceleration", name, axis, "body") for name in virtual.accelerometers for axis in "xyz"
+    ]
     checks = len(rows)
-    rows += [(f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body") for name in own.sections]
-    rows += [(f"{name}_travel", "travel", name, "", "body") for name in own.travels]
+    rows += [
+        (f"{name}_force", "force" if units[name] == "N" else "moment", name, "", "body") for name in virtual.sections
+    ]
+    rows += [(f"{name}_travel", "travel", name, "", "body") for name in virtual.travels]
     return tuple(
         Signal(name, "", name, what, at, axis, frame, 1, *FILE_UNITS[what], check=i >= checks)
         for i, (name, what, at, axis, frame) in enumerate(rows)
@@ -198,11 +204,11 @@ def write_pattern(scene: "MeasuredScene", virtual: VirtualMeasurement, samples: 
     path, groups = folder / f"measured.{scene.virtual.format}", [group(virtual.signals, samples, virtual.period)]
     write(path, groups, BEGAN, f"virtual measurement: {scene.title}")
     table = scene.model_dump(exclude_unset=True, exclude={"virtual", "files", "sensors", "file", "folder", "options"})
-    table |= {f"effects.{name}": own for name, own in table.pop("effects", {}).items()}
+    table |= {f"effects.{name}": entries for name, entries in table.pop("effects", {}).items()}
     lines = [f"{key} = {_toml(value)}" for key, value in table.items() if not isinstance(value, dict)]
-    for name, own in table.items():
-        if isinstance(own, dict):
-            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in own.items())]
+    for name, entries in table.items():
+        if isinstance(entries, dict):
+            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in entries.items())]
     for name, place in scene.virtual.accelerometers.items():
         lines += ["", f"[sensors.{_toml(name)}]", f'body = "{virtual.vehicle.chassis}"', f"position = {place}"]
     write_whole(folder / "scene.toml", "\n".join([*lines, "", map_lines(virtual.signals, path.name)]))

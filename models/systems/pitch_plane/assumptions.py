@@ -144,7 +144,7 @@ def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
     from models.drift.score import own_figures
 
     with suppress(InputError):
-        own = own_figures(run, p)
-        force = {"force": np.array([own.force_share_band])} if heave else {}
-        return {"moment": np.array([own.moment_share_band]), **force}
+        figures = own_figures(run, p)
+        force = {"force": np.array([figures.force_share_band])} if heave else {}
+        return {"moment": np.array([figures.moment_share_band]), **force}
     return {}

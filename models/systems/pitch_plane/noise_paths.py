@@ -59,8 +59,8 @@ class NoisePaths:
         """What the scene computes with this number as its path."""
         assembly = self.base
         for name, p in self.rest:
-            own = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
-            assembly = module_of(DEFAULT, name).extend(assembly, own)
+            with_path = p.model_copy(update={"path": path}) if "path" in type(p).model_fields else p
+            assembly = module_of(DEFAULT, name).extend(assembly, with_path)
         return assembly
 
     def trajectory(self, path: int) -> Trajectory:
@@ -145,13 +145,13 @@ def noise_paths(
 
 def _split(scene: Scene) -> tuple[Assembly, tuple[tuple[str, Any], ...]]:
     """The part of a scene that all paths share, and the effects that have a path or follow one that has."""
-    names, own = ordered(scene), list[str]()
+    names, unshared = ordered(scene), list[str]()
     for name in names:
         module = module_of(DEFAULT, name)
-        if "path" in type(scene.effects[name]).model_fields or set(own) & {*module.NEEDS, *module.AFTER}:
-            own.append(name)
-    shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in own}})
-    return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in own)
+        if "path" in type(scene.effects[name]).model_fields or set(unshared) & {*module.NEEDS, *module.AFTER}:
+            unshared.append(name)
+    shared = scene.model_copy(update={"effects": {name: scene.effects[name] for name in names if name not in unshared}})
+    return replace(assemble(shared), scene=scene), tuple((name, scene.effects[name]) for name in unshared)
 
 
 def _rows(scene: Scene, settings: Settings, times: np.ndarray) -> np.ndarray:
@@ -199,14 +199,14 @@ class MujocoThreads(NoisePaths):
         controls = np.concatenate([model.padded(model.drive.controls) for model in models]) if held else None
         working = models[: self.threads]
         with models[0].callback(), quiet():
-            found, _ = rollout.rollout(
+            sensed, _ = rollout.rollout(
                 [model.model for model in models],
                 [model.data for model in working],
                 np.tile(start, (len(models), 1)),
                 control=controls,
                 nstep=self.settings.steps,
             )
-        states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), found[:, :, 1:9]), axis=1)
+        states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), sensed[:, :, 1:9]), axis=1)
         return states, any(model.warnings() for model in working)
 
     def facts(self) -> dict[str, Any]:
@@ -232,6 +232,6 @@ def gap(reference: Arrays, other: Arrays, times: np.ndarray) -> float:
     until = np.minimum(reference["drift_off"][:count], other["drift_off"])
     if not (times[times > 0.0] < until[:, None]).any():
         return math.nan
-    one = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
+    first = np.where((times < until[:, None])[:, :, None], reference["states"][:count], 0.0)
     two = np.where((times < until[:, None])[:, :, None], other["states"], 0.0)
-    return float(np.abs(one - two).max() / np.abs(one).max())
+    return float(np.abs(first - two).max() / np.abs(first).max())

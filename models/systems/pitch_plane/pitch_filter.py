@@ -53,17 +53,17 @@ class PitchStep:
     _substeps: int = field(init=False)
 
     def __post_init__(self) -> None:
-        own, signal = self.assembly, self.assembly.input
+        assembly, signal = self.assembly, self.assembly.input
         assert signal is not None
-        pole = np.abs(np.linalg.eigvals(first_order(linearised(own.vehicle, ())))).max()
+        pole = np.abs(np.linalg.eigvals(first_order(linearised(assembly.vehicle, ())))).max()
         n = self._substeps = math.ceil(self.period * pole / REACH)
         self._rows = (0, 0, 1) if signal.held else (1, 2, 2)
         per_step, ends = n * self._rows[2], 0 if signal.held else 1
         self._inputs = signal.sample(0.0, self.period / per_step, self.count * per_step + ends)
         falling = np.ones(per_step) if signal.held else np.linspace(1.0, 0.0, per_step + 1)
         self._hats = np.column_stack([falling, 1.0 - falling])
-        self._p = own.parameters.array()
-        self._respond = responding(own.mode, own.vehicle.geometry)
+        self._p = assembly.parameters.array()
+        self._respond = responding(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Over one step from x (7,): x after it, and its derivatives.
@@ -74,8 +74,8 @@ class PitchStep:
         """
         first = number * self._substeps * self._rows[2]
         inputs = self._inputs[first : first + len(self._hats)]
-        found = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
-        return found[:, 0].copy(), found[:, 1:8], found[:, 8:10], found[:, 10:]
+        answer = self._respond(x, self.period / self._substeps, self._substeps, inputs, self._rows, self._p, self._hats)
+        return answer[:, 0].copy(), answer[:, 1:8], answer[:, 8:10], answer[:, 10:]
 
 
 @cache
@@ -90,24 +90,24 @@ def responding(mode: str, geometry: str) -> Any:
     march = register_jitable(march_of(mode, geometry).py_func)
 
     def respond(x, step, count, inputs, rows, p, hats):
-        states, found, own = np.empty((count + 1, 8)), np.zeros((7, 12)), p.copy()
+        states, transition, parameters = np.empty((count + 1, 8)), np.zeros((7, 12)), p.copy()
         for column in range(12):
             for sign in (1.0, -1.0):
                 y, pushed, nudge = np.zeros(8), inputs, sign * NUDGES[column]
                 y[KEPT] = x[:6]
-                own[PITCH_INERTIA] = p[PITCH_INERTIA] / (1.0 + x[6] + (nudge if column == 7 else 0.0))
+                parameters[PITCH_INERTIA] = p[PITCH_INERTIA] / (1.0 + x[6] + (nudge if column == 7 else 0.0))
                 if 0 < column < 7:
                     y[KEPT[column - 1]] += nudge
                 elif column > 7:
                     pushed = inputs.copy()
                     pushed[:, (column - 8) % 2] += nudge * hats[:, (column - 8) // 2]
-                march(y, step, count, pushed, rows, own, states)
+                march(y, step, count, pushed, rows, parameters, states)
                 end, share = states[count], 0.5 / (nudge if column > 0 else 1.0)
                 for row in range(6):
                     heave = end[2] if row < 2 else end[6] if 2 < row < 5 else 0.0
-                    found[row, column] += share * (end[KEPT[row]] - heave)
-        found[6, 0], found[6, 7] = x[6], 1.0
-        return found
+                    transition[row, column] += share * (end[KEPT[row]] - heave)
+        transition[6, 0], transition[6, 7] = x[6], 1.0
+        return transition
 
     return compiled(respond, ("pitch_step", mode, geometry))
 
@@ -198,10 +198,10 @@ class PitchFilter(ExtendedKalmanFilter):
         white, there = np.full(len(self.measured.columns), math.nan), self._there[number]
         if not there:
             return white
-        chosen, rows, own = self._seen[there]
+        chosen, rows, variance = self._seen[there]
         late = rows.dot(self.late)
         values = self.measured.values[number, chosen]
-        self.update(values, lambda x: rows, rows.dot, R=own + self.intensity * late.dot(late.T))
+        self.update(values, lambda x: rows, rows.dot, R=variance + self.intensity * late.dot(late.T))
         white[chosen] = np.linalg.cholesky(self.SI).T.dot(self.y)
         return white
 
@@ -239,55 +239,55 @@ def estimate(
     period = min(assembly.input.period, measured.period)
     step = PitchStep(assembly, period, math.ceil(assembly.scene.run.duration / period - 1e-9))
     start = _start(assembly, start_deviation, inertia_deviation)
-    found, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
-    return _smoothed(found, steps) if smoother else found
+    estimated, steps = _march(PitchFilter(step, *start, deviation**2 * assembly.input.period / period, measured))
+    return _smoothed(estimated, steps) if smoother else estimated
 
 
-def _march(own: PitchFilter) -> tuple[Estimate, _Steps]:
+def _march(filtered: PitchFilter) -> tuple[Estimate, _Steps]:
     """Predict over each step, take in what was measured at its end, and keep everything."""
-    n, period, measured = own.step.count + 1, own.step.period, own.measured
+    n, period, measured = filtered.step.count + 1, filtered.step.period, filtered.measured
     every, width = round(measured.period / period), len(measured.columns)
     states, pending, predictions = np.empty((n, 7)), np.empty((n, 7, 2)), np.empty((n, 7))
     covariances, transitions, noises = (np.empty((n, 7, 7)) for _ in range(3))
     missed, innovations = np.zeros(n, dtype=int), np.full((n, width), np.nan)
     for i in range(n):
         if i:
-            own.predict(i - 1)
-        if not math.isfinite(own.x.dot(own.P).dot(own.x)):
+            filtered.predict(i - 1)
+        if not math.isfinite(filtered.x.dot(filtered.P).dot(filtered.x)):
             raise RunFailed("kalman filter", "the estimate became infinite or not a number", i * period)
-        predictions[i], transitions[i], noises[i] = own.x, own.F, own.Q
+        predictions[i], transitions[i], noises[i] = filtered.x, filtered.F, filtered.Q
         if i % every == 0 and i // every < len(measured.values):
-            innovations[i] = own.measure(i // every)
+            innovations[i] = filtered.measure(i // every)
             missed[i] = np.count_nonzero(np.isnan(innovations[i]))
-        states[i], covariances[i], pending[i] = own.x, own.P, own.late
-    pending *= math.sqrt(own.intensity)
+        states[i], covariances[i], pending[i] = filtered.x, filtered.P, filtered.late
+    pending *= math.sqrt(filtered.intensity)
     used = np.count_nonzero(np.isfinite(innovations), axis=1)
     surprises = np.where(used > 0, np.nansum(innovations**2, axis=1), np.nan)
-    found = Estimate(period, states, covariances, pending, used, missed, surprises, innovations)
-    return found, _Steps(predictions, transitions, noises)
+    estimated = Estimate(period, states, covariances, pending, used, missed, surprises, innovations)
+    return estimated, _Steps(predictions, transitions, noises)
 
 
-def _smoothed(found: Estimate, steps: _Steps) -> Estimate:
+def _smoothed(filtered: Estimate, steps: _Steps) -> Estimate:
     """The same by filterpy's Rauch-Tung-Striebel smoother.
 
     It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
     """
-    n = len(found.states)
+    n = len(filtered.states)
     states, covariances = np.ones((n, 8)), np.zeros((n, 8, 8))
     transitions, noises = np.zeros((n, 8, 8)), np.zeros((n, 8, 8))
-    states[:, :7], covariances[:, :7, :7], noises[:, :7, :7] = found.states, found.covariances, steps.noises
+    states[:, :7], covariances[:, :7, :7], noises[:, :7, :7] = filtered.states, filtered.covariances, steps.noises
     transitions[:, :7, :7], transitions[:, 7, 7] = steps.transitions, 1.0
-    linear = np.einsum("nij,nj->ni", steps.transitions[1:], found.states[:-1])
+    linear = np.einsum("nij,nj->ni", steps.transitions[1:], filtered.states[:-1])
     transitions[1:, :7, 7] = steps.predictions[1:] - linear
     states, covariances, _, _ = KalmanFilter(8, 1).rts_smoother(states, covariances, transitions, noises, _inverse)
-    return replace(found, states=states[:, :7], covariances=covariances[:, :7, :7])
+    return replace(filtered, states=states[:, :7], covariances=covariances[:, :7, :7])
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of the covariance of seven states and an eighth that is certain."""
-    found = np.zeros((8, 8))
-    found[:7, :7] = np.linalg.inv(matrix[:7, :7])
-    return found
+    inverse = np.zeros((8, 8))
+    inverse[:7, :7] = np.linalg.inv(matrix[:7, :7])
+    return inverse
 
 
 def _start(assembly: Assembly, turn: float, inertia: float) -> tuple[np.ndarray, np.ndarray]:

@@ -59,9 +59,9 @@ def _line(head: str, text: str) -> str:
 
 def _vehicle(scene: Scene, assembly: Assembly) -> list[str]:
     """Parameter set, bodies, struts and start, a line each."""
-    own, vehicle = scene.vehicle, assembly.vehicle
-    changed = ", ".join(f"{name} = {value:g}" for name, value in own.override.items())
-    lines = [_line("vehicle", own.parameters + (f", but {changed}" if changed else ""))]
+    scene_vehicle, vehicle = scene.vehicle, assembly.vehicle
+    changed = ", ".join(f"{name} = {value:g}" for name, value in scene_vehicle.override.items())
+    lines = [_line("vehicle", scene_vehicle.parameters + (f", but {changed}" if changed else ""))]
     for body in vehicle.bodies:
         inertia = "" if body.pitch_inertia is None else f", {body.pitch_inertia:g} kg m^2"
         lines.append(_line("  body", f"{body.name:<12} {body.mass:g} kg{inertia}"))
@@ -93,12 +93,12 @@ def trust_line(assembly: Assembly) -> list[str]:
         return []
     from models.systems.pitch_plane.trust import trust
 
-    found = trust(assembly)
-    if found is None:
+    limit = trust(assembly)
+    if limit is None:
         return []
-    if found.until is None and assembly.doubts:
-        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {found.unchecked}")]
-    return [_line("trust", str(found))]
+    if limit.until is None and assembly.doubts:
+        return [_line("trust", f"only as far as the doubts about the wheel forces allow; {limit.unchecked}")]
+    return [_line("trust", str(limit))]
 
 
 def doubt_lines(assembly: Assembly) -> list[str]:

@@ -164,8 +164,8 @@ def _check_engine(name: str, scene: Scene) -> None:
 def _check_times(scene: Scene) -> None:
     """The duration and the saved spacing are whole numbers of every engine's steps."""
     for name in CATALOGUE:
-        own = name in scene.engines and scene.engines[name].step is not None
-        _check_step(scene, f"engines.{name}.step" if own else "run.step", float(scene.settings(name).step or 0))
+        stated = name in scene.engines and scene.engines[name].step is not None
+        _check_step(scene, f"engines.{name}.step" if stated else "run.step", float(scene.settings(name).step or 0))
     wanted = scene.run.output_step
     if wanted is None:
         return
@@ -193,9 +193,11 @@ def _check_step(scene: Scene, place: str, step: float) -> None:
 
 def settings_of(scene: Scene, engine: str) -> Settings:
     """Settings of a scene for one engine."""
-    own = scene.settings(engine)
-    assert own.integrator is not None and own.step is not None
-    return Settings(own.integrator, own.step, scene.run.duration, own.tolerance, own.spectral_radius)
+    settings = scene.settings(engine)
+    assert settings.integrator is not None and settings.step is not None
+    return Settings(
+        settings.integrator, settings.step, scene.run.duration, settings.tolerance, settings.spectral_radius
+    )
 
 
 def assemble(scene: Scene) -> Assembly:

@@ -173,21 +173,23 @@ class Bench:
 
     def _methods(self) -> dict[str, dict[str, Any]]:
         """Name -> effects beside forces and noise."""
-        own, noisy = self.options, "measured_pitch.csv"
-        sure = {"file": noisy, "pitch_deviation": own.angle_deviation, "force_deviation": self.deviation}
-        filtered = {**sure, "inertia_deviation": own.inertia_deviation}
-        smoothed = {"file": noisy, "bandwidth": own.bandwidth}
-        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring(k)} for k in own.stiffnesses}
-        stiffest = max(own.stiffnesses)
-        banded = {"pitch_spring": {**self.spring(stiffest), "dead_band": own.dead_band}}
-        passes = {f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING}} for f in own.cut_offs}
+        options, noisy = self.options, "measured_pitch.csv"
+        sure = {"file": noisy, "pitch_deviation": options.angle_deviation, "force_deviation": self.deviation}
+        filtered = {**sure, "inertia_deviation": options.inertia_deviation}
+        smoothed = {"file": noisy, "bandwidth": options.bandwidth}
+        springs = {f"spring {k:g} N m/rad": {"pitch_spring": self.spring(k)} for k in options.stiffnesses}
+        stiffest = max(options.stiffnesses)
+        banded = {"pitch_spring": {**self.spring(stiffest), "dead_band": options.dead_band}}
+        passes = {
+            f"high-pass {f:g} Hz": {"high_pass": {"cut_off": f, "damping_ratio": DAMPING}} for f in options.cut_offs
+        }
         return {
             "free": {},
             "exact pitch prescribed": {"prescribed_pitch": {"file": "pitch.csv"}},
             "exact heave and pitch": {"prescribed_heave_and_pitch": {"file": "heave_and_pitch.csv"}},
-            f"measured pitch to {own.bandwidth:g} Hz": {"prescribed_pitch": smoothed},
+            f"measured pitch to {options.bandwidth:g} Hz": {"prescribed_pitch": smoothed},
             **springs,
-            f"{stiffest:g} beyond {own.dead_band:g} rad": banded,
+            f"{stiffest:g} beyond {options.dead_band:g} rad": banded,
             **passes,
             "Kalman, sure of the model": {"kalman_filter": sure},
             "Kalman filter": {"kalman_filter": filtered},
@@ -200,9 +202,9 @@ class Bench:
         self.simulate(engine, {})  # compiles what is not compiled yet, so that no row pays for it
         for i, (name, effects) in enumerate(self.methods.items()):
             progress(f"{engine}, {self.road}: {name}", i / len(self.methods))
-            own = self._scored(engine, name, effects, failed)
-            rows += own
-            if own and (name == "free" or own[0]["verdict"] == "accepted"):
+            of_method = self._scored(engine, name, effects, failed)
+            rows += of_method
+            if of_method and (name == "free" or of_method[0]["verdict"] == "accepted"):
                 rows += [row for other in others for row in self._scored(other, name, effects, failed)]
         return rows
 
@@ -210,13 +212,13 @@ class Bench:
         """One row, or none for a run that fails."""
         start = time.perf_counter()
         try:
-            found = self.simulate(engine, effects)
+            result = self.simulate(engine, effects)
         except RunFailed as error:
             failed[f"{engine}, {self.road}, {name}"] = str(error)
             return []
         seconds = time.perf_counter() - start
-        self.results[f"{engine}: {name} ({self.road})"] = found
-        return [{"engine": engine, "road": self.road, **self.row(name, effects, found), "seconds": seconds}]
+        self.results[f"{engine}: {name} ({self.road})"] = result
+        return [{"engine": engine, "road": self.road, **self.row(name, effects, result), "seconds": seconds}]
 
     def simulate(self, engine: str, effects: dict[str, Any]) -> Result:
         """A run of the perturbed model under noisy forces."""
@@ -229,27 +231,27 @@ class Bench:
     def row(self, name: str, effects: dict[str, Any], result: Result) -> Row:
         """Figures and verdicts; a tumbled run has no damage that could mislead."""
         limits = self.options.limits
-        own, wrong = own_figures(result, self.parameters), errors(result, self.truth, self.options.slope)
-        with_truth = verdict(own, wrong, effects, limits)
+        figures, wrong = own_figures(result, self.parameters), errors(result, self.truth, self.options.slope)
+        with_truth = verdict(figures, wrong, effects, limits)
         alone = blind_verdict(
-            own, effects, float(result.times[-1]), limits, self.trusted, consistent(result), uncertainty(result)
+            figures, effects, float(result.times[-1]), limits, self.trusted, consistent(result), uncertainty(result)
         )
         loads = {f"damage {channel}": wrong.damage[channel] for channel in CHANNELS}
         loads |= {f"error {channel} [N]": wrong.force_rms[channel] for channel in CHANNELS}
         return {
             "method": name,
-            **(dict.fromkeys(loads) if own.pitch_max > TUMBLED else loads),
+            **(dict.fromkeys(loads) if figures.pitch_max > TUMBLED else loads),
             **{f"vertical damage {name}": ratio for name, ratio in wrong.vertical_damage.items()},
             "pitch error max [rad]": wrong.pitch_max,
             "pitch error rms [rad]": wrong.pitch_rms,
             "heave error max [m]": wrong.heave_max,
-            "moment rms [N m]": own.moment_rms,
-            "moment max [N m]": own.moment_max,
-            "moment share": own.moment_share,
-            "moment share to 15 Hz": own.moment_share_band,
-            "force share to 15 Hz": own.force_share_band,
-            "force calls": own.force_calls,
-            "steps": own.steps,
+            "moment rms [N m]": figures.moment_rms,
+            "moment max [N m]": figures.moment_max,
+            "moment share": figures.moment_share,
+            "moment share to 15 Hz": figures.moment_share_band,
+            "force share to 15 Hz": figures.force_share_band,
+            "force calls": figures.force_calls,
+            "steps": figures.steps,
             "verdict": with_truth.word,
             "reason": with_truth.reason,
             "without truth": alone.word,

@@ -232,9 +232,9 @@ def measured_growth(path: Path) -> tuple[float, float]:
     The rate is that of the larger eigenvalue of ``tilt_map``; both on the unit circle is no growth but a swing. Where
     they meet, at 1, an error of the map moves them by its square root.
     """
-    found, duration = tilt_map(path), path.forces.period * path.samples
-    off = abs(float(np.linalg.det(found)) - 1.0)
-    return float(np.log(np.abs(np.linalg.eigvals(found)).max())) / duration, math.sqrt(off) / duration
+    tilting, duration = tilt_map(path), path.forces.period * path.samples
+    off = abs(float(np.linalg.det(tilting)) - 1.0)
+    return float(np.log(np.abs(np.linalg.eigvals(tilting)).max())) / duration, math.sqrt(off) / duration
 
 
 def swing(path: Path) -> float:

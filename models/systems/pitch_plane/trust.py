@@ -78,8 +78,8 @@ def growth(assembly: Assembly) -> Growth:
         return Growth(times, 0.0, np.zeros(len(times)))
     values, p = _covering(path), assembly.parameters
     rate = pitch_rate_of_forces(values, path.forces.period, p)
-    own = (rate, path.forces.period, p)
-    return Growth(times, growth_rate(*own), growth_until(*own))
+    arguments = (rate, path.forces.period, p)
+    return Growth(times, growth_rate(*arguments), growth_until(*arguments))
 
 
 def _covering(path: Path) -> np.ndarray:
@@ -90,9 +90,9 @@ def _covering(path: Path) -> np.ndarray:
 
 def noise(assembly: Assembly, deviation: float) -> Curve:
     """Median size over paths, for white samples of ``deviation`` (N) each."""
-    own, period = growth(assembly), path_of(assembly).forces.period
+    growing, period = growth(assembly), path_of(assembly).forces.period
     intensity = rigid_pitch(assembly.parameters).intensity(deviation, period)
-    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, intensity)))
+    return Curve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, intensity)))
 
 
 def interpolation_error(path: Path) -> np.ndarray:
@@ -122,9 +122,9 @@ def model(assembly: Assembly, other: Parameters, longest: float = STEP) -> Curve
     What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
     The difference is carried along a run with the mean of both models, which leaves no error of second order.
     """
-    own = assembly.parameters.model_dump()
-    change = {name: getattr(other, name) - value for name, value in own.items()}
-    mean = Parameters(**{name: value + 0.5 * change[name] for name, value in own.items()})
+    parameters = assembly.parameters.model_dump()
+    change = {name: getattr(other, name) - value for name, value in parameters.items()}
+    mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
     return _carried(path_of(replace(assembly, parameters=mean), longest), other=shifted)
 
@@ -137,10 +137,10 @@ def _carried(path: Path, errors: np.ndarray | None = None, other: Parameters | N
 
 def rounding(assembly: Assembly) -> Curve:
     """Median size of what rounding alone does, each step rounding the pitch rate anew: a floor for every solver."""
-    own, path = growth(assembly), path_of(assembly)
+    growing, path = growth(assembly), path_of(assembly)
     rate = pitch_rate_of_forces(_covering(path), path.forces.period, assembly.parameters)
     each = np.finfo(float).eps * float(np.sqrt(np.mean(rate**2))) / math.sqrt(12)
-    return Curve(own.times, MEDIAN * np.sqrt(pitch_variance(own.times, own.until, each**2 / path.step)))
+    return Curve(growing.times, MEDIAN * np.sqrt(pitch_variance(growing.times, growing.until, each**2 / path.step)))
 
 
 @dataclass(frozen=True)
@@ -195,11 +195,13 @@ def _steady(assembly: Assembly, angle: float) -> dict[str, float]:
         return {}
     from models.measured.axle_forces import steady
 
-    p, found = assembly.parameters, steady(_axles(assembly))
+    p, motion = assembly.parameters, steady(_axles(assembly))
     ways = {"mean of the wheel forces": angle * (p.a + p.b), "balance of the axles": angle}
     return {
         name: math.sqrt(2 * way / abs(acceleration))
-        for (name, way), acceleration, seen in zip(ways.items(), found.accelerations.tolist(), found.seen, strict=True)
+        for (name, way), acceleration, seen in zip(
+            ways.items(), motion.accelerations.tolist(), motion.seen, strict=True
+        )
         if seen
     }
 

@@ -56,13 +56,13 @@ def with_error_of_sweep(
     again = np.array(
         [[_direct(linear, road, filters, float(swept.speeds[i]), digit) for i in at] for road in roads.values()]
     )
-    own = swept.deviation[:, at]
+    deviation = swept.deviation[:, at]
     told = {}
     for i, (name, unit) in enumerate(zip(swept.outputs, swept.units, strict=True)):
-        known = np.isfinite(own[..., i]) & np.isfinite(again[..., i])
-        size = rms(own[..., i][known])
+        known = np.isfinite(deviation[..., i]) & np.isfinite(again[..., i])
+        size = rms(deviation[..., i][known])
         if size > 0.0:
-            error = max(SAFETY * rms(again[..., i][known] - own[..., i][known]), DIGIT / 4.0 * size)
+            error = max(SAFETY * rms(again[..., i][known] - deviation[..., i][known]), DIGIT / 4.0 * size)
             told[name] = Estimate(error, unit, error / size, 1.0, 0.0)
     points = f"{len(at)} of {len(swept.speeds)} speeds"
     return stated(run, told, f"the Lyapunov equation of nudged matrices at {points}", "")

@@ -109,11 +109,11 @@ def _of_steps(
     """Errors and orders (p,) of the copies' deviations at a speed."""
     twice, fourfold = (coarser_variances(vehicle, road, speed, fine, times, seed) for times in (2, 4))
     count = len(twice)
-    own = np.sqrt(fine.about_mean()[:count].mean(axis=0))
+    deviation = np.sqrt(fine.about_mean()[:count].mean(axis=0))
     coarse, coarser = np.sqrt(twice.mean(axis=0)), np.sqrt(fourfold.mean(axis=0))
-    pairs = zip(abs(own - coarse), abs(coarse - coarser), strict=True)
+    pairs = zip(abs(deviation - coarse), abs(coarse - coarser), strict=True)
     order = np.array([observed_order(float(a), float(b), COPIES_ORDER) for a, b in pairs])
-    return abs(own - coarse) / (2.0**order - 1.0), order
+    return abs(deviation - coarse) / (2.0**order - 1.0), order
 
 
 def _of_gains(

@@ -101,9 +101,9 @@ def linearised(
         lasting, count, seed = sampling.lasting, sampling.copies, sampling.seed
         copies[speed] = copies_in_time(vehicle, road, speed, lasting, copies=count, seed=seed)
     at_shown = statistically_linear(on_road, road, shown)
-    found = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
-    by_speed = {"deviation": found.deviation, "small_motion": found.small}
-    by_speed |= {part: found.of(part) for part in ("mean", "left_out")}
+    linear_runs = Nonlinear(speeds, np.array(small), replaced, copies, at_shown, vehicle.lifts)
+    by_speed = {"deviation": linear_runs.deviation, "small_motion": linear_runs.small}
+    by_speed |= {part: linear_runs.of(part) for part in ("mean", "left_out")}
     of_copies = {"deviation": "deviation", "mean": "mean", "variance_error": "error", "kurtosis": "kurtosis"}
     channels = {name: Channel(("speed", "output"), values) for name, values in by_speed.items()}
     channels |= {
@@ -122,7 +122,7 @@ def linearised(
         engine="reference",
         counts={"iterations": sum(len(each.changes) for each in replaced)},
         seconds=time.process_time() - begun,
-        detail=found,
+        detail=linear_runs,
         **({"tyres": "lift in copies alone"} if vehicle.lifts else {}),
     )
     motion = _moved(vehicle, road, speeds, replaced)
@@ -221,8 +221,8 @@ def _with_error_of_steps(
         ride = driven(engine, vehicle, longer, read[: 2 * count + 1], skipped=begin, every=every)
         return series(ride, begin)
 
-    own = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
-    fine = series(own, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
+    outputs = read_outputs(engine, vehicle, path, table, run.detail.run, np.arange(first, steps + 1, APART))
+    fine = series(outputs, first * path.step)._replace(units=dict(zip(names, units, strict=True)))
     return estimated(run, fine, again, ORDER, path.step)
 
 

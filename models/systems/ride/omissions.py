@@ -170,13 +170,13 @@ def mounts(scene: ReducedScene) -> list[Effect]:
             pairs[spring.one, spring.two].append(spring.name)
     return [
         Effect(
-            f"springs of {one} on {two}",
+            f"springs of {body} on {two}",
             partial(less, rigid=springs),
-            f"{one} sits rigidly on {two}",
-            excludes=(*(f"{one} {freedom}" for freedom in scene.vehicle.body(one).freedoms), f"mass of {one}"),
+            f"{body} sits rigidly on {two}",
+            excludes=(*(f"{body} {freedom}" for freedom in scene.vehicle.body(body).freedoms), f"mass of {body}"),
             why="a body that sits rigidly on another has no motion of its own left",
         )
-        for (one, two), springs in pairs.items()
+        for (body, two), springs in pairs.items()
     ]
 
 

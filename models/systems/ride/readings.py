@@ -43,7 +43,7 @@ def isotropic_change(scene: RideScene, vehicle: SpatialVehicle, speed: float) ->
         for each in (road, isotropic_like(road, y))
     )
     pairs = zip(linear.names, of_road, of_isotropic, strict=True)
-    return {name: float(np.sqrt(isotropic / own) - 1.0) for name, own, isotropic in pairs if own > 0}
+    return {name: float(np.sqrt(isotropic / plain) - 1.0) for name, plain, isotropic in pairs if plain > 0}
 
 
 def largest_gap(sweep: Sweep, reference: Sweep) -> float:

@@ -98,8 +98,8 @@ def _swept(scene: RideScene, engine: str, vehicle: SpatialVehicle, points: Sweep
         seconds=time.process_time() - begun,
         detail=swept,
     )
-    own = roads.get(AS_WRITTEN, [*roads.values()][-1])
-    judged(labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, own, few(swept.speeds), {})))
+    road = roads.get(AS_WRITTEN, [*roads.values()][-1])
+    judged(labelled, assumptions(scene, vehicle, Spectral(vehicle, linear, road, few(swept.speeds), {})))
     if not error:
         return labelled
     digit = DIGIT if engine == "reference" or not any(spring.bent for spring in vehicle.springs) else CORNERED

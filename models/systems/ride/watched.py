@@ -45,11 +45,11 @@ def watched(vehicle: SpatialVehicle) -> tuple[SpatialOutput, ...]:
     return tuple(whole)
 
 
-def watching(own: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
+def watching(linear: LinearVehicle, vehicle: SpatialVehicle, speed: float) -> LinearVehicle:
     """A linear vehicle, whoever made it, whose outputs are those of ``watched`` and the slip angles (rad)."""
     seen = replace(vehicle, outputs=watched(vehicle))
     rows = linearise(seen, speed).outputs if vehicle.limits else outputs(seen, Kinematics(seen))
-    return replace(own, outputs=(*rows, *_slips(vehicle, rows, speed)))
+    return replace(linear, outputs=(*rows, *_slips(vehicle, rows, speed)))
 
 
 def _slips(vehicle: SpatialVehicle, rows: tuple[Output, ...], speed: float) -> Iterator[Output]:
@@ -114,8 +114,8 @@ class Along:
     def of(self, name: str) -> Gaussian:
         """What is known at every instant, or at some speeds."""
         if name in self.deviations:
-            own = self.deviations[name]
-            return Gaussian(np.zeros(len(own)), own)
+            deviation = self.deviations[name]
+            return Gaussian(np.zeros(len(deviation)), deviation)
         return self.apart.of(name)
 
 

@@ -79,7 +79,7 @@ def _labelled(scene: WheelsetScene, engine: str, motion: Path, **more: Any) -> R
 
 def over_speeds(paths: Mapping[str, Mapping[Any, Result]]) -> Result:
     """Paths by engine and speed (m/s) as one result over engine, speed and time."""
-    each = {engine: gathered(joined(own, "speed"), at_speeds(own)) for engine, own in paths.items()}
+    each = {engine: gathered(joined(path, "speed"), at_speeds(path)) for engine, path in paths.items()}
     whole = gathered(joined(each, "engine"), each)
     whole.data["speed"].attrs["units"] = "m/s"
     return whole

@@ -12,16 +12,16 @@ def _of_manoeuvres(key: str, says: str, cost: str, counts: dict[str, int], usual
     """An effect that a key of the manoeuvres names: left out of all of them, put into all of them."""
 
     def there(scene: Any) -> bool:
-        values = [getattr(own, key) for own in scene.manoeuvres.values()]
+        values = [getattr(manoeuvre, key) for manoeuvre in scene.manoeuvres.values()]
         return any(value if isinstance(value, bool) else any(size for _, size in value) for value in values)
 
     def leave_out(table: dict[str, Any], scene: Any) -> None:
-        for own in table["manoeuvres"].values():
-            own.pop(key, None)
+        for manoeuvre in table["manoeuvres"].values():
+            manoeuvre.pop(key, None)
 
     def put_in(table: dict[str, Any], scene: Any) -> None:
-        for own in table["manoeuvres"].values():
-            own[key] = usual
+        for manoeuvre in table["manoeuvres"].values():
+            manoeuvre[key] = usual
 
     place = f"manoeuvres.NAME.{key}"
     return Entry(says, place, cost, counts, there=there, leave_out=leave_out, put_in=put_in)

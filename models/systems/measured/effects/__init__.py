@@ -12,8 +12,8 @@ def _of_transducers(key: str, says: str, cost: str, usual: dict[str, Any], **cou
     why = "for files have the faults that they have"
 
     def there(scene: Any) -> bool:
-        own = getattr(scene.virtual.faults, key) if scene.virtual is not None else None
-        return any(own.values()) if isinstance(own, Mapping) else own is not None
+        fault = getattr(scene.virtual.faults, key) if scene.virtual is not None else None
+        return any(fault.values()) if isinstance(fault, Mapping) else fault is not None
 
     def put_in(table: Table, scene: Any) -> None:
         if "virtual" not in table:

@@ -59,5 +59,5 @@ class Biased:
 
 def extend(assembly: Assembly, p: Any) -> Assembly:
     """The assembly with a biased gyro in place of its plain one."""
-    own = tuple(Biased(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
-    return replace(assembly, outputs=own)
+    biased = tuple(Biased(output, p) if isinstance(output, Gyro) else output for output in assembly.outputs)
+    return replace(assembly, outputs=biased)

@@ -146,7 +146,7 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
     kind = assembly.mode, assembly.vehicle.geometry, assembly.scene.run.duration
     key = pickle.dumps((kind, p_vehicle.array(), assembly.initial, signal, measured, p))
     if key not in _LATEST:
-        found = estimate(
+        estimated = estimate(
             assembly,
             measured,
             p.force_deviation,
@@ -155,30 +155,30 @@ def guide_of(assembly: Assembly, p: Parameters) -> Guide:
             smoother=p.smoother,
         )
         _LATEST.clear()
-        _LATEST[key] = _read(assembly, found, measured)
+        _LATEST[key] = _read(assembly, estimated, measured)
     return _LATEST[key]
 
 
-def _read(assembly: Assembly, found: "Estimate", measured: "Measurement") -> Guide:
+def _read(assembly: Assembly, estimated: "Estimate", measured: "Measurement") -> Guide:
     from models.systems.pitch_plane.pitch_filter import INERTIA, KEPT, PITCH, RATE
     from models.vehicles.pitch_plane_equations import suspension_loads
 
-    deviations = np.sqrt(found.errors()[:, [PITCH, RATE], [PITCH, RATE]])
-    share, names = found.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
+    deviations = np.sqrt(estimated.errors()[:, [PITCH, RATE], [PITCH, RATE]])
+    share, names = estimated.states[:, INERTIA], {PITCH: "pitch", RATE: "pitch_rate"}
     relative = np.zeros((8, len(share)))
-    relative[KEPT] = found.states[:, :6].T
+    relative[KEPT] = estimated.states[:, :6].T
     moment = suspension_loads(relative, assembly.parameters, assembly.vehicle.geometry)[2]
-    fits = consistency(found.innovations, [names[column] for column in measured.columns])
+    fits = consistency(estimated.innovations, [names[column] for column in measured.columns])
     return Guide(
-        found.period,
-        found.states,
-        found.states[:, [PITCH, RATE]],
+        estimated.period,
+        estimated.states,
+        estimated.states[:, [PITCH, RATE]],
         deviations,
         share,
         share * moment,
-        np.cumsum(found.used),
-        np.cumsum(found.missed),
-        np.nancumsum(found.surprises),
+        np.cumsum(estimated.used),
+        np.cumsum(estimated.missed),
+        np.nancumsum(estimated.surprises),
         fits,
     )
 
@@ -194,7 +194,7 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
     if not given:
         raise InputError(scene.file, place, None, "needs pitch_deviation, rate_deviation or both: the columns to read")
     path = scene.path(p.file, f"{place}.file")
-    values, period = read_time_series(path, {name: own[0] for name, own in given.items()}, gaps=True)
+    values, period = read_time_series(path, {name: fields[0] for name, fields in given.items()}, gaps=True)
     for name, column in zip(given, values.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(path, f"column {name!r}", None, "holds no number at all: leave its deviation out")
@@ -208,7 +208,9 @@ def _measurement(assembly: Assembly, p: Parameters) -> "Measurement":
             f"is sampled every {period:g} s and the forces every {assembly.input.period:g} s: one must be "
             "a multiple of the other",
         )
-    return Measurement(values, period, tuple(own[1] for own in given.values()), tuple(own[2] for own in given.values()))
+    return Measurement(
+        values, period, tuple(fields[1] for fields in given.values()), tuple(fields[2] for fields in given.values())
+    )
 
 
 def _check_surprise(assembly: Assembly, p: Parameters, guide: Guide) -> None:

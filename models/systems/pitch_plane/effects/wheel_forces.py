@@ -67,7 +67,7 @@ def _judged(
         Signal(axle, p.file, f"{axle} [N]", "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
     scene = assembly.scene
-    own = AxleForces(
+    axles = AxleForces(
         values,
         period,
         assembly.parameters,
@@ -77,7 +77,7 @@ def _judged(
         rests=not scene.start,
         turn=assembly.mode == "force-body",
     )
-    looked = (*check(own), *_samples((front, rear), values, period))
+    looked = (*check(axles), *_samples((front, rear), values, period))
     findings = tuple(each for each in looked if each.weight != "note" and each.check not in p.accept)
     errors = [each for each in findings if each.weight == "error"]
     if errors:
@@ -88,14 +88,14 @@ def _judged(
             p.file,
             f"{' '.join(each.text for each in errors)} If it is meant so: accept = [{names}].",
         )
-    return tuple(each.text for each in findings), _balance(own, p)
+    return tuple(each.text for each in findings), _balance(axles, p)
 
 
-def _balance(own: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
+def _balance(axles: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
     """That the means of the forces carry the weight, and that of each axle, as far as the record can tell."""
     from models.measured.axle_balance import steady
 
-    means = steady(own)
+    means = steady(axles)
     each = (
         ("weight", "the wheel forces carry the vehicle's weight on average", "m/s^2", "m1, m2, m3"),
         ("balance", "front and rear wheel forces balance each other on average", "rad/s^2", "a, b"),
@@ -112,7 +112,7 @@ def _balance(own: "AxleForces", p: Parameters) -> tuple[Assumption, ...]:
             float(means.known[i]),
         )
         for i, (name, says, unit, symbols) in enumerate(each)
-        if name not in p.accept and own.parameters.g > 0
+        if name not in p.accept and axles.parameters.g > 0
     )
 
 
@@ -129,4 +129,4 @@ def _samples(signals: "tuple[Signal, ...]", values: np.ndarray, period: float) -
 
     felt = MemoryColumns(tuple(s.name for s in signals), np.where(values == 0.0, np.nan, values))
     evidence = Evidence(Recording(signals, felt, period), None)
-    return [*spikes.check(evidence), *(found for found in clipped.check(evidence) if found.unit == "%")]
+    return [*spikes.check(evidence), *(finding for finding in clipped.check(evidence) if finding.unit == "%")]
