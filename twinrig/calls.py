@@ -158,9 +158,9 @@ def compare(one: "Result | str | Path", two: "Result | str | Path") -> "Report":
     from twinrig.report import Report
 
     names = (_name(one, "the first"), _name(two, "the second"))
-    found, notes = compare_runs(_result(one), _result(two), names)
-    values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in found}
-    return Report((f"{names[1]} less {names[0]}", *lines(found, notes)), values, found)
+    differences, notes = compare_runs(_result(one), _result(two), names)
+    values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in differences}
+    return Report((f"{names[1]} less {names[0]}", *lines(differences, notes)), values, differences)
 
 
 def _result(given: Any) -> "Result":

@@ -65,8 +65,10 @@ class Result(saved.Result):
         seconds = f"{said['seconds']:.3f} s" if said.get("seconds") else ""
         parts = "; ".join(part for part in (str(said.get("status", "")), counts, seconds) if part)
         texts = json.loads(said.get("doubts", "[]"))
-        queries = [one for one in json.loads(said.get("queries", "[]")) if one["text"] not in texts]
-        doubts = [f"  in doubt: {text}" for text in texts] + [f"  {one['weight']}: {one['text']}" for one in queries]
+        queries = [query for query in json.loads(said.get("queries", "[]")) if query["text"] not in texts]
+        doubts = [f"  in doubt: {text}" for text in texts] + [
+            f"  {query['weight']}: {query['text']}" for query in queries
+        ]
         place = dict.fromkeys(str(said.get(key, "")) for key in ("system", "engine"))
         return [f"  {' '.join(filter(None, place))}: {parts}", *doubts, *lines({self._label: self})]
 

@@ -56,8 +56,8 @@ def conformity(name: str, folder: Path, command: str) -> int:
     Returns the number of failed rows; raises InputError if there is no such class.
     """
     register(name)
-    with TemporaryDirectory() as own:
-        rows = list(_told(_rows(name, Path(own))))
+    with TemporaryDirectory() as cases_folder:
+        rows = list(_told(_rows(name, Path(cases_folder))))
     (folder / "data").mkdir(exist_ok=True)
     save(
         folder,
@@ -116,13 +116,13 @@ def _run(name: str, assembly: Assembly, settings: Settings) -> Any:
 
     Raises RunFailed too if its times are not the ends of the steps, at which it is compared.
     """
-    found = checks.engine(name)(assembly, settings).run()
-    if not np.array_equal(np.rint(found.times / settings.step), np.arange(settings.steps + 1)):
+    path = checks.engine(name)(assembly, settings).run()
+    if not np.array_equal(np.rint(path.times / settings.step), np.arange(settings.steps + 1)):
         allowed = f"instead of {settings.steps + 1} from 0 to {settings.duration:g} s, the ends of the steps"
         raise RunFailed(
-            name, f"gave {len(found.times)} times from {found.times[0]:.6g} to {found.times[-1]:.6g} s {allowed}"
+            name, f"gave {len(path.times)} times from {path.times[0]:.6g} to {path.times[-1]:.6g} s {allowed}"
         )
-    return found
+    return path
 
 
 def _checks(name: str, folder: Path) -> Iterator[Check]:
@@ -240,7 +240,7 @@ def _order(name: str, second: Independence) -> Row:
 
 def _tightened(name: str, road: Assembly) -> float:
     loose = Settings(name, STEP, DURATION, 1e-5)
-    errors = [checks.state_gap(_run(name, road, own), _truth(road)) for own in (loose, _settings(name))]
+    errors = [checks.state_gap(_run(name, road, settings), _truth(road)) for settings in (loose, _settings(name))]
     return errors[1] / errors[0] if errors[0] > EXACT else 0.0
 
 
@@ -256,16 +256,16 @@ def _guards(name: str, folder: Path) -> Row:
     try:
         scene = force_scene(throw, duration=DURATION, effects={"wheel_forces": meant})
         _run(name, assemble(scene), _settings(name))
-        found = "silent"
+        ended = "silent"
     except RunFailed:
-        found = "raised"
+        ended = "raised"
     except InputError:
-        found = "refused"
+        ended = "refused"
     return behaves(
         "conformity.guard",
         SYSTEM,
         "a run that leaves all bounds",
-        found,
+        ended,
         "raised",
         "what is no vehicle any more is no answer",
     )
@@ -276,15 +276,15 @@ def _hard_cases(name: str, folder: Path) -> Iterator[Row]:
     for family in FAMILIES:
         for case in import_module(f"validation.hard_cases.{family}").CASES:
             id = f"conformity.hard.{case.name.replace(',', '').replace(' ', '-')}"
-            quantity, own = f"hard case: {case.name}: {case.check}", folder / id
-            own.mkdir()
+            quantity, case_folder = f"hard case: {case.name}: {case.check}", folder / id
+            case_folder.mkdir()
             if case.unit in BY_STEPS and (_adaptive(name) or CATALOGUE[name][name].order < 4):
                 yield not_run(id, SYSTEM, quantity, "compares steps of a method of order 4")
                 continue
             if _adaptive(name):
                 case = replace(case, tolerance=max(case.tolerance, KEPT))
             try:
-                outcome = judge(case, name, own)
+                outcome = judge(case, name, case_folder)
             except Exception as error:  # what foreign code leads to is a row, not the end of the table
                 if isinstance(error, KeyError) and error.args[0] in built_in:
                     yield not_run(id, SYSTEM, quantity, "is about the engines and integrators that come with twinrig")

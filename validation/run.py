@@ -79,14 +79,16 @@ class Cases:
         """Measure one case; raises what the case raises."""
         start = time.perf_counter()
         case = import_module(f"validation.cases.{name}")
-        with TemporaryDirectory(ignore_cleanup_errors=True) as own:  # what cases write to run is no part of the report
-            rows, data = rested(name, partial(case.measure, self.quick, Path(own)))
+        with TemporaryDirectory(
+            ignore_cleanup_errors=True
+        ) as case_folder:  # what cases write to run is no part of the report
+            rows, data = rested(name, partial(case.measure, self.quick, Path(case_folder)))
         write_whole(self.folder / "data" / f"{name}.json", json.dumps(data).encode())
         return {"rows": [row.as_dict() for row in rows], "seconds": time.perf_counter() - start}
 
     def facts(self) -> Saved:
         """The share, the code, and which measured files there are, without which rows are not run."""
-        root, own = data_folder(), Path(__file__).parent
+        root, here = data_folder(), Path(__file__).parent
         sizes = (
             {str(path.relative_to(root)): path.stat().st_size for path in sorted(root.rglob("*")) if path.is_file()}
             if root
@@ -96,8 +98,8 @@ class Cases:
             "cases": list(self.names),
             "quick": self.quick,
             "measured files": sizes,
-            "code of validation": code(own),
-            "code of studies": code(own.parent / "studies"),
+            "code of validation": code(here),
+            "code of studies": code(here.parent / "studies"),
         }
 
 
@@ -117,8 +119,8 @@ def measured(job: Cases, pool: Executor, progress: Callable[[int], None], alone:
         return _array([{"rows": [_broken(job.names[i], reason).as_dict()], "seconds": 0.0} for i in cases])
 
     store, blocks = job.folder / KEPT / ("alone" if alone else "together"), Blocks(1, 1) if alone else Blocks(1)
-    found = run_paths(job, len(job.names), store, pool, blocks, lambda done: progress(done.done), lost)["record"]
-    records = (json.loads(str(one)) for one in found)
+    told = run_paths(job, len(job.names), store, pool, blocks, lambda done: progress(done.done), lost)["record"]
+    records = (json.loads(str(each)) for each in told)
     return {
         name: ([Row(**row) for row in record["rows"]], record["seconds"])
         for name, record in zip(job.names, records, strict=True)
@@ -138,9 +140,9 @@ def validate(folder: Path, quick: bool, command: str, earlier: Saved | None = No
     start, begun = time.perf_counter(), datetime.now(UTC)
     (folder / "data").mkdir(exist_ok=True)
     with locked(folder), processes(min(WORKERS, os.cpu_count() or 1)) as pool:
-        found = _outcomes(pool, quick, folder)
-        rows = [row for name in CASES for row in found[name][0]]
-        seconds = {name: found[name][1] for name in CASES}
+        outcomes = _outcomes(pool, quick, folder)
+        rows = [row for name in CASES for row in outcomes[name][0]]
+        seconds = {name: outcomes[name][1] for name in CASES}
         wall = None if resumed else time.perf_counter() - start
         source = {**provenance(command), "date": f"{begun:%Y-%m-%d %H:%M} UTC", "data": _data()}
         save(

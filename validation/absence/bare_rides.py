@@ -30,21 +30,21 @@ BY_HAND = {"exudyn": exudyn_run, "mujoco": mujoco_run}
 
 def scene() -> tuple[SpatialVehicle, RoadPath]:
     """The vehicle of the bare scene without its anti-roll bars, an effect of a vehicle's file, and its road."""
-    own = bare("ride")
-    vehicle = replace(vehicle_of(own), bars=())
-    return vehicle, road_path(excitation_of(own, wheels(vehicle)), ride.SPEED, STEP)
+    bare_scene = bare("ride")
+    vehicle = replace(vehicle_of(bare_scene), bars=())
+    return vehicle, road_path(excitation_of(bare_scene, wheels(vehicle)), ride.SPEED, STEP)
 
 
 def rides(engine: str, steps: int) -> tuple[Job, Job]:
     """Runs of a bare ride and of the car written for an engine, whose states (steps + 1, 14) pass the same guard."""
     vehicle, road = scene()
     table, rest, duration = road.table(steps, 0), np.zeros(len(vehicle.coordinates())), steps * road.step
-    own = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
+    model = build(engine, vehicle, Settings(INTEGRATORS[engine], road.step, duration), road.speed, table)
     by_hand = BY_HAND[engine](Car.of(vehicle), table[:, : len(vehicle.tyres)], road.step, steps)
 
     def ours() -> np.ndarray:
-        found = own.run(rest, rest)
-        return np.hstack([found.positions, found.rates])
+        path = model.run(rest, rest)
+        return np.hstack([path.positions, path.rates])
 
     def theirs() -> np.ndarray:
         states = by_hand()

@@ -148,10 +148,15 @@ def tyre(i, given, now, truck, known):
 @inlined
 def respond(now, before, after, step, truck, known):
     """Accelerations by the tyres' forces over a step (s) between torques before and after, if they were those now."""
-    found, report = now.accelerations, report_of(now.report)
+    accelerations, report = now.accelerations, report_of(now.report)
     ax, ay, turn = 0.0, 0.0, 0.0
     for i in range(4):
-        rate = known.rate[i] + known.east[i] * found[0] + known.north[i] * found[1] + known.arm[i] * found[2]
+        rate = (
+            known.rate[i]
+            + known.east[i] * accelerations[0]
+            + known.north[i] * accelerations[1]
+            + known.arm[i] * accelerations[2]
+        )
         given = StepInput(known.start[i], known.start[i] + step * rate, before[i], after[i], step)
         tyre(i, given, now, truck, known)
         fx, fy, e, f = report.force_x[i], report.force_y[i], known.east[i], known.north[i]
@@ -163,12 +168,12 @@ def respond(now, before, after, step, truck, known):
 @inlined
 def rounds(now, torques, step, truck, known):
     """Find the accelerations that the tyres' forces give back; whether there are any."""
-    found, last, off = now.accelerations, known.last, known.off
+    accelerations, last, off = now.accelerations, known.last, known.off
     left, before = math.inf, 0.0
     for n in range(PATIENCE):
         out, change, product, square = respond(now, torques[0], torques[1], step, truck, known), 0.0, 0.0, 0.0
         for a in range(3):
-            gap = out[a] - found[a]
+            gap = out[a] - accelerations[a]
             change = max(change, abs(gap))
             product += gap * (gap - off[a])
             square += (gap - off[a]) ** 2
@@ -176,8 +181,8 @@ def rounds(now, torques, step, truck, known):
         done, before = not left > CLOSE or n == PATIENCE - 1, change
         mix = min(max(product / square, -2.0), 0.75) if n > 0 and square > 0.0 and not done else 0.0
         for a in range(3):
-            off[a] = out[a] - found[a]
-            found[a] = out[a] - mix * (out[a] - last[a])
+            off[a] = out[a] - accelerations[a]
+            accelerations[a] = out[a] - mix * (out[a] - last[a])
             last[a] = out[a]
         if done:
             break
@@ -187,12 +192,15 @@ def rounds(now, torques, step, truck, known):
 @inlined
 def rests(now, first, step, truck):
     """Time within the step at which the truck stands, or -1 if it does not."""
-    found, mass, inertia = now.accelerations, truck.mass, truck.inertia
+    accelerations, mass, inertia = now.accelerations, truck.mass, truck.inertia
     speed = mass * (first[3] * first[3] + first[4] * first[4]) + inertia * first[5] * first[5]
     if speed == 0.0 and not now.turning.any():
         return 0.0
-    both = mass * (first[3] * found[0] + first[4] * found[1]) + inertia * first[5] * found[2]
-    rate = mass * (found[0] * found[0] + found[1] * found[1]) + inertia * found[2] * found[2]
+    both = mass * (first[3] * accelerations[0] + first[4] * accelerations[1]) + inertia * first[5] * accelerations[2]
+    rate = (
+        mass * (accelerations[0] * accelerations[0] + accelerations[1] * accelerations[1])
+        + inertia * accelerations[2] * accelerations[2]
+    )
     if rate == 0.0 or both >= 0.0 or -both > step * rate or speed > 2.25 * step * step * rate:
         return -1.0
     return -both / rate
@@ -201,9 +209,9 @@ def rests(now, first, step, truck):
 @inlined
 def moved(now, time, known):
     """Move the state from the start of a step on by a time (s)."""
-    state, first, found = now.state, known.first, now.accelerations
+    state, first, accelerations = now.state, known.first, now.accelerations
     for a in range(3):
-        state[3 + a] = first[3 + a] + time * found[a]
+        state[3 + a] = first[3 + a] + time * accelerations[a]
         state[a] = first[a] + 0.5 * time * (first[3 + a] + state[3 + a])
 
 
@@ -217,8 +225,8 @@ def go(now, torques, step, truck, known):
     for i in range(4):
         middle[i] = 0.5 * (torques[0, i] + torques[1, i])
     settle(now, step.regular, True, truck, known)
-    found = respond(now, torques[0], middle, 0.5 * step.time, truck, known)
-    now.accelerations[0], now.accelerations[1], now.accelerations[2] = found
+    accelerations = respond(now, torques[0], middle, 0.5 * step.time, truck, known)
+    now.accelerations[0], now.accelerations[1], now.accelerations[2] = accelerations
     rest = rests(now, first, step.time, truck)
     if rest >= 0.0:
         moved(now, rest, known)
@@ -354,8 +362,8 @@ def gap(ours: Path, theirs: Path) -> float:
     """Largest difference of states (m, rad, m/s, rad/s), of the wheels' turning (rad/s), of the tyres' forces by the
     largest one, and of pressures and torques by theirs."""
     shares = [
-        np.abs(one - other).max() / np.abs(other).max()
-        for one, other in (
+        np.abs(states - other).max() / np.abs(other).max()
+        for states, other in (
             (forces(ours), forces(theirs)),
             (ours.pressures, theirs.pressures),
             (ours.torques, theirs.torques),

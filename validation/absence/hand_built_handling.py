@@ -46,7 +46,7 @@ def law(numbers, q, v, f):
     turning = v[4], c_roll * v[5], s_roll * v[5]
     frame, ahead, aside = (x, y, z, turning), c_yaw * v[0] + s_yaw * v[1], c_yaw * v[1] - s_yaw * v[0]
     passing = ahead, aside, head[0]
-    contacts, found = doubles(4 * TOUCH), stacked(4, FORCES)
+    contacts, forces = doubles(4 * TOUCH), stacked(4, FORCES)
     places, pushes = doubles(12), doubles(12)
     left = places, pushes, contacts
     moment = plus(_engine(mounts, head, frame, q, v, f), _seats(beyond(mounts, 3 * MOUNT), frame, q, v, f))
@@ -61,11 +61,11 @@ def law(numbers, q, v, f):
         THREE,
         ORDER,
         Workspace(stacked(4, SLIP), stacked(1, BLOCK)),
-        found,
+        forces,
     )
     along, across, turn, lift = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
-        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), found[i], 9 + 3 * i
+        place, push, creep, k = row(places, 3, i), row(pushes, 3, i), forces[i], 9 + 3 * i
         force, radius = (push[0] + creep.fx, push[1] + creep.fy, push[2]), q[3] + place[2]
         f[k] += dot(x, force)
         f[k + 1] += dot(z, force)
@@ -132,7 +132,7 @@ def _engine(mounts, head, frame, q, v, f):
     up = plus(times(z, c_roll), times(y, -s_roll))
     ahead, high = plus(times(x, c_pitch), times(up, -s_pitch)), plus(times(x, s_pitch), times(up, c_pitch))
     joint = plus(times(x, head[4]), times(z, head[5] + q[6]))
-    own = plus(plus(turning, times(x, v[7])), times(over, v[8]))
+    turning_wheel = plus(plus(turning, times(x, v[7])), times(over, v[8]))
     passing, total, twist = plus(cross(turning, joint), times(z, v[6])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     moment = 0.0, 0.0, 0.0
     for i in range(3):
@@ -140,7 +140,7 @@ def _engine(mounts, head, frame, q, v, f):
         here = plus(plus(times(x, m[0]), times(y, m[1])), times(z, m[2]))
         arm = plus(plus(times(ahead, m[3]), times(over, m[4])), times(high, m[5]))
         gap = plus(here, times(plus(joint, arm), -1.0))
-        rate = plus(cross(turning, here), times(plus(passing, cross(own, arm)), -1.0))
+        rate = plus(cross(turning, here), times(plus(passing, cross(turning_wheel, arm)), -1.0))
         force = (
             m[12] + m[6] * gap[0] + m[9] * rate[0],
             m[13] + m[7] * gap[1] + m[10] * rate[1],
@@ -168,14 +168,14 @@ def _seats(seats, frame, q, v, f):
     return moment
 
 
-def numbers_of(own: Handling) -> np.ndarray:
+def numbers_of(handling: Handling) -> np.ndarray:
     """The car's table: head, wheels, mounts, seats, net."""
-    car, of, held = own.vehicle, net(CELLS), own.held.parts
+    car, of, held = handling.vehicle, net(CELLS), handling.held.parts
     springs, s, joint = {p.name: p for p in car.springs}, car.body("sway").position, car.body("engine").position
     bars = [number for bar in car.bars for number in (bar.stiffness, held[bar.name], 1.0 / bar.track)]
     head = [
         s[0],
-        own.given.drags[0].coefficient / 2.0,
+        handling.given.drags[0].coefficient / 2.0,
         car.body("body").position[2],
         0.0,
         joint[0] - s[0],
@@ -190,10 +190,10 @@ def numbers_of(own: Handling) -> np.ndarray:
 
     wheels = []
     for tyre, corner in zip(car.tyres, CORNERS, strict=True):
-        strut, load, width = springs[corner].axis, own.held.tyres[tyre.name], own.tyres.half_width
+        strut, load, width = springs[corner].axis, handling.held.tyres[tyre.name], handling.tyres.half_width
         sunk = load / tyre.stiffness
         radius = tyre.point[2] + sunk
-        side = next(force.stiffness for force in own.given.side_forces if force.name == tyre.name)
+        side = next(force.stiffness for force in handling.given.side_forces if force.name == tyre.name)
         wheels += [
             *np.subtract(tyre.point, s),
             strut[0],
@@ -206,7 +206,7 @@ def numbers_of(own: Handling) -> np.ndarray:
             radius,
             width,
             shape_factor(CELLS) * radius * sunk * width / side,
-            own.tyres.friction,
+            handling.tyres.friction,
         ]
     mounts = [
         np.r_[
@@ -220,9 +220,9 @@ def numbers_of(own: Handling) -> np.ndarray:
     return np.concatenate([head, wheels, np.ravel(mounts), np.ravel(seats), of.cells.ravel(), of.strips.ravel()])
 
 
-def model_of(own: Handling, step: float) -> mujoco.MjModel:
+def model_of(handling: Handling, step: float) -> mujoco.MjModel:
     """The car in MuJoCo, the table among its numbers; bodies without inertia get it as the model is there."""
-    car, table = own.vehicle, numbers_of(own)
+    car, table = handling.vehicle, numbers_of(handling)
     chassis = car.body("body")
     bodies = "".join(
         BODY.format(
@@ -237,7 +237,7 @@ def model_of(own: Handling, step: float) -> mujoco.MjModel:
     built = mujoco.MjModel.from_xml_string(
         MJCF.format(
             step=repr(step),
-            gravity=_text(own.gravity),
+            gravity=_text(handling.gravity),
             size=table.size,
             bodies=bodies,
             pos=_text(chassis.position),
@@ -249,16 +249,16 @@ def model_of(own: Handling, step: float) -> mujoco.MjModel:
     )
     built.body_inertia[1] = inertias
     for name, kinds in RIDERS.items():
-        spin = [0.0, own.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
+        spin = [0.0, handling.tyres.spin_inertia, 0.0] if kinds == WHEELED else np.diagonal(car.body(name).inertia)
         built.body_inertia[built.body(name).id] = spin
     mujoco.mj_setConst(built, mujoco.MjData(built))
     built.numeric_data[:] = table
     return built
 
 
-def run(own: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
+def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
     """One run from positions and rates (23,) that gives states (steps + 1, 46)."""
-    built = model_of(own, step)
+    built = model_of(handling, step)
     data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), native_law(law)
 
     def marched() -> np.ndarray:

@@ -111,7 +111,7 @@ def exudyn_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:
         )
     )
     march = exudyn_march(container, mbs, nodes, step, steps)
-    return lambda: np.hstack([found[:, 1:] for found in march()])
+    return lambda: np.hstack([states[:, 1:] for states in march()])
 
 
 def mujoco_run(car: Car, road: np.ndarray, step: float, steps: int) -> Run:

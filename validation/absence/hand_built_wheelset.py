@@ -30,8 +30,8 @@ def rates(state, speed, p, told, out, report):
     cone = Cone(radius, gauge, conicity, head)
     y, z, roll, yaw, _, y_rate, z_rate, roll_rate, yaw_rate, spin = state
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
-    own = spin - yaw_rate * sr
-    wx, wy, wz = cy * roll_rate - sy * cr * own, sy * roll_rate + cy * cr * own, yaw_rate + sr * own
+    turn_rate = spin - yaw_rate * sr
+    wx, wy, wz = cy * roll_rate - sy * cr * turn_rate, sy * roll_rate + cy * cr * turn_rate, yaw_rate + sr * turn_rate
     fy = fz = mx = my = mz = 0.0
     for side in (RIGHT, LEFT):
         depth, rolling, n_y, n_z, px, py, pz = cone_on_rail(side, Pose(y, z, roll, yaw), cone)
@@ -78,7 +78,7 @@ def rates(state, speed, p, told, out, report):
                 report[0 if side == RIGHT else 1, k] = line[k]
     m1, level = cy * mx + sy * my, cy * my - sy * mx
     m2, m3 = cr * level + sr * mz, cr * mz - sr * level
-    out[0], out[1], out[2], out[3], out[4] = y_rate, z_rate, roll_rate, yaw_rate, own
+    out[0], out[1], out[2], out[3], out[4] = y_rate, z_rate, roll_rate, yaw_rate, turn_rate
     out[5], out[6], out[9] = fy / mass, (fz + 2.0 * carried) / mass + 9.81, m2 / along
     out[7] = (m1 + along * spin * yaw_rate * cr) / across - yaw_rate**2 * sr * cr
     out[8] = ((m3 - along * spin * roll_rate) / across + 2.0 * roll_rate * yaw_rate * sr) / cr

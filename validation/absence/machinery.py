@@ -36,17 +36,17 @@ def arrays(job: Callable[[], Any]) -> int:
 def wheelsets(steps: int) -> tuple[Callable[[], Path], Callable[[], Path]]:
     """Runs of a bare wheelset and of one written out for linear creep on cones alone, whose path passes the same
     checks: both give states and contacts."""
-    own, times = equations_of(bare("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
-    start = own.displaced(1e-3)
-    theirs = hand_built_wheelset.run(own.wheelset, start, wheelset.SPEED, STEP, steps)
+    equations, times = equations_of(bare("wheelset"), "reference", wheelset.SPEED), STEP * np.arange(steps + 1)
+    start = equations.displaced(1e-3)
+    theirs = hand_built_wheelset.run(equations.wheelset, start, wheelset.SPEED, STEP, steps)
 
     def written() -> Path:
         states, contacts = theirs()
         path = Path(times, states, contacts=contacts)
-        own.check(path, STEP, 1)
+        equations.check(path, STEP, 1)
         return path
 
-    return lambda: own.run(start, steps * STEP, STEP), written
+    return lambda: equations.run(start, steps * STEP, STEP), written
 
 
 def ratio_of_wheelsets(steps: int, rounds: int) -> tuple[float, tuple[float, float, float]]:

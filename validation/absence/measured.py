@@ -78,7 +78,9 @@ def seen(scene: MeasuredScene, engine: str) -> tuple[dict[str, int], bytes]:
     path = b"".join(exam.outcome.samples(answer).tobytes() for answer in exam.outcome.answers)
     guides, faulty = {int(table[kernel.GUIDE]) for table in tables}, np.zeros((2, 1), bool)
     if scene.virtual is not None and exam.virtual is not None:
-        samples, true = (exam.virtual.samples(own, scene.virtual.seed) for own in (scene.virtual.faults, Faults()))
+        samples, true = (
+            exam.virtual.samples(faults, scene.virtual.seed) for faults in (scene.virtual.faults, Faults())
+        )
         faulty = np.array([(samples != true).any(axis=0), np.isnan(samples).any(axis=0)])
     counts = {
         "runs on tyres": int(exam.virtual is not None),

@@ -62,12 +62,12 @@ def by_hand(system: str) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
 def seen(system: str, scene: Any, quick: bool = False) -> dict[str, tuple[dict[str, int], bytes]]:
     """Counts and path of a scene in each engine that does not refuse it, or in the first one; the counts of Exudyn and
     MuJoCo with the callbacks that were there while it ran."""
-    file, found = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
+    file, counts_and_path = file_of(system), dict[str, tuple[dict[str, int], bytes]]()
     for engine in file.ENGINES[:1] if quick else file.ENGINES:
         with suppress(Refused), registered(engine) as callbacks:
             counts, path = file.seen(scene, engine)
-            found[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
-    return found
+            counts_and_path[engine] = {**counts, **({"callbacks": max(callbacks)} if callbacks else {})}, path
+    return counts_and_path
 
 
 def controlled(system: str) -> tuple[str, ...]:
@@ -109,9 +109,9 @@ def _before(system: str, effect: str, quick: bool) -> Counts:
 
 
 @cache
-def _counted(system: str, needs: tuple[str, ...], own: str, quick: bool) -> Counts:
+def _counted(system: str, needs: tuple[str, ...], tables: str, quick: bool) -> Counts:
     """Counts of a bare scene with some effects, or with tables of its own, as text."""
-    scene = beside(bare(system, **json.loads(own)), *needs)
+    scene = beside(bare(system, **json.loads(tables)), *needs)
     return {engine: counts for engine, (counts, _) in seen(system, scene, quick).items()}
 
 
@@ -121,15 +121,17 @@ def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
     """To be run in a fresh process: what a bare scene imports, what effects import and add, whether the path stays."""
-    own = {system: sorted({module for some in _modules(system).values() for module in some}) for system in systems}
+    modules_of = {
+        system: sorted({module for some in _modules(system).values() for module in some}) for system in systems
+    }
     for system in systems:
         if file_of(system).ENGINES[0] == "reference":
-            with _removed(system, own[system]):
+            with _removed(system, modules_of[system]):
                 seen(system, bare(system), quick=True)
     engines, bares = _loaded(["exudyn", "mujoco"]), dict[str, Any]()
     for system in systems:  # all of them before any effect, as two systems may have a module in common
-        with _removed(system, own[system]):
-            bares[system] = seen(system, bare(system)), _loaded(own[system])
+        with _removed(system, modules_of[system]):
+            bares[system] = seen(system, bare(system)), _loaded(modules_of[system])
     return {"engines": engines, "systems": {system: _probed(system, *bares[system]) for system in systems}}
 
 
@@ -170,7 +172,7 @@ def _removed(system: str, modules: list[str]) -> Iterator[None]:
 
 def _loaded(modules: list[str]) -> list[str]:
     there = [name for name, module in sys.modules.items() if module is not None]
-    return [name for name in modules if any(one == name or one.startswith(f"{name}.") for one in there)]
+    return [name for name in modules if any(loaded == name or loaded.startswith(f"{name}.") for loaded in there)]
 
 
 @cache
@@ -258,7 +260,9 @@ def _present(system: str, more: dict[str, Counts]) -> list[Row]:
 
 def _text(counts: Counts) -> str:
     """The counts by engine, once where all agree."""
-    said = {engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(own.items())) for engine, own in counts.items()}
+    said = {
+        engine: ", ".join(f"{n:+d} {key}" for key, n in sorted(counted.items())) for engine, counted in counts.items()
+    }
     if len({*said.values()}) == 1:
         return next(iter(said.values())) or "nothing"
     return "; ".join(f"{engine} {text or 'nothing'}" for engine, text in said.items())

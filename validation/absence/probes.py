@@ -163,47 +163,47 @@ def _user_functions(mbs: Any) -> int:
     )
     items = [getattr(mbs, f"Get{kind}")(i) for kind, count in kinds for i in range(count)]
     assert items, "the system is empty"
-    own = [getattr(mbs, name)() for name in dir(mbs) if name.startswith("Get") and name.endswith("UserFunction")]
+    told_of = [getattr(mbs, name)() for name in dir(mbs) if name.startswith("Get") and name.endswith("UserFunction")]
     told = [value for item in items for key, value in item.items() if "UserFunction" in key]
-    return sum(bool(value) for value in (*told, *own))
+    return sum(bool(value) for value in (*told, *told_of))
 
 
 @contextmanager
 def registered(engine: str) -> Iterator[list[int]]:
     """Callbacks in a block: of every Exudyn system that marches, or of MuJoCo whenever one is set or taken away."""
-    found, patches = list[int](), list[Any]()
+    functions, patches = list[int](), list[Any]()
     if engine == "mujoco":
         import mujoco
 
         patches = [
-            mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), found))
+            mock.patch.object(mujoco, name, _setting(getattr(mujoco, name), functions))
             for name in (f"set_mjcb_{callback}" for callback in CALLBACKS)
         ]
     elif engine == "exudyn":
         import exudyn as exu
 
-        patches = [mock.patch.object(exu.MainSystem, "SolveDynamic", _marching(exu.MainSystem.SolveDynamic, found))]
+        patches = [mock.patch.object(exu.MainSystem, "SolveDynamic", _marching(exu.MainSystem.SolveDynamic, functions))]
     with ExitStack() as stack:
         for patch in patches:
             stack.enter_context(patch)
-        yield found
+        yield functions
 
 
-def _setting(function: Callable[..., Any], found: list[int]) -> Callable[..., Any]:
+def _setting(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
     def call(law: Any) -> None:
         function(law)
-        found.append(installed())
+        functions.append(installed())
 
     return call
 
 
-def _marching(function: Callable[..., Any], found: list[int]) -> Callable[..., Any]:
+def _marching(function: Callable[..., Any], functions: list[int]) -> Callable[..., Any]:
     seen = dict[int, Any]()
 
     def call(mbs: Any, *args: Any, **options: Any) -> Any:
         if id(mbs) not in seen:  # which keeps it, so that no other one has its number
             seen[id(mbs)] = mbs
-            found.append(_user_functions(mbs))
+            functions.append(_user_functions(mbs))
         return function(mbs, *args, **options)
 
     return call

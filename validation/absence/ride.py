@@ -122,7 +122,7 @@ def imported(engine: str) -> list[str]:
     command = [sys.executable, "-c", PROBE, engine]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     modules = json.loads(done.stdout.splitlines()[-1])
-    return [name for name in FOREIGN if any(found == name or found.startswith(f"{name}.") for found in modules)]
+    return [name for name in FOREIGN if any(package == name or package.startswith(f"{name}.") for package in modules)]
 
 
 def states(filters: dict[str, str]) -> int:
@@ -142,8 +142,8 @@ def linearised(name: str) -> int:
 
 def noisy(damping: float) -> int:
     """Outputs of the half car that white noise reaches at once, with this tyre damping (N s/m)."""
-    own = load_vehicle("half_car")
-    damped = replace(own, tyres=tuple(replace(tyre, damping=damping) for tyre in own.tyres))
+    half_car = load_vehicle("half_car")
+    damped = replace(half_car, tyres=tuple(replace(tyre, damping=damping) for tyre in half_car.tyres))
     vehicle = of_scene.linear_vehicle(damped)(SPEEDS[0])
     system = excited(vehicle, paper_road(vehicle.wheels), SPEEDS[0])
     return sum(any(d[i].any() for d in system.D) for i in range(len(system.C)))
@@ -151,13 +151,13 @@ def noisy(damping: float) -> int:
 
 def callbacks(name: str) -> dict[str, tuple[int, int]]:
     """Curves and callbacks of a vehicle in both engines, Exudyn's counted over its own items."""
-    found = {}
+    counts = {}
     for engine in ("exudyn", "mujoco"):
         model = build(engine, load_vehicle(name))
         plan = model.plan()
         counted = user_functions(model) if engine == "exudyn" else plan["callbacks"]
-        found[engine] = (plan["curves"], counted)
-    return found
+        counts[engine] = (plan["curves"], counted)
+    return counts
 
 
 @cache
@@ -209,5 +209,5 @@ def rows(quick: bool = False) -> list[Row]:
     ]
 
 
-def _counts(found: dict[str, tuple[int, int]]) -> str:
-    return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in found.items())
+def _counts(counts: dict[str, tuple[int, int]]) -> str:
+    return ", ".join(f"{engine} {curves}, {called}" for engine, (curves, called) in counts.items())

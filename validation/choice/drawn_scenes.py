@@ -61,11 +61,11 @@ def _pitch_plane(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, 
 def _wheelset(draw: np.random.Generator) -> tuple[dict[str, Any], tuple[str, ...]]:
     """A wheelset below and above its critical speed, from small displacements to those that meet the flange."""
     factors = {name: float(np.exp(draw.uniform(-0.7, 0.7))) for name in ("stiffness_x", "damping_x", "damping_y")}
-    own = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
+    usual = {"stiffness_x": 2e5, "damping_x": 1e3, "damping_y": 1e3}
     displacement = float(10.0 ** draw.uniform(-4.0, -2.2))
     asked = draw.choice(["y", "yaw", "rms y", "max fy", "rms power", "rms fx"], 2, replace=False)
     return {
-        "wheelset": {"override": {name: own[name] * factor for name, factor in factors.items()}},
+        "wheelset": {"override": {name: usual[name] * factor for name, factor in factors.items()}},
         "contact": {"law": "fastsim"},
         "speeds": {"values": [10.0]},
         "run": {

@@ -57,7 +57,7 @@ def worst_nearby(chooser: Chooser, chosen: Set, draws: int, seed: int) -> float:
     names = parameters(chooser.scene.vehicle)
     for _ in range(draws):
         factors = dict(zip(names, 1.0 + OFF * random.uniform(-1.0, 1.0, len(names)), strict=True))
-        full, left = (replace(one, vehicle=changed(one.vehicle, factors)) for one in (chooser.scene, rest))
+        full, left = (replace(scene, vehicle=changed(scene.vehicle, factors)) for scene in (chooser.scene, rest))
         whole = Whole(full, float(random.uniform(low, high)))
         ratio = confirmed(whole.reduced(left), chooser.rows) / confirmed(whole.full, chooser.rows)
         worst = max(worst, float(abs(np.sqrt(ratio) - 1.0).max()))
@@ -102,6 +102,6 @@ def change(whole: tuple[np.ndarray, ...], rest: tuple[np.ndarray, ...]) -> float
     for full, left in zip(whole, rest, strict=True):
         rows = np.linspace(0, len(full) - 1, len(left)).round().astype(int)
         size = full.std() if len(full) > 1 else abs(full[0])
-        largest = max(one.std() if len(one) > 1 else abs(one[0]) for one in whole)
+        largest = max(case.std() if len(case) > 1 else abs(case[0]) for case in whole)
         worst = max(worst, float(np.sqrt(np.mean((left - full[rows]) ** 2)) / max(size, 1e-3 * largest)))
     return worst

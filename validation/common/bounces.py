@@ -37,10 +37,10 @@ class Bounces:
 
     def path(self, start: np.ndarray, count: int) -> np.ndarray:
         """States (count + 1, 8) from the first (8,), every ``step`` seconds."""
-        found = [np.append(start, 1.0)]
+        states = [np.append(start, 1.0)]
         for _ in range(count):
-            found.append(self._over(found[-1]))
-        return np.array(found)[:, :8]
+            states.append(self._over(states[-1]))
+        return np.array(states)[:, :8]
 
     def _over(self, x: np.ndarray) -> np.ndarray:
         """The state (9,) a step later."""

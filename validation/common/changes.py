@@ -44,8 +44,8 @@ def _rows(content: Saved) -> dict[str, Saved]:
 
 def _provenance(content: Saved) -> Saved:
     """Where the rows are from, its tables as tables."""
-    found = dict(content["provenance"])
-    return found | {name: dict(found.get(name) or {}) for name in ("versions", "seeds")}
+    kept = dict(content["provenance"])
+    return kept | {name: dict(kept.get(name) or {}) for name in ("versions", "seeds")}
 
 
 def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
@@ -54,7 +54,7 @@ def against(earlier: Saved, rows: list[Saved], source: Saved) -> Saved:
     source : provenance of the rows; the notes say where that of the earlier report differs in what numbers depend on.
     """
     was = earlier["provenance"]
-    old, new = (("quick" if one.get("quick") else "full") for one in (was, source))
+    old, new = (("quick" if report.get("quick") else "full") for report in (was, source))
     notes = [] if old == new else [f"the earlier report is the {old} one and this the {new} one"]
     notes += [f"{name} {before} -> {now}" for name, before, now in _other(was, source)]
     return {
@@ -83,12 +83,12 @@ def _other(was: Saved, source: Saved) -> Iterator[tuple[str, Any, Any]]:
 
 def changes(before: dict[str, Saved], after: dict[str, Saved]) -> list[Change]:
     """Changed rows by id, in the order of KINDS and, within values, the largest share of a tolerance first."""
-    found = [
+    listed = [
         change
         for id in (*before, *(id for id in after if id not in before))
         for change in _of(id, before.get(id), after.get(id))
     ]
-    return sorted(found, key=lambda one: (KINDS.index(one["kind"]), _rank(one["after"]), -one["size"]))
+    return sorted(listed, key=lambda entry: (KINDS.index(entry["kind"]), _rank(entry["after"]), -entry["size"]))
 
 
 def _rank(status: Any) -> int:
@@ -148,19 +148,20 @@ def _size(old: Saved, new: Saved) -> float:
     return abs(now - was) / max(abs(was), abs(now))
 
 
-def lines(found: Saved) -> list[str]:
+def lines(compared: Saved) -> list[str]:
     """The comparison as text, changed rows first."""
-    own = found["changes"]
+    changed = compared["changes"]
     names = zip(KINDS, ("of status", "gone", "new", "judged otherwise", "of value"), strict=True)
-    counts = ", ".join(f"{sum(one['kind'] == kind for one in own)} {text}" for kind, text in names)
-    head = f"against {found['file']} (commit {found['commit']}): {len(own)} changes: {counts}"
+    counts = ", ".join(f"{sum(change['kind'] == kind for change in changed)} {text}" for kind, text in names)
+    head = f"against {compared['file']} (commit {compared['commit']}): {len(changed)} changes: {counts}"
     told = [
-        f"  {one['kind']}: {one['id']}: {one['quantity']}: {_shown(one['before'])} -> {_shown(one['after'])}"
-        f"{' ' + one['unit'] if one['kind'] == 'value' and one['unit'] else ''}"
-        f"{': ' + one['reason'] if one['reason'] else ''}"
-        for one in own
+        f"  {change['kind']}: {change['id']}: {change['quantity']}: "
+        f"{_shown(change['before'])} -> {_shown(change['after'])}"
+        f"{' ' + change['unit'] if change['kind'] == 'value' and change['unit'] else ''}"
+        f"{': ' + change['reason'] if change['reason'] else ''}"
+        for change in changed
     ]
-    return [head, *([f"  note: {found['note']}"] if found["note"] else []), *told]
+    return [head, *([f"  note: {compared['note']}"] if compared["note"] else []), *told]
 
 
 def _shown(value: Any) -> str:

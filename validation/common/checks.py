@@ -49,9 +49,9 @@ def acceleration_gap(make: Make, assembly: Assembly, settings: Settings, count: 
     return relative(accelerations(make, assembly, settings, states), hand)
 
 
-def relative(found: np.ndarray, hand: np.ndarray) -> float:
+def relative(computed: np.ndarray, hand: np.ndarray) -> float:
     """Largest difference by the largest magnitude."""
-    return float(np.abs(found - hand).max() / np.abs(hand).max())
+    return float(np.abs(computed - hand).max() / np.abs(hand).max())
 
 
 def run(make: Make, assembly: Assembly, settings: Settings) -> Trajectory | None:
@@ -71,12 +71,12 @@ def trajectory_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
     return state_gap(run(make, assembly, settings), hand)
 
 
-def state_gap(found: Trajectory | None, other: Trajectory) -> float:
+def state_gap(path: Trajectory | None, other: Trajectory) -> float:
     """Largest difference of any state at the times that both hold; ``other`` may be finer by a whole factor."""
-    if found is None:
+    if path is None:
         return float("inf")
-    every = (len(other.times) - 1) // (len(found.times) - 1)
-    return float(np.abs(found.states - other.states[::every]).max())
+    every = (len(other.times) - 1) // (len(path.times) - 1)
+    return float(np.abs(path.states - other.states[::every]).max())
 
 
 def order_gap(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
@@ -92,7 +92,7 @@ def order_gap(make: Make, assembly: Assembly, settings: Settings, truth: Traject
 def observed_order(make: Make, assembly: Assembly, settings: Settings, truth: Trajectory) -> float:
     """log2 of the ratio of the largest state errors at the settings' step and its half."""
     halved = replace(settings, step=settings.step / 2)
-    coarse, fine = (state_gap(run(make, assembly, own), truth) for own in (settings, halved))
+    coarse, fine = (state_gap(run(make, assembly, each), truth) for each in (settings, halved))
     return float(np.log2(coarse / fine)) if np.isfinite([coarse, fine]).all() and fine > 0 else float("-inf")
 
 
@@ -136,12 +136,12 @@ def _impulse(assembly: Assembly, settings: Settings) -> np.ndarray:
 
 def enforced_gap(make: Make, assembly: Assembly, settings: Settings) -> float:
     """Rms difference of the enforced moment (or force, if worse) to the eliminated form, relative to its rms."""
-    found = run(make, assembly, settings)
-    if found is None or found.enforced is None:
+    path = run(make, assembly, settings)
+    if path is None or path.enforced is None:
         return float("inf")
     hand = engine("reference")(assembly, by_hand(settings)).run().enforced
     assert hand is not None
-    return float(np.sqrt(np.mean((found.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
+    return float(np.sqrt(np.mean((path.enforced - hand) ** 2, axis=0) / np.mean(hand**2, axis=0)).max())
 
 
 def by_hand(settings: Settings) -> Settings:
@@ -149,6 +149,6 @@ def by_hand(settings: Settings) -> Settings:
     return replace(settings, integrator=RECOMMENDED["reference"])
 
 
-def off(found: Any, wanted: Any) -> float:
+def off(computed: Any, wanted: Any) -> float:
     """Largest difference by the largest."""
-    return float(np.abs(np.asarray(found) - wanted).max() / np.abs(wanted).max())
+    return float(np.abs(np.asarray(computed) - wanted).max() / np.abs(wanted).max())

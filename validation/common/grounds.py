@@ -44,22 +44,22 @@ class Grounds:
             self.breaches, self.rested, self.closed = [], False, False
         self.part = _part()
         name, reasons = f"{run.data.attrs['title']}, {run.data.attrs['engine']}".strip(", "), _ALLOWED.get()
-        for one in broken_of(run):
-            self.breaches.append(Breach(name, one, reasons.get(one.name) or reasons.get(ANY, "")))
+        for broken in broken_of(run):
+            self.breaches.append(Breach(name, broken, reasons.get(broken.name) or reasons.get(ANY, "")))
 
     def rest(self, allowed: bool) -> str:
         """What the row that is made now rests on, with or without leave."""
-        own = self.part == _part()
-        self.rested, self.closed = True, self.closed or own
-        return "" if self.closed and not own else self.told(allowed)
+        same_part = self.part == _part()
+        self.rested, self.closed = True, self.closed or same_part
+        return "" if self.closed and not same_part else self.told(allowed)
 
     def told(self, allowed: bool) -> str:
         """Each assumption that was broken once, with or without leave: how often, the longest share, and why it may."""
-        found: dict[str, list[Breach]] = {}
+        by_name: dict[str, list[Breach]] = {}
         for each in self.breaches:
             if bool(each.why) == allowed:
-                found.setdefault(each.broken.name, []).append(each)
-        return "; ".join(_told(same) for same in found.values())
+                by_name.setdefault(each.broken.name, []).append(each)
+        return "; ".join(_told(same) for same in by_name.values())
 
 
 def _told(same: list[Breach]) -> str:

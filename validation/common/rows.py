@@ -134,13 +134,13 @@ class Observed:
 
 
 def behaves(
-    id: str, system: System, quantity: str, found: str, expected: str, why: str, independence: Independence = "none"
+    id: str, system: System, quantity: str, seen: str, expected: str, why: str, independence: Independence = "none"
 ) -> Row:
     """Row for a behaviour, such as "refused": passes if found and expected are the same word."""
-    passed = found == expected
-    reason = "" if passed else f"found {found!r}"
+    passed = seen == expected
+    reason = "" if passed else f"found {seen!r}"
     return Row(
-        id, system, quantity, found, "", expected, None, why, independence, "passed" if passed else "failed", reason
+        id, system, quantity, seen, "", expected, None, why, independence, "passed" if passed else "failed", reason
     )
 
 

@@ -105,12 +105,12 @@ def held(name: str, cases: list[Case], cells: int = CELLS) -> Held:
     )
 
 
-def kept(name: str, one: Held) -> tuple[float, float]:
+def kept(name: str, held: Held) -> tuple[float, float]:
     """Parts of the contacts whose errors of force and moment lie within what ``models.contact.accuracy`` states."""
-    moment = moment_band(name, one.used_with_moment, one.spinning)
+    moment = moment_band(name, held.used_with_moment, held.spinning)
     return (
-        float(np.mean(one.error <= band(name, one.used, one.spinning))),
-        float(np.mean(one.moment_error <= moment + ROUNDING)),
+        float(np.mean(held.error <= band(name, held.used, held.spinning))),
+        float(np.mean(held.moment_error <= moment + ROUNDING)),
     )
 
 

@@ -55,13 +55,13 @@ def _main(engine: str) -> str:
 def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
     """Lines of the best bridge at every number of wheels, marks of the others."""
     for engine in METHODS:
-        own = [p for p in points if p["engine"] == engine]
+        of_engine = [p for p in points if p["engine"] == engine]
         for count, style in LINES.items():
-            line = [p for p in own if p["wheels"] == count and p["bridge"] in ("none", "empty", _main(engine))]
+            line = [p for p in of_engine if p["wheels"] == count and p["bridge"] in ("none", "empty", _main(engine))]
             x, y = np.array(sorted((LAWS.index(p["law"]), 1e6 * p["step"]) for p in line)).T
             label = f"{NAMES[engine]}, {_main(engine)}, {count} wheel{'s' * (count > 1)}"
             axis.semilogy(x, y, style, marker=".", color=COLOURS[engine], label=label)
-        others = [p for p in own if p["bridge"] not in ("none", "empty", _main(engine))]
+        others = [p for p in of_engine if p["bridge"] not in ("none", "empty", _main(engine))]
         for mark, bridge in zip("sD^", dict.fromkeys(p["bridge"] for p in others), strict=False):
             x, y = np.array([(LAWS.index(p["law"]), 1e6 * p["step"]) for p in others if p["bridge"] == bridge]).T
             axis.semilogy(

@@ -200,11 +200,11 @@ FAR = 1e-3
 
 def _height(patch: Patch, x: Array, y: Array) -> Array:
     """Heights (ny, nx) of a patch along the track's vertical, on the common contour."""
-    known, own = patch.distance, y - patch.place
-    over = (own >= known.y[0]) & (own <= known.y[-1])
+    known, across = patch.distance, y - patch.place
+    over = (across >= known.y[0]) & (across <= known.y[-1])
     heights = np.full((y.size, x.size), FAR)
     inside = np.clip(x, known.x[0], known.x[-1])
-    heights[over] = known.at(inside[None, :], own[over][:, None]) / np.cos(patch.lean)
+    heights[over] = known.at(inside[None, :], across[over][:, None]) / np.cos(patch.lean)
     return heights
 
 

@@ -43,12 +43,12 @@ AROUND, BELOW = 0.02, 5
 
 def drawn() -> dict[str, Wheelset]:
     """Wheelsets with parameters drawn evenly over the logarithms of RANGES."""
-    draw, found = np.random.default_rng(SEED), dict[str, Wheelset]()
-    while len(found) < DRAWN:
+    draw, wheelsets = np.random.default_rng(SEED), dict[str, Wheelset]()
+    while len(wheelsets) < DRAWN:
         values = {key: float(np.exp(draw.uniform(*np.log(ends)))) for key, ends in RANGES.items()}
         if values["load"] > 1.5 * GRAVITY * values["mass"]:
-            found[f"drawn {len(found) + 1}"] = CHOSEN.changed(**values)
-    return found
+            wheelsets[f"drawn {len(wheelsets) + 1}"] = CHOSEN.changed(**values)
+    return wheelsets
 
 
 def criticals(wheelset: Wheelset, near: bool) -> dict[str, float | None]:

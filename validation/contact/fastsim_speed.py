@@ -61,10 +61,10 @@ def speed(pair: Pair, load: float, mu: float, axis: float) -> tuple[list[Row], l
     table = [
         [
             name,
-            f"{spelled(own, 1e6)} us" if "call" in name else f"{spelled(own, 1e9)} ns per cell",
+            f"{spelled(lasted, 1e6)} us" if "call" in name else f"{spelled(lasted, 1e9)} ns per cell",
             "" if "call" in name else f"{ratio[name][0]:.2f}",
         ]
-        for name, own in took.items()
+        for name, lasted in took.items()
     ]
     return rows, table
 
@@ -79,11 +79,11 @@ def _timed(jobs: dict[str, tuple[Callable[[], Any], float]]) -> dict[str, np.nda
     for job, _ in jobs.values():
         job()
     seconds = np.empty((ROUNDS, len(jobs)))
-    for own in seconds:
+    for row in seconds:
         for j, (job, units) in enumerate(jobs.values()):
             start = time.process_time()
             job()
-            own[j] = (time.process_time() - start) / units
+            row[j] = (time.process_time() - start) / units
     return dict(zip(jobs, seconds.T, strict=True))
 
 

@@ -63,7 +63,7 @@ def sums(placed: Placed, wheel: str) -> tuple[float, float, float]:
 def on_one_plane(contact: Contact, placed: Placed) -> tuple[float, float, list[float]]:
     """The right wheel lowered on CONTACT's plane: mean place (mm), largest pressure (MPa), both patches' forces (N)."""
     side, (_, y, angle) = contact.side, PLANE
-    normal, pose = sum(one.normal for one in placed.right), _lowered(side, placed)
+    normal, pose = sum(touch.normal for touch in placed.right), _lowered(side, placed)
     place = np.array([-7e-3, y, float(side.rail.curve(y))])
     x, s = centres(140, CELL), 5e-3 + centres(180, CELL)
 
@@ -86,7 +86,7 @@ def apart(contact: Contact, placed: Placed) -> list[float]:
     side = contact.side
     touches = touches_of(side, _lowered(side, placed))[: len(placed.right)]
     away = abs(touches[0].patch.place - touches[1].patch.place)
-    vertical, cosines = sum(one.vertical for one in placed.right), [math.cos(touch.angle) for touch in touches]
+    vertical, cosines = sum(wheel.vertical for wheel in placed.right), [math.cos(touch.angle) for touch in touches]
 
     def pressed(approach: float) -> np.ndarray:
         forces = np.zeros(2)

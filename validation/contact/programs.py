@@ -64,7 +64,7 @@ def table(comparison: dict[str, Any]) -> Table:
     for key in ("approach", "area", "peak"):
         values = [100 * errors[key] for errors in comparison["normal"]]
         normal[key] = f"{min(values):+.1f} to {max(values):+.1f} %"
-    t = {name: np.array(own) for name, own in comparison["seconds"].items()}
+    t = {name: np.array(seconds) for name, seconds in comparison["seconds"].items()}
     both = t["1983"] + t["press"]
     rows = (
         ("goes in", "semi-axes, load, creepages, linear coefficients", "undeformed distance, load, creepages"),

@@ -83,7 +83,7 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
         done += [run for speed in SPEEDS[1:] for run in runs(speed, STEPS[speed])]
     explicit = done[0]
     implicit = [next(run for run in done if run.method == method) for method in METHODS]
-    found = [
+    judged = [
         Observed(
             f"contact_bridges.low-speed.{run.method}",
             SYSTEM,
@@ -111,8 +111,8 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
             said = "refused" if isinstance(error, Refused) else "raised"
         what = f"Exudyn at 0.1 m/s in steps of 1 ms, {method}, {name}"
         row = f"contact_bridges.low-speed.{name.replace(' ', '-')}"
-        found.append(behaves(row, SYSTEM, what, said, expected, why, "none"))
-    return found, done
+        judged.append(behaves(row, SYSTEM, what, said, expected, why, "none"))
+    return judged, done
 
 
 def table(saved: list[dict[str, Any]]) -> Table:

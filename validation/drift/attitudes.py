@@ -30,9 +30,9 @@ def cone(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rates, product(product(about, tilt), conjugate(about))
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def apart(first: np.ndarray, other: np.ndarray) -> float:
     """Largest angle (rad) between attitudes (..., 4)."""
-    return float(np.abs(logarithm(product(conjugate(one), other))).max())
+    return float(np.abs(logarithm(product(conjugate(first), other))).max())
 
 
 def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) -> np.ndarray:
@@ -43,8 +43,8 @@ def errors(rates: np.ndarray, period: float, deviation: np.ndarray, paths: int) 
     return error_rotation(np.concatenate(ends), true)
 
 
-def standard_errors(found: np.ndarray, law: np.ndarray) -> float:
+def standard_errors(attitudes: np.ndarray, law: np.ndarray) -> float:
     """Largest distance of an entry of the mean matrix of quaternions (n, 4) from its law, by its standard error."""
-    samples = matrix(found)
+    samples = matrix(attitudes)
     error = samples.std(axis=0, ddof=1) / math.sqrt(len(samples))
     return float((np.abs(samples.mean(axis=0) - law) / error).max())

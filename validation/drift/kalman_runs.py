@@ -47,9 +47,9 @@ def at_period(deviation: float, period: float) -> float:
 @cache
 def measured(folder: Path, duration: float, period: float) -> Result:
     """The virtual measurement on the study road, its files left in the folder; rows ``period`` (s) apart."""
-    found = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
-    write_measurement(found, folder, period)
-    return found.every(period)
+    path = simulate(road_scene(step=min(period, 1e-3) / 2, duration=duration), "reference")
+    write_measurement(path, folder, period)
+    return path.every(period)
 
 
 def force_deviation(true: Result) -> float:
@@ -93,24 +93,24 @@ def consistency(folder: Path, duration: float, seed: int, scales: dict[str, tupl
     states = free_run(replace(clean, initial=start), duration, COARSE)
     seen = states[:, 3] + angle * normal(seed, 0, len(states), 1, source=PITCH_SENSOR)[:, 0]
     noisy = assemble(driven(folder, duration, noise_of(force, seed)))
-    found = {}
+    figures = {}
     for name, (q, r) in scales.items():
-        own = Measurement(seen[:, None], COARSE, (PITCH,), (angle * np.sqrt(r),))
-        filtered = estimate(noisy, own, force * np.sqrt(q), start_deviation=START)
+        measurement = Measurement(seen[:, None], COARSE, (PITCH,), (angle * np.sqrt(r),))
+        filtered = estimate(noisy, measurement, force * np.sqrt(q), start_deviation=START)
         first = round(1 / COARSE)
-        found[name] = (nees(filtered, states), filtered.surprises[first:], filtered.innovations[first:])
-    return found
+        figures[name] = (nees(filtered, states), filtered.surprises[first:], filtered.innovations[first:])
+    return figures
 
 
 START = 0.02
 """Deviation (rad) of the start in the runs on consistency."""
 
 
-def nees(found: Estimate, states: np.ndarray) -> np.ndarray:
+def nees(estimated: Estimate, states: np.ndarray) -> np.ndarray:
     """Normalised error squared of the six states, once a second from the second one on."""
-    rows = np.arange(round(2 / found.period), len(states), round(1 / found.period))
-    wrong = (found.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]
-    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(found.errors()[rows, :6, :6], wrong))[:, 0, 0]
+    rows = np.arange(round(2 / estimated.period), len(states), round(1 / estimated.period))
+    wrong = (estimated.states[rows, :6] - states[rows] @ RELATIVE.T)[:, :, None]
+    return (wrong.transpose(0, 2, 1) @ np.linalg.solve(estimated.errors()[rows, :6, :6], wrong))[:, 0, 0]
 
 
 def closed_loop(folder: Path, deviation: float) -> tuple[np.ndarray, np.ndarray]:
@@ -176,12 +176,12 @@ def loop_errors(folder: Path, deviation: float, duration: float, seed: int) -> n
     write_wheel_forces(folder, np.full(count, p.k1 * start[0]), np.full(count, p.k2 * start[1]), COARSE)
     seen = start[3] + angle * normal(seed, 0, count, 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, COARSE)
-    own = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
+    effect = {"file": "read.csv", "force_deviation": deviation, "pitch_deviation": angle}
     noise = noise_of(deviation, seed)
-    drawn = driven(folder, duration, noise | {"kalman_filter": own}, geometry="linear")
+    drawn = driven(folder, duration, noise | {"kalman_filter": effect}, geometry="linear")
     run = free_run(assemble(drawn), duration, COARSE)
-    found = guide_of(assemble(driven(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"])
-    errors = np.hstack([found.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
+    guide = guide_of(assemble(driven(folder, duration, noise, geometry="linear")), drawn.effects["kalman_filter"])
+    errors = np.hstack([guide.states[:, :6] - RELATIVE @ start, (run - start) @ RELATIVE.T])
     return errors[round(2 / COARSE) :]
 
 
@@ -205,8 +205,8 @@ def stabilised(
     seen = true["pitch"] + ANGLE * normal(seed, 0, len(true.times), 1, source=PITCH_SENSOR)[:, 0]
     write_time_series(folder / "read.csv", {"pitch": ("rad", seen)}, 1e-3)
     force = force_deviation(true)
-    own = {"file": "read.csv", "force_deviation": force, "pitch_deviation": ANGLE, "inertia_deviation": INERTIA}
-    scene = driven(folder, duration, noise_of(force, seed) | {"kalman_filter": own}, wrong=wrong)
+    effect = {"file": "read.csv", "force_deviation": force, "pitch_deviation": ANGLE, "inertia_deviation": INERTIA}
+    scene = driven(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}, wrong=wrong)
     return {engine: _scored(true, simulate(scene, engine)) for engine in engines}
 
 
@@ -215,17 +215,17 @@ INERTIA = 0.05
 
 
 def _scored(true: Result, run: Result) -> dict[str, float]:
-    wanted, had = (section_forces(one["f3"], one["f4"], one["pitch"]) for one in (true, run))
-    found = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
+    wanted, had = (section_forces(each["f3"], each["f4"], each["pitch"]) for each in (true, run))
+    scores = {name: damage_ratio(had[name], wanted[name]) for name in CHANNELS}
     term = PARAMETERS.I * np.gradient(true["pitch_rate"], true.times)
     moments = {"pull": run["kalman_moment"], "all": run["kalman_moment"] + run["inertia_moment"]}
     low = butter(4, BAND, fs=1 / float(true.times[1]), output="sos")
     for name, moment in moments.items():
-        found[name] = rms(moment) / rms(term)
-        found[f"{name}, band"] = rms(sosfiltfilt(low, moment)) / rms(sosfiltfilt(low, term))
-    found["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
-    found["inertia"] = float(run["inertia_share"][-1])
-    return found
+        scores[name] = rms(moment) / rms(term)
+        scores[f"{name}, band"] = rms(sosfiltfilt(low, moment)) / rms(sosfiltfilt(low, term))
+    scores["pitch"] = float(np.abs(run["pitch"] - true["pitch"]).max())
+    scores["inertia"] = float(run["inertia_share"][-1])
+    return scores
 
 
 def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
@@ -241,14 +241,14 @@ def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
     assembly = assemble(driven(folder, duration, noise_of(force, seed)))
     clean = true.states
     seen = clean[:, 7] + gyro * normal(seed, 0, len(clean), 1, source=PITCH_SENSOR)[:, 0]
-    found = estimate(assembly, Measurement(seen[:, None], COARSE, (RATE,), (gyro,)), force)
-    p, sure = assembly.parameters, np.sqrt(found.errors()[:, PITCH, PITCH])
+    estimated = estimate(assembly, Measurement(seen[:, None], COARSE, (RATE,), (gyro,)), force)
+    p, sure = assembly.parameters, np.sqrt(estimated.errors()[:, PITCH, PITCH])
     inertia = p.I + p.m1 * p.b**2 + p.m2 * p.a**2
     growth = rms(true["pitch_rate"]) * np.sqrt(p.I / inertia)
     push = (force**2 * COARSE * (p.a**2 + p.b**2)) / inertia**2
     model, see = np.array([[0.0, 1.0], [growth**2, 0.0]]), np.array([[0.0, 1.0]])
     law = control.care(model.T, see.T, np.diag([0.0, push]), np.array([[gyro**2 * COARSE]]))[0]
-    wrong = found.states[len(clean) // 6 :, PITCH] - clean[len(clean) // 6 :, 3]
+    wrong = estimated.states[len(clean) // 6 :, PITCH] - clean[len(clean) // 6 :, 3]
     return {
         "stated": float(sure[-1]),
         "law": float(np.sqrt(law[0, 0])),
@@ -275,13 +275,13 @@ def with_gaps(
         lost[round(outage[0] / COARSE) : round(outage[1] / COARSE)] = True
     names = {PITCH: ("pitch", "rad", 3, "pitch_deviation"), RATE: ("pitch_rate", "rad/s", 7, "rate_deviation")}
     table, force = {}, at_period(force_deviation(true), COARSE)
-    own: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
+    effect: dict[str, Any] = {"file": "read.csv", "force_deviation": force}
     for i, column in enumerate(columns):
         name, unit, state, key = names[column]
         table[name] = (unit, np.where(lost, np.nan, clean[:, state] + deviations[column] * noise[:, i]))
-        own[key] = deviations[column]
+        effect[key] = deviations[column]
     write_time_series(folder / "read.csv", table, COARSE)
-    run = simulate(driven(folder, duration, noise_of(force, seed) | {"kalman_filter": own}), "reference")
+    run = simulate(driven(folder, duration, noise_of(force, seed) | {"kalman_filter": effect}), "reference")
     every = round(COARSE / 1e-3)
     wrong = run["pitch_estimate"][::every] - clean[:, 3]
     sure = run["pitch_deviation"][::every]

@@ -46,9 +46,9 @@ def _read(
         effects={"accelerometers": {"sampling_rate": 1 / PERIOD, "sensors": sensors, "deviation": noise}},
     )
     assembly = base if initial is None else driven(base, Sampled(np.zeros((400, 2)), PERIOD, held=True))
-    own = settings(engine, PERIOD, 0.3)
-    model = build(engine, assembly, own)
-    run = simulate(assembly.scene, engine, own, assembly)
+    engine_settings = settings(engine, PERIOD, 0.3)
+    model = build(engine, assembly, engine_settings)
+    run = simulate(assembly.scene, engine, engine_settings, assembly)
     felt = readings_of(run, assembly.scene.effects["accelerometers"])
     true = np.array([model.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
     return felt, run.states, true
@@ -70,8 +70,8 @@ def _plain(places: dict[str, Any], felt: np.ndarray) -> np.ndarray:
 def plane(engine: str, folder: Path) -> float:
     """Sensors on a flat floor; the pitch axis lies in their plane."""
     felt, states, true = _read(engine, FLOOR)
-    found = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
-    return largest(found - true) / largest(true)
+    computed = angular_acceleration(spin(sensor_array(FLOOR), felt), _turning(states))[:, 1]
+    return largest(computed - true) / largest(true)
 
 
 def plane_naive(folder: Path) -> str:
@@ -85,9 +85,9 @@ def nearly_plane(engine: str, folder: Path) -> float:
     """The fifth sensor 3 cm above the others, and noise: of what the noise of the readings must leave."""
     felt, states, true = _read(engine, LIFTED, noise=NOISE)
     array = sensor_array(LIFTED)
-    found = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
+    computed = angular_acceleration(spin(array, felt), _turning(states))[:, 1]
     least = array.gains(planar=True)[1]
-    return rms(found - true) / (NOISE * least)
+    return rms(computed - true) / (NOISE * least)
 
 
 def nearly_plane_naive(folder: Path) -> str:
@@ -104,8 +104,8 @@ def bracket(engine: str, folder: Path) -> float:
     loose = quality(sensor_array(places), felt).suspect
     keep = [name != loose for name in places]
     rest = sensor_array({name: place for name, place in places.items() if name != loose})
-    found = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
-    return largest(found - true) / largest(true)
+    computed = angular_acceleration(spin(rest, felt[:, keep]), _turning(states))[:, 1]
+    return largest(computed - true) / largest(true)
 
 
 def bracket_naive(folder: Path) -> str:
@@ -141,9 +141,9 @@ def _falling(engine: str, pitch: float, rate: float) -> tuple[np.ndarray, np.nda
 def tumbling(engine: str, folder: Path) -> float:
     """The nose passes through the vertical: the orientation as a matrix."""
     felt, states, start = _falling(engine, 1.4, 3.0)
-    found = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
+    orientation = motion(sensor_array(ROOFED), felt, PERIOD, start).orientation
     none = np.zeros(len(states))
-    return largest(matrix(found) - matrix(from_cardan(none, states[:, 3], none)))
+    return largest(matrix(orientation) - matrix(from_cardan(none, states[:, 3], none)))
 
 
 def locked(engine: str, folder: Path) -> float:

@@ -36,10 +36,10 @@ def wheelset(speed: float = 60.0, yaw: float = 0.0, **changed: float) -> Callabl
     """A case of a wheelset that is let go 5 mm beside the middle, for a fifth of a second in the usual steps."""
 
     def error(implementation: str, folder: Path) -> float:
-        own = built(implementation, CHOSEN.changed(**changed), speed)
-        start = own.displaced(5e-3)
+        wheelset = built(implementation, CHOSEN.changed(**changed), speed)
+        start = wheelset.displaced(5e-3)
         start[3] = yaw
-        ends = [own.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
+        ends = [wheelset.run(start, 0.2, step).states[-1] for step in (STEP, STEP / 4.0)]
         return float(np.abs(ends[1] - ends[0])[[0, 3]].max())
 
     return error
@@ -93,10 +93,10 @@ def driven_over_waves(implementation: str, folder: Path) -> float:
     if implementation == "reference":
         raise InputError("", "engine", implementation, "handling is marched by engines")
     told = run(car(speed=1000.0, rough=True), implementation, error=True)
-    name, one = max(errors_of(told).items(), key=lambda each: each[1].share)
+    name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
     fine = principal(run(car(1e-4, speed=1000.0, rough=True), implementation).detail).channels[name][::10]
     off = principal(told.detail).channels[name] - fine
-    return float(np.sqrt(np.mean(off**2))) / one.error if one.warned else np.inf
+    return float(np.sqrt(np.mean(off**2))) / estimate.error if estimate.warned else np.inf
 
 
 def crossings(implementation: str, folder: Path) -> float:
@@ -123,8 +123,8 @@ def slow_naive(folder: Path) -> str:
     from scipy.signal import butter, sosfiltfilt
 
     line = np.linspace(0.0, 1.0, 2001)
-    found = sosfiltfilt(butter(4, 0.01 / 500.0, output="sos"), line, padlen=2000)
-    return f"a line from 0 to 1 comes out with an error of {np.abs(found - line).max():.2g}"
+    filtered = sosfiltfilt(butter(4, 0.01 / 500.0, output="sos"), line, padlen=2000)
+    return f"a line from 0 to 1 comes out with an error of {np.abs(filtered - line).max():.2g}"
 
 
 LINE = np.arange(5.0)[:, None]

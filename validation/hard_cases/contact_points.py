@@ -16,10 +16,10 @@ STEPS = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
 LOAD = 1000.0
 
 
-def _compressions(assembly: Assembly, found: Trajectory) -> np.ndarray:
+def _compressions(assembly: Assembly, path: Trajectory) -> np.ndarray:
     """Tyre compression (n, 2) in m along a run."""
-    channels = contact_points(assembly, found.times, found.states)
-    return found.states[:, :2] - np.column_stack([channels["zeta1"][2], channels["zeta2"][2]])
+    channels = contact_points(assembly, path.times, path.states)
+    return path.states[:, :2] - np.column_stack([channels["zeta1"][2], channels["zeta2"][2]])
 
 
 def step_answer(engine: str, folder: Path) -> float:
@@ -31,12 +31,12 @@ def step_answer(engine: str, folder: Path) -> float:
     for step in STEPS:
         assembly = driven(base, Sampled(values, 2e-2, held=True))
         if engine == "exudyn":  # its implicit integrators refuse held samples
-            found = run(engine, assembly, min(step, 2e-3), 0.1)
+            path = run(engine, assembly, min(step, 2e-3), 0.1)
         else:
-            found = run(engine, assembly, step, 0.1, IMPLICIT[engine])
-        since = np.maximum(found.times - 2e-2, 0.0)
+            path = run(engine, assembly, step, 0.1, IMPLICIT[engine])
+        since = np.maximum(path.times - 2e-2, 0.0)
         truth = -LOAD / p.k1 * np.expm1(-since * p.k1 / p.d1)
-        worst = max(worst, largest(_compressions(assembly, found)[:, 0] - truth) / (LOAD / p.k1))
+        worst = max(worst, largest(_compressions(assembly, path)[:, 0] - truth) / (LOAD / p.k1))
     return worst
 
 
@@ -65,18 +65,18 @@ def _ramp_error(engine: str, step: float, integrator: str) -> float:
     """Largest difference to the ramp's closed form at each row's own time, of f/k."""
     base, rising = vehicle(), LOAD * np.minimum(np.arange(6.0), 1.0)[:, None] * np.ones(2)
     assembly, p = driven(base, Sampled(rising, 2e-2, held=False)), base.parameters
-    found = run(engine, assembly, step, 0.1, integrator)
-    return largest(_compressions(assembly, found)[:, 0] - _ramp(found.times, p.k1, p.d1)) / (LOAD / p.k1)
+    path = run(engine, assembly, step, 0.1, integrator)
+    return largest(_compressions(assembly, path)[:, 0] - _ramp(path.times, p.k1, p.d1)) / (LOAD / p.k1)
 
 
 def _ramp(times: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
     """Compression (n,) under a load that rises to LOAD in 20 ms: two ramps, one of them late."""
     lag = damping / stiffness
 
-    def one(t: np.ndarray) -> np.ndarray:
+    def ramp(t: np.ndarray) -> np.ndarray:
         return np.where(t > 0, t + lag * np.expm1(-np.maximum(t, 0) / lag), 0.0)
 
-    return LOAD / stiffness / 2e-2 * (one(times) - one(times - 2e-2))
+    return LOAD / stiffness / 2e-2 * (ramp(times) - ramp(times - 2e-2))
 
 
 def stamps(engine: str, folder: Path) -> float:
@@ -89,9 +89,9 @@ def undamped(engine: str, folder: Path) -> float:
     base = vehicle(d1=0.0, d2=0.0)
     values = LOAD * np.random.default_rng(4).standard_normal((100, 2))
     assembly = driven(base, Sampled(values, 1e-3, held=True))
-    found = run(engine, assembly, 1e-3, 0.1)
+    path = run(engine, assembly, 1e-3, 0.1)
     stiffness = base.parameters.k1
-    return largest(_compressions(assembly, found)[:100] - values / stiffness) / (LOAD / stiffness)
+    return largest(_compressions(assembly, path)[:100] - values / stiffness) / (LOAD / stiffness)
 
 
 CASES = (

@@ -32,8 +32,8 @@ def held_noise(engine: str, folder: Path) -> float:
             values = np.zeros((SAMPLES, 2))
             values[sample, wheel] = 1.0
             responses.append(setups.run(engine, _base(values), STEP, PERIOD * SAMPLES).states[-1] - quiet)
-    found, expected = np.array(responses).T @ np.array(responses), _recursion()
-    return setups.largest(found - expected) / setups.largest(expected)
+    covariance, expected = np.array(responses).T @ np.array(responses), _recursion()
+    return setups.largest(covariance - expected) / setups.largest(expected)
 
 
 def _recursion() -> np.ndarray:
@@ -52,14 +52,14 @@ def van_loan_naive(folder: Path) -> str:
     p, linear = base.parameters, linearised(base.vehicle)
     pushes = np.zeros((8, 2))
     pushes[4, 0], pushes[5, 1] = -1 / p.m1, -1 / p.m2
-    found = []
+    smallest = []
     with np.errstate(all="ignore"):
         for length in (PERIOD, 20 * PERIOD):
             noise = van_loan_discretization(first_order(linear), pushes, length)[1]
-            found.append(float(np.linalg.eigvalsh(0.5 * (noise + noise.T)).min() / np.abs(noise).max()))
+            smallest.append(float(np.linalg.eigvalsh(0.5 * (noise + noise.T)).min() / np.abs(noise).max()))
     return (
-        f"filterpy's van Loan gives a covariance with a negative eigenvalue of {found[0]:.0e} of its size over "
-        f"{PERIOD:g} s and {found[1]:.0e} over {20 * PERIOD:g} s, without a word"
+        f"filterpy's van Loan gives a covariance with a negative eigenvalue of {smallest[0]:.0e} of its size over "
+        f"{PERIOD:g} s and {smallest[1]:.0e} over {20 * PERIOD:g} s, without a word"
     )
 
 

@@ -50,23 +50,23 @@ def figures(run: Result, truth: Result, scene: Scene) -> tuple[Own, Errors]:
 
 def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
     """The verdicts with the truth and without it."""
-    own, wrong = figures(simulate(scene, engine), truth, scene)
-    known = blind_verdict(own, scene.effects, DURATION, Limits())
-    return verdict(own, wrong, scene.effects, Limits()).word, known.word
+    scores, wrong = figures(simulate(scene, engine), truth, scene)
+    known = blind_verdict(scores, scene.effects, DURATION, Limits())
+    return verdict(scores, wrong, scene.effects, Limits()).word, known.word
 
 
 def tumbled(engine: str, folder: Path) -> float:
     """A free run that has turned over."""
-    found = words(engine, follow(folder, measured(), tilt=TILT), measured())
-    return float(found != ("rejected", "rejected"))
+    judged = words(engine, follow(folder, measured(), tilt=TILT), measured())
+    return float(judged != ("rejected", "rejected"))
 
 
 def tumbled_naive(folder: Path) -> str:
     """What its vertical forces say."""
     scene = follow(folder, measured(), tilt=TILT)
-    own, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
-        f"at a pitch of {own.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
+        f"at a pitch of {scores.pitch_max:.1f} rad its vertical f3 does {wrong.vertical_damage['f3']:.3f} times the "
         f"true damage, its f3 along the chassis {wrong.damage['f3x']:.0e} times"
     )
 
@@ -83,25 +83,25 @@ def soft(engine: str, folder: Path) -> float:
 def soft_naive(folder: Path) -> str:
     """What the run itself shows."""
     scene = follow(folder, measured(), SPRING, TILT)
-    own, wrong = figures(simulate(scene, "reference"), measured(), scene)
+    scores, wrong = figures(simulate(scene, "reference"), measured(), scene)
     return (
-        f"its artificial moment is {own.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
+        f"its artificial moment is {scores.moment_share_band:.1%} of I pitch'' and its vertical f3 does "
         f"{wrong.vertical_damage['f3']:.3f} times the true damage; its pitch is {wrong.pitch_max:.2f} rad wrong"
     )
 
 
 def graded(engine: str, folder: Path) -> float:
     """A spring on a grade: wrong, and never called right without the truth."""
-    found = words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
-    return float(found != ("rejected", "stabilise"))
+    judged = words(engine, follow(folder, measured(0.1), FIRM), measured(0.1))
+    return float(judged != ("rejected", "stabilise"))
 
 
 def graded_naive(folder: Path) -> str:
     """What the run itself shows."""
     scene = follow(folder, measured(0.1), FIRM)
-    own, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
+    scores, wrong = figures(simulate(scene, "reference"), measured(0.1), scene)
     return (
-        f"its artificial moment is {own.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
+        f"its artificial moment is {scores.moment_share_band:.1%} of I pitch''; its pitch is {wrong.pitch_max:.2f} "
         f"rad wrong, f3 along the chassis does {wrong.damage['f3x']:.2f} times the true damage"
     )
 
@@ -124,8 +124,8 @@ def broken_load_naive(folder: Path) -> str:
 
     load = _walk().copy()
     load[250] = np.nan
-    found = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
-    return f"rainflow alone finds {found / pseudo_damage(_walk()):.2g} times the damage of the whole load"
+    damage = sum(count * span**5 for span, _, count, _, _ in extract_cycles(load.tolist()))
+    return f"rainflow alone finds {damage / pseudo_damage(_walk()):.2g} times the damage of the whole load"
 
 
 def empty_load(engine: str, folder: Path) -> float:
@@ -170,9 +170,9 @@ def before_drift(engine: str, folder: Path) -> float:
     """Difference to another implementation under the same noise, up to the drift-off, of the largest state."""
     scene = follow(folder, measured(), {"force_noise": {"deviation": HEAVY}})
     other = "mujoco" if engine == "reference" else "reference"
-    one, two = (simulate(scene, name) for name in (engine, other))
-    held = slice(None, _off(one, measured()))
-    return largest(one.states[held] - two.states[held]) / largest(two.states[held])
+    first, two = (simulate(scene, name) for name in (engine, other))
+    held = slice(None, _off(first, measured()))
+    return largest(first.states[held] - two.states[held]) / largest(two.states[held])
 
 
 def _off(run: Result, truth: Result) -> int | None:

@@ -46,9 +46,9 @@ def _undamped() -> tuple[Assembly, np.ndarray]:
 def undamped_naive(folder: Path) -> str:
     """Explicit Euler past the check: every mode grows."""
     base, truth = _undamped()
-    found = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
+    states = unchecked("exudyn", base, 1e-3, 1.0, "ExplicitEuler").states
     return (
-        f"Exudyn's explicit Euler past the check: {largest(found - base.initial):.2g} where the truth "
+        f"Exudyn's explicit Euler past the check: {largest(states - base.initial):.2g} where the truth "
         f"stays below {largest(truth - base.initial):.2g}, finite and unwarned"
     )
 

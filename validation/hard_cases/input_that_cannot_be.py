@@ -67,11 +67,11 @@ def words(change: Change) -> list[str]:
         Signal(axle, "forces.csv", axle, "force", axle, "z", "inertial", 1, "N", 1.0) for axle in ("front", "rear")
     )
     forces = np.ascontiguousarray(change(true()))
-    found = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
-    errors = [each.text for each in found if each.weight == "error"]
+    findings = check(AxleForces(forces, PERIOD, TWIN, ((front,), (rear,)), DURATION, IN_FILE))
+    errors = [each.text for each in findings if each.weight == "error"]
     if errors:
         raise InputError("forces.csv", "", None, " ".join(errors))
-    return [each.text for each in found if each.weight == "doubt"]
+    return [each.text for each in findings if each.weight == "doubt"]
 
 
 def _forces(change: Change, doubted: bool, _: str, folder: Path) -> float:

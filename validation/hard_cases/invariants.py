@@ -42,11 +42,11 @@ def down(engine: str, folder: Path) -> float:
     for parameters in VEHICLES:
         base = vehicle(parameters)
         p = base.parameters
-        found = simulate(base.scene, engine, settings(engine, 1e-3, 0.1), base)
+        path = simulate(base.scene, engine, settings(engine, 1e-3, 0.1), base)
         front = (p.m3 * p.a / (p.a + p.b) + p.m1) * G
         rear = (p.m3 * p.b / (p.a + p.b) + p.m2) * G
         for name, load in (("f1", front), ("f2", rear)):
-            worst = max(worst, largest(found[name] - load))
+            worst = max(worst, largest(path[name] - load))
     return worst
 
 
@@ -55,12 +55,12 @@ def nose_up(engine: str, folder: Path) -> float:
     base, tilt = vehicle("asymmetric_twin", "linear"), 0.01
     p, state = base.parameters, base.initial.copy()
     state[3] += tilt
-    found = build(engine, base, settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
+    acceleration = build(engine, base, settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
     front, rear = -p.k3 * p.b * tilt, p.k4 * p.a * tilt  # the front strut is pulled, the rear one pressed
     hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
-    if not (found[0] < 0 < found[1] and found[3] < 0):
+    if not (acceleration[0] < 0 < acceleration[1] and acceleration[3] < 0):
         return np.inf
-    return largest(found - hand) / largest(hand)
+    return largest(acceleration - hand) / largest(hand)
 
 
 def push(engine: str, folder: Path) -> float:
@@ -112,9 +112,9 @@ def free_heave(engine: str, folder: Path) -> float:
     model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
-        found = model.acceleration(2 * i * 1e-3, state)[:3]
+        acceleration = model.acceleration(2 * i * 1e-3, state)[:3]
         wanted = p.g - forces.values[2 * i].sum() / masses.sum()
-        worst, size = max(worst, abs(found @ masses / masses.sum() - wanted)), max(size, largest(found))
+        worst, size = max(worst, abs(acceleration @ masses / masses.sum() - wanted)), max(size, largest(acceleration))
     return worst / size
 
 
@@ -133,11 +133,11 @@ def _tumbled() -> np.ndarray:
 
 def tumbling(engine: str, folder: Path) -> float:
     """Over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
-    found = run(engine, _spun("exact"), 2.5e-4, 1.0).states
+    states = run(engine, _spun("exact"), 2.5e-4, 1.0).states
     truth = _tumbled()
     if truth[:, 3].max() < np.pi / 2:
         return np.inf
-    return largest(found - truth)
+    return largest(states - truth)
 
 
 def tumbling_naive(folder: Path) -> str:

@@ -27,7 +27,7 @@ SLOW = 0.1
 """s between force samples that are 70 time constants of the wheels apart."""
 
 
-def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any) -> float:
+def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **options: Any) -> float:
     """Largest pitch error by its stated deviation of a vehicle at rest, its pitch unknown in the ``lost`` samples.
 
     The filter starts from a pitch that is ``turn`` (rad) wrong.
@@ -49,7 +49,7 @@ def _drawn(engine: str, folder: Path, lost: slice, turn: float = 0.0, **own: Any
             "effects": {
                 "wheel_forces": {"file": "wheel_forces.csv", "interpolation": "linear"},
                 "force_noise": {"deviation": FORCE, "seed": 7},
-                "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **own},
+                "kalman_filter": {"file": "pitch.csv", "force_deviation": FORCE, "pitch_deviation": ANGLE, **options},
             },
         },
         "kalman",
@@ -68,10 +68,10 @@ def outage(engine: str, folder: Path) -> float:
 
 def outage_naive(folder: Path) -> str:
     """The filter's own update with a value that is not a number."""
-    own = ExtendedKalmanFilter(2, 1)
-    own.x = np.zeros(2)
-    own.update(np.array([np.nan]), lambda x: np.eye(2)[:1], lambda x: x[:1])
-    return f"filterpy takes the NaN in without a word: its state is {own.x[0]} for ever after"
+    kalman = ExtendedKalmanFilter(2, 1)
+    kalman.x = np.zeros(2)
+    kalman.update(np.array([np.nan]), lambda x: np.eye(2)[:1], lambda x: x[:1])
+    return f"filterpy takes the NaN in without a word: its state is {kalman.x[0]} for ever after"
 
 
 def wrong_start(engine: str, folder: Path) -> float:
@@ -84,18 +84,21 @@ def sure(engine: str, folder: Path) -> float:
     count, exact = 400, 1e-9
     base = vehicle()
     forces = static_forces(base, count + 1, PERIOD, held=False)
-    own = driven(base, forces)
-    own = replace(
-        own, scene=own.scene.model_copy(update={"run": own.scene.run.model_copy(update={"duration": count * PERIOD})})
+    assembly = driven(base, forces)
+    assembly = replace(
+        assembly,
+        scene=assembly.scene.model_copy(
+            update={"run": assembly.scene.run.model_copy(update={"duration": count * PERIOD})}
+        ),
     )
     seen = base.initial[3] + exact * normal(7, 0, count + 1, 1, source=PITCH_SENSOR)
-    found = estimate(own, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
-    P = found.errors()
+    estimated = estimate(assembly, Measurement(seen, PERIOD, (PITCH,), (exact,)), FORCE, start_deviation=1.0)
+    P = estimated.errors()
     scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2).clip(1e-300))
     values = np.linalg.eigvalsh(P / (scale[:, :, None] * scale[:, None, :]))
     if not np.isfinite(values).all() or values.min() < -1e-6:
         return np.inf
-    off = found.states[1:, PITCH] - base.initial[3]
+    off = estimated.states[1:, PITCH] - base.initial[3]
     return float(np.abs(off / np.sqrt(P[1:, PITCH, PITCH])).max())
 
 

@@ -51,10 +51,10 @@ def exactly(step: float = STEP, start: np.ndarray = FALLING, **override: float) 
 
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(start, "linear", override)
-        found = setups.run(engine, assembly, step, LASTING).states
+        states = setups.run(engine, assembly, step, LASTING).states
         every = max(1, round(step / STEP))
-        exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(found) - 1))
-        return setups.largest(found - exact[::every])
+        exact = Bounces(assembly, STEP if every > 1 else step).path(assembly.initial, every * (len(states) - 1))
+        return setups.largest(states - exact[::every])
 
     return error
 
@@ -65,8 +65,10 @@ def gained(**override: float) -> Error:
     def error(engine: str, folder: Path) -> float:
         assembly = vehicle(FALLING, "exact", override)
         states = setups.run(engine, assembly, STEP, LASTING).states
-        own = energy(assembly, states)
-        return float((own - np.minimum.accumulate(own)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2))
+        energies = energy(assembly, states)
+        return float(
+            (energies - np.minimum.accumulate(energies)).max() / np.ptp(states[:, 6] ** 2 * assembly.parameters.m3 / 2)
+        )
 
     return error
 
@@ -101,9 +103,9 @@ def on_road(scene: dict[str, Any], folder: Path, step: float, duration: float) -
 
 def beside_tight(engine: str, assembly: Assembly, step: float, duration: float) -> float:
     """Largest error of a run beside the solution at tight tolerance; infinite if no wheel left the road."""
-    found, exact = setups.run(engine, assembly, step, duration).states, setups.tight(assembly, step, duration).states
+    states, exact = setups.run(engine, assembly, step, duration).states, setups.tight(assembly, step, duration).states
     air = exact[:, 0] < _heights(assembly.input, step, len(exact))
-    return setups.largest(found - exact) if air.any() else np.inf
+    return setups.largest(states - exact) if air.any() else np.inf
 
 
 def _heights(road: Signal | None, step: float, count: int) -> np.ndarray:

@@ -26,7 +26,7 @@ def cut_number(folder: Path) -> str:
 
 def invalid_samples(folder: Path) -> str:
     """What asammdf makes of samples marked as invalid."""
-    path = next(one for one in mdf4.FILES if one.name == "MDF 4 with invalid samples").make(folder)
+    path = next(each for each in mdf4.FILES if each.name == "MDF 4 with invalid samples").make(folder)
     with mdf4_opened(path) as file:
         samples = file.get(group=0, index=1, samples_only=True, data=next(file._mdf._load_data(file.groups[0])))[0]
     return f"asammdf hands over {len(samples)} of {len(FZ)} samples of a block, those after a gap moved up"

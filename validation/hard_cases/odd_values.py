@@ -87,20 +87,20 @@ def slender(a: float, b: float) -> Callable[[str, Path], float]:
 
 def tiny_noise(implementation: str, folder: Path) -> float:
     """Times to an angle for noise and angle that are both smaller: the same time, over 300 decades."""
-    own = drift_off_time(0.3, 1e-5, 1e-3)
+    off_time = drift_off_time(0.3, 1e-5, 1e-3)
     scaled = [drift_off_time(0.3, 1e-5 * s * s, 1e-3 * s) for s in (1e-145, 1e-100, 1e145)]
-    return float(np.abs(np.array(scaled) / own - 1.0).max())
+    return float(np.abs(np.array(scaled) / off_time - 1.0).max())
 
 
 def sure(implementation: str, folder: Path) -> float:
     """A filter of tilts told of angles and rates to 1e-12, forces to 1 and to 8 N: its deviations, by those told."""
     vehicle, angles = cut(load_vehicle("r19_free"), "body"), Angles(np.zeros((5000, 4)), 2e-3)
     forces = HubForces(np.zeros((5000, 6 * len(vehicle.hubs))), 2e-3, "hub")
-    found = [
+    fits = [
         estimate(vehicle, forces, angles, Deviations(np.full(forces.samples.shape[1], noise), (1e-12, 1e-12), 10.0))
         for noise in (1.0, 8.0)
     ]
-    return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in found)
+    return max(float(np.nan_to_num(each.deviations / 1e-12, nan=np.inf).max()) for each in fits)
 
 
 def flipped(implementation: str, folder: Path) -> float:
@@ -115,14 +115,14 @@ def flipped(implementation: str, folder: Path) -> float:
 
 def spiked() -> Any:
     """A rail of which one point was measured 1 mm too low."""
-    own = built_in("UIC60")
-    return profile(own.y, own.z + 1e-3 * (np.arange(own.z.size) == own.z.size // 2))
+    rail = built_in("UIC60")
+    return profile(rail.y, rail.z + 1e-3 * (np.arange(rail.z.size) == rail.z.size // 2))
 
 
 def rounded() -> Any:
     """A rail whose points were written to 0.1 mm, so that its steep sides turn back from point to point."""
-    own = built_in("UIC60")
-    return profile(own.y.round(4), own.z.round(4))
+    rail = built_in("UIC60")
+    return profile(rail.y.round(4), rail.z.round(4))
 
 
 MASKED = np.ma.array([0.0, 100.0, 0.0, 1.0, 0.0], mask=np.arange(5) == 1)

@@ -78,21 +78,21 @@ def truth(period: float = PERIOD, noise: float = 0.0) -> np.ndarray:
     return moment
 
 
-def moment_error(found: Trajectory, wanted: np.ndarray) -> float:
+def moment_error(path: Trajectory, wanted: np.ndarray) -> float:
     """Rms difference of the enforced moment in N m, from 20 ms on.
 
     Before, generalised-alpha forgets that its start has the right acceleration but not the right change of
     it: 6 N m that shrink by 0.6 per step, which the enforced-moment case shows on its own.
     """
-    assert found.moment is not None
-    every = (len(found.moment) - 1) // (len(wanted) - 1)
-    return rms((found.moment[::every] - wanted)[20:])
+    assert path.moment is not None
+    every = (len(path.moment) - 1) // (len(wanted) - 1)
+    return rms((path.moment[::every] - wanted)[20:])
 
 
 def recommended(engine: str, folder: Path) -> float:
     """The enforced moment at 1 ms with the recommended settings."""
-    found = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine])
-    return moment_error(found, truth()) / rms(truth())
+    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine])
+    return moment_error(path, truth()) / rms(truth())
 
 
 def soft_naive(folder: Path) -> str:
@@ -125,8 +125,8 @@ def _soft_error(step: float) -> float:
 
 def undamped_multiplier(engine: str, folder: Path) -> float:
     """Generalised-alpha with spectral radius 1; the others eliminate the pitch and have no such setting."""
-    found = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine], spectral_radius=1.0)
-    return moment_error(found, truth()) / rms(truth())
+    path = run(engine, scene(), 1e-3, DURATION, CONSTRAINED[engine], spectral_radius=1.0)
+    return moment_error(path, truth()) / rms(truth())
 
 
 class AsItComes(exudyn_engine.ExudynModel):
@@ -160,11 +160,11 @@ def undamped_multiplier_naive(folder: Path) -> str:
     """Exudyn past the check and with its own start, late in the run."""
     parts = []
     for name, radius in (("GeneralizedAlpha", 1.0), ("TrapezoidalIndex2", 0.6)):
-        own = settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
-        found = Inconsistent(scene(), own).run()
-        assert found.moment is not None
-        late = (found.moment - truth())[-100:]
-        heave = largest((found.states - solution().states)[-100:, :4])
+        engine_settings = settings("exudyn", 1e-3, DURATION, name, spectral_radius=radius)
+        path = Inconsistent(scene(), engine_settings).run()
+        assert path.moment is not None
+        late = (path.moment - truth())[-100:]
+        heave = largest((path.states - solution().states)[-100:, :4])
         parts.append(f"{name} by {rms(late):.0f} N m (states by {heave:.0e})")
     return f"moment of {rms(truth()):.0f} N m off over the last 0.1 s: {', '.join(parts)}"
 
@@ -180,8 +180,8 @@ def noisy_fine(engine: str, folder: Path) -> float:
 
 
 def _noisy(engine: str, step: float) -> float:
-    found = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED[engine])
-    return moment_error(found, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
+    path = run(engine, scene(noise=NOISE), step, DURATION, CONSTRAINED[engine])
+    return moment_error(path, truth()) / (vehicle().parameters.I * NOISE * np.sqrt(6) / PERIOD**2)
 
 
 def noisy_naive(folder: Path) -> str:
@@ -189,10 +189,10 @@ def noisy_naive(folder: Path) -> str:
     base = vehicle()
     samples = angle(PERIOD * np.arange(501)) + NOISE * np.random.default_rng(5).standard_normal(501)
     assembly = setups.guided(_settled(base), _weight(), Straight(samples, PERIOD))
-    found = as_it_comes(assembly, 1e-3)
+    path = as_it_comes(assembly, 1e-3)
     expected = base.parameters.I * NOISE * np.sqrt(6) / PERIOD**2
     return (
-        f"Exudyn's default on straight lines: {moment_error(found, truth()) / 1e3:.0f} kN m, "
+        f"Exudyn's default on straight lines: {moment_error(path, truth()) / 1e3:.0f} kN m, "
         f"finite differences would give {expected / 1e3:.1f}"
     )
 
@@ -245,16 +245,16 @@ def refined_naive(folder: Path) -> str:
 
 def explicit(engine: str, folder: Path) -> float:
     """The explicit fourth-order solver of each engine."""
-    found = run(engine, scene(), 1e-3, DURATION)
-    return moment_error(found, truth()) / rms(truth())
+    path = run(engine, scene(), 1e-3, DURATION)
+    return moment_error(path, truth()) / rms(truth())
 
 
 def explicit_naive(folder: Path) -> str:
     """Exudyn's explicit solver with the constraint in it, past the check."""
-    found = as_it_comes(scene(), 1e-3, "RK44")
-    assert found.moment is not None
-    off = largest(found.states[:, 3] - angle(found.times))
-    moment = largest(found.moment[1:])
+    path = as_it_comes(scene(), 1e-3, "RK44")
+    assert path.moment is not None
+    off = largest(path.states[:, 3] - angle(path.times))
+    moment = largest(path.moment[1:])
     return f"Exudyn RK44 ends without a word: moment {moment:.1f} N m, pitch off by {off:.3f} rad"
 
 
@@ -266,26 +266,26 @@ def fed_back(engine: str, folder: Path) -> float:
     free = tight(driven(base, forces), 2.5e-4, DURATION).states
     guided = setups.guided(base, forces, smooth_pitch(free[:, 3], 2.5e-4))
     guided.initial[:] = free[0]
-    found = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED[engine])
-    assert found.moment is not None and guided.input is not None
-    inertia = base.parameters.I * guided.input.sample(0.0, 2.5e-4, len(found.times))[:, 4]
-    return rms(found.moment[40:]) / rms(inertia)
+    path = run(engine, guided, 2.5e-4, DURATION, CONSTRAINED[engine])
+    assert path.moment is not None and guided.input is not None
+    inertia = base.parameters.I * guided.input.sample(0.0, 2.5e-4, len(path.times))[:, 4]
+    return rms(path.moment[40:]) / rms(inertia)
 
 
 def gap(engine: str, folder: Path) -> float:
     """Distance of the pitch from what was prescribed."""
     assembly = scene()
-    found = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
+    path = run(engine, assembly, 1e-3, DURATION, CONSTRAINED[engine])
     assert assembly.input is not None
-    return largest(found.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 2])
+    return largest(path.states[:, 3] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 2])
 
 
 def gap_naive(folder: Path) -> str:
     """The gap of the rate, which nothing enforces."""
     assembly = scene()
-    found = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
+    path = run("exudyn", assembly, 1e-3, DURATION, "GeneralizedAlpha")
     assert assembly.input is not None
-    off = largest(found.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(found.times))[:, 3])
+    off = largest(path.states[:, 7] - assembly.input.sample(0.0, 1e-3, len(path.times))[:, 3])
     return f"Exudyn enforces the angle alone: its rate is off by {off:.1e} rad/s"
 
 

@@ -47,21 +47,21 @@ def asked_again(engine: str, folder: Path) -> float:
     model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
     states = base.initial + 1e-3 * np.random.default_rng(3).standard_normal((40, 8))
     asked = [(2e-3 * i, state) for i, state in enumerate(states)]
-    once = [model.acceleration(*own).copy() for own in asked]
-    again = [model.acceleration(*own).copy() for own in reversed(asked)][::-1]
+    once = [model.acceleration(*arguments).copy() for arguments in asked]
+    again = [model.acceleration(*arguments).copy() for arguments in reversed(asked)][::-1]
     return largest(np.array(once) - again)
 
 
 def streams(implementation: str, folder: Path) -> float:
     """Largest correlation of any two streams, in standard errors of none, by what so many pairs allow."""
-    own = [
+    paths = [
         normal(seed, path, BLOCK, 1, source=source)[:, 0]
         for seed in (0, 1)
         for path in (0, 1)
         for source in (FORCES, GYRO, ROAD)
     ]
-    own += [normal(0, 0, BLOCK, 1, first=BLOCK)[:, 0], *normal(5, 0, BLOCK, 2).T]
-    worst = max(abs(float(one @ two)) / BLOCK**0.5 for one, two in combinations(own, 2))
+    paths += [normal(0, 0, BLOCK, 1, first=BLOCK)[:, 0], *normal(5, 0, BLOCK, 2).T]
+    worst = max(abs(float(first @ two)) / BLOCK**0.5 for first, two in combinations(paths, 2))
     return worst / 4.75  # one pair of 105 beyond 4.75 errors once in 5000
 
 
@@ -97,11 +97,11 @@ def odd_delay(implementation: str, folder: Path) -> float:
     worst = 0.0
     for length, speed, longest in ((2.7, 31.0, 0.02), (3.1415926, 17.3, 0.0055), (1.234567, 0.37, 0.001)):
         heights = (np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
-        own = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
-        steps = int(2.0 * length / (speed * own.step)) + 50
-        front, rear = own.table(steps, seed=3)[:, :2].T
+        road = road_path(replace(_one_state(), heights=heights, lengths=(0.0, length)), speed, longest)
+        steps = int(2.0 * length / (speed * road.step)) + 50
+        front, rear = road.table(steps, seed=3)[:, :2].T
         lag = next((i for i in range(1, len(front)) if np.array_equal(rear[i : i + 20], front[:20])), 0)
-        worst = max(worst, abs(lag * own.half * speed / length - 1.0) if lag else np.inf)
+        worst = max(worst, abs(lag * road.half * speed / length - 1.0) if lag else np.inf)
     return worst
 
 
@@ -116,9 +116,9 @@ def attitude(implementation: str, folder: Path) -> float:
     """Mean trace of the error of a noisy gyro on a turning body against 3 exp(-s^2 t), in standard errors."""
     rates = np.tile([0.0, 0.0, 2.0], (SAMPLES, 1))
     start, deviation = np.array([1.0, 0.0, 0.0, 0.0]), np.full(3, WALK * RATE**0.5)
-    found = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
+    attitudes = measured_attitude(rates, 1.0 / RATE, deviation, start, range(PATHS), seed=5)[-1]
     true = measured_attitude(rates, 1.0 / RATE, np.zeros(3), start, range(1))[-1]
-    traces = np.trace(matrix(error_rotation(found, true)), axis1=-2, axis2=-1)
+    traces = np.trace(matrix(error_rotation(attitudes, true)), axis1=-2, axis2=-1)
     wanted = mean_trace(random_walk(deviation[0], RATE), SAMPLES / RATE)
     return abs(float(traces.mean()) - wanted) / (float(traces.std()) / PATHS**0.5)
 
@@ -137,8 +137,8 @@ def no_growth(implementation: str, folder: Path) -> float:
     """Variance of the pitch for 2 lambda t of 1e-12 to 600, either side of its series, against 60 digits, relative."""
     worst = 0.0
     for x in (1e-12, 1e-6, 1e-3, 0.0999, SERIES, np.nextafter(SERIES, 1.0), 0.1001, 0.5, 1.0, 10.0, 600.0):
-        found = float(pitch_variance(2.0, x / 4.0, 0.7))
-        worst = max(worst, abs(found / _law(Decimal(x)) - 1.0))
+        variance = float(pitch_variance(2.0, x / 4.0, 0.7))
+        worst = max(worst, abs(variance / _law(Decimal(x)) - 1.0))
     return max(worst, abs(float(pitch_variance(2.0, 0.0, 0.7)) / (0.7 * 8.0 / 3.0) - 1.0))
 
 
@@ -160,8 +160,8 @@ def indefinite(implementation: str, folder: Path) -> float:
     vehicle = linear_vehicle(load_vehicle("half_car"), implementation)
     worst = 0.0
     for speed in (2.0, 7.0, 20.0, 60.0):
-        own = vehicle(speed)
-        P = stationary(excited(own, excitation(road_of_level(1.0), on_track(own.wheels, 1.0)), speed)).P
+        half_car = vehicle(speed)
+        P = stationary(excited(half_car, excitation(road_of_level(1.0), on_track(half_car.wheels, 1.0)), speed)).P
         scale = np.sqrt(np.diag(P))
         values = np.linalg.eigvalsh(P / np.outer(scale, scale))
         worst = max(worst, -values[0] / values[-1])

@@ -23,10 +23,10 @@ def spoilt(
     """A case of one fault: ``check`` must speak first, and of no other place than ``place``."""
 
     def error(implementation: str, folder: Path) -> float:
-        found = bench.planted(bench.measurement(road=ROAD), folder, spoil, **faults)
-        if not found or found[0].check != check or not all(place in finding.place for finding in found):
+        findings = bench.planted(bench.measurement(road=ROAD), folder, spoil, **faults)
+        if not findings or findings[0].check != check or not all(place in finding.place for finding in findings):
             return np.inf
-        return 0.0 if size is None else abs((found[0].size or 0.0) / size - 1.0)
+        return 0.0 if size is None else abs((findings[0].size or 0.0) / size - 1.0)
 
     return error
 

@@ -31,10 +31,10 @@ Change = Callable[[dict[str, Any]], object]
 def damped_tyre(implementation: str, folder: Path) -> float:
     """Acceleration of the body against quadrature, where the force of the tyre, and it alone, is called infinite."""
     vehicle, road = linear(quarter(*CORNER, c_t=100.0), implementation), one_track((0.0,), 0.3)
-    found = stationary(excited(vehicle, road, SPEED))
-    if [status == INFINITE for status in found.status] != [False, False, True]:
+    covariance = stationary(excited(vehicle, road, SPEED))
+    if [status == INFINITE for status in covariance.status] != [False, False, True]:
         return np.inf
-    return off(found.variance[:2], quadrature(vehicle, road, SPEED).variance[:2])
+    return off(covariance.variance[:2], quadrature(vehicle, road, SPEED).variance[:2])
 
 
 def damped_tyre_naive(folder: Path) -> str:
@@ -49,33 +49,33 @@ def free(implementation: str, folder: Path) -> float:
     vehicle = linear(load_vehicle("r19_free"), implementation)
     system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
     rows = [i for i, output in enumerate(vehicle.outputs) if "acceleration" in output.kind]
-    found, wanted = stationary(system), after_hours(system)[0]
-    return off(found.variance[rows], wanted[rows])
+    covariance, wanted = stationary(system), after_hours(system)[0]
+    return off(covariance.variance[rows], wanted[rows])
 
 
 def drifting(implementation: str, folder: Path) -> float:
     """Rates of heading (t) and place (t^3) against the exact covariance after 1 and 2 hours, axles independent."""
     vehicle = linear(steered(), implementation)
     system = excited(vehicle, paper_road(vehicle.wheels, "modelled", "uncorrelated"), SPEED)
-    found = stationary(system)
-    if found.status != (DIFFUSING, DIFFUSING) or found.power.tolist() != [1, 3]:
+    covariance = stationary(system)
+    if covariance.status != (DIFFUSING, DIFFUSING) or covariance.power.tolist() != [1, 3]:
         return np.inf
-    one, two = after_hours(system)
-    grown = (two - one) / (2.0**found.power - 1.0) / 3600.0**found.power
-    return off(grown, found.rate)
+    after_1, two = after_hours(system)
+    grown = (two - after_1) / (2.0**covariance.power - 1.0) / 3600.0**covariance.power
+    return off(grown, covariance.rate)
 
 
 def undamped(corner: float) -> Callable[..., float]:
     """A case of a body on a tyre without a damper: rates at which its motion grows, against S(w) / 2 w^2."""
 
     def error(implementation: str, folder: Path) -> float:
-        own = replace(single(300.0, 2e5, 0.0), springs=())
-        found = stationary(excited(linear(own, implementation), one_track((0.0,), corner), SPEED))
-        if found.status != (DIFFUSING, DIFFUSING):
+        undamped_car = replace(single(300.0, 2e5, 0.0), springs=())
+        covariance = stationary(excited(linear(undamped_car, implementation), one_track((0.0,), corner), SPEED))
+        if covariance.status != (DIFFUSING, DIFFUSING):
             return np.inf
         w2 = 2e5 / 300.0
         height = w2 * INTENSITY * SPEED / (2.0 * (w2 + (corner * SPEED) ** 2))
-        return off(found.rate, np.array([w2**2, 1.0]) * height)
+        return off(covariance.rate, np.array([w2**2, 1.0]) * height)
 
     return error
 
@@ -83,10 +83,10 @@ def undamped(corner: float) -> Callable[..., float]:
 def triple(implementation: str, folder: Path) -> float:
     """Critically damped, and the road's corner at the same place: 3 q w^3 / 16 and 3 q / 16 w, relative."""
     w = 6.0
-    found = stationary(
+    covariance = stationary(
         excited(linear(single(300.0, 300.0 * w**2, 600.0 * w), implementation), one_track((0.0,), w / SPEED), SPEED)
     )
-    return off(found.variance, 3.0 * INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
+    return off(covariance.variance, 3.0 * INTENSITY * SPEED / 16.0 * np.array([w**3, 1.0 / w]))
 
 
 def triple_naive(folder: Path) -> str:
@@ -104,9 +104,9 @@ def unstable(implementation: str, folder: Path) -> float:
 
 def toppling(implementation: str, folder: Path) -> float:
     """A body 30 m above its springs under gravity: refused, with the rate at which it topples."""
-    own = load_vehicle("seven_freedoms")
-    x, y, _ = own.bodies[0].position
-    tall = replace(own, gravity=9.81, bodies=(replace(own.bodies[0], position=(x, y, 30.0)), *own.bodies[1:]))
+    car = load_vehicle("seven_freedoms")
+    x, y, _ = car.bodies[0].position
+    tall = replace(car, gravity=9.81, bodies=(replace(car.bodies[0], position=(x, y, 30.0)), *car.bodies[1:]))
     return _refused_by_growth(linear(tall, implementation))
 
 
@@ -145,25 +145,25 @@ def _deviation(vehicle: LinearVehicle, speed: float = SPEED, axles: str = "delay
 
 def mirrored(implementation: str, folder: Path) -> float:
     """Left springs twice as stiff, then the right ones: outputs on the centre line, relative."""
-    own = load_vehicle("seven_freedoms")
-    found = []
+    car = load_vehicle("seven_freedoms")
+    deviations = []
     for side in (1.0, -1.0):
         springs = tuple(
-            replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0)) for s in own.springs
+            replace(s, stiffness=s.stiffness * (2.0 if side * s.point_one[1] > 0 else 1.0)) for s in car.springs
         )
-        vehicle = linear(replace(own, springs=springs), implementation)
+        vehicle = linear(replace(car, springs=springs), implementation)
         rows = [o.name == "body centre" or "angular" in o.kind for o in vehicle.outputs]
-        found.append(_deviation(vehicle)[rows])
-    return off(found[0], found[1])
+        deviations.append(_deviation(vehicle)[rows])
+    return off(deviations[0], deviations[1])
 
 
 def slow_weighting(implementation: str, folder: Path) -> float:
     """Body acceleration weighted by Wk at 1 mm/s against quadrature, relative."""
     vehicle = linear(quarter(*CORNER), implementation)
     road, name = one_track((0.0,), 0.3), vehicle.outputs[0].name
-    found = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
+    variance = stationary(weighted(excited(vehicle, road, 1e-3), {name: "Wk"})).variance[-1]
     wanted = quadrature(vehicle, road, 1e-3, {name: WEIGHTINGS["Wk"].response}).variance[0]
-    return off(found, wanted)
+    return off(variance, wanted)
 
 
 def standstill(implementation: str, folder: Path) -> float:

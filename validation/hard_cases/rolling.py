@@ -29,9 +29,9 @@ MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0] * 2)
 """What left and right exchanged make of a state; its spin is about the same axle."""
 
 
-def built(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **own: Any) -> Equations:
+def built(implementation: str, wheelset: Wheelset = CHOSEN, speed: float = 40.0, **options: Any) -> Equations:
     """A wheelset in an implementation, with coarse cells."""
-    return KINDS[implementation](wheelset, speed, **({"cells": 7} | own))
+    return KINDS[implementation](wheelset, speed, **({"cells": 7} | options))
 
 
 def off(equations: Equations, **values: float) -> np.ndarray:
@@ -54,8 +54,8 @@ def beyond_friction(motion: Motion, mu: float) -> float:
 
 def standing(implementation: str, folder: Path) -> float:
     """Speed at which a standing wheelset creeps sideways under a third of what friction could hold."""
-    own = built(implementation, HEAVY, 0.0, lean=0.1)
-    motion = own.run(own.rest, 0.04, 8e-5, 250)
+    equations = built(implementation, HEAVY, 0.0, lean=0.1)
+    motion = equations.run(equations.rest, 0.04, 8e-5, 250)
     return float(abs(motion.states[-1, eq.Y] - motion.states[-2, eq.Y]) / 0.02)
 
 
@@ -67,27 +67,27 @@ def standing_naive(folder: Path) -> str:
 
 def reversal(implementation: str, folder: Path) -> float:
     """Largest jump of an acceleration by mu N / m, as the speed passes 0 and where regularisation begins and ends."""
-    found = []
+    jumps = []
     for middle in (-wf.REGULAR, 0.0, wf.REGULAR):
         below, above = (built(implementation, CHOSEN, middle + part) for part in (-1e-9, 1e-9))
         state = np.array([2e-3, 5e-5, 1e-4, 1e-3, 0.0, 1e-3, 0.0, 1e-3, 1e-3, 0.1])
-        found.append(np.abs(above.rates(state) - below.rates(state)).max())
-    return float(max(found) * CHOSEN.mass / (CHOSEN.friction * CHOSEN.load))
+        jumps.append(np.abs(above.rates(state) - below.rates(state)).max())
+    return float(max(jumps) * CHOSEN.mass / (CHOSEN.friction * CHOSEN.load))
 
 
 def through_zero(implementation: str, folder: Path) -> float:
     """Kinetic energy of lateral motion and yaw beyond that of the start, by it, in runs of falling speed through 0."""
-    state, found = None, []
+    state, energies = None, []
     for speed in np.linspace(0.06, -0.06, 7):
-        own = built(implementation, HEAVY, float(speed))
-        state = off(own, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
+        equations = built(implementation, HEAVY, float(speed))
+        state = off(equations, Y_RATE=2e-3, YAW_RATE=2e-3) if state is None else state
         state[eq.SPIN] = -speed / HEAVY.radius
-        motion = own.run(state, 0.002, 8e-5)
+        motion = equations.run(state, 0.002, 8e-5)
         if beyond_friction(motion, HEAVY.friction) > 1e-12:
             return np.inf
-        found.append(motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia])
+        energies.append(motion.states[:, [eq.Y_RATE, eq.YAW_RATE]] ** 2 @ [HEAVY.mass, HEAVY.yaw_inertia])
         state = motion.states[-1].copy()
-    return float(np.max(found) / found[0][0] - 1.0)
+    return float(np.max(energies) / energies[0][0] - 1.0)
 
 
 def energies(motion: Motion, w: Wheelset) -> np.ndarray:
@@ -134,23 +134,23 @@ def light(implementation: str, folder: Path, mass: float) -> float:
 
 def frictions(implementation: str, folder: Path) -> float:
     """Force beyond mu N for mu from nothing to 1."""
-    found = []
+    shares = []
     for mu in (0.0, 1e-6, 1e-3, 1.0):
         wheelset = built(implementation, CHOSEN.changed(friction=mu), 60.0)
-        found.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
-    return max(found)
+        shares.append(beyond_friction(wheelset.run(off(wheelset, Y=3e-3, YAW=3e-3), 0.05, STEP / 4.0), mu))
+    return max(shares)
 
 
 def pure_spin(implementation: str, folder: Path) -> float:
     """Steep cones at rest: lateral forces of both wheels together, and moments about the axle of each, by mu N (r)."""
-    own = CHOSEN.changed(conicity=0.5)
-    wheelset = built(implementation, own, 20.0)
+    spinning = CHOSEN.changed(conicity=0.5)
+    wheelset = built(implementation, spinning, 20.0)
     contact = wheelset.run(wheelset.rest, 1e-4, 1e-4).contacts[0]
-    bound = own.friction * contact["load"]
+    bound = spinning.friction * contact["load"]
     if np.abs(contact["fy"] / bound).min() < 0.1:
         return np.inf
     moment = contact["fx"] * contact["z"] - contact["mz"] * np.sin(contact["angle"])
-    return float(max(np.abs(moment / (bound * own.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
+    return float(max(np.abs(moment / (bound * spinning.radius)).max(), abs(contact["fy"].sum()) / bound[0]))
 
 
 def halved(implementation: str, folder: Path, wheelset: Wheelset, speed: float, step: float) -> float:
@@ -171,16 +171,16 @@ def crawling(implementation: str, folder: Path) -> float:
 
 def symmetric(implementation: str, folder: Path) -> float:
     """Displacement, roll and yaw of a wheelset in the middle of the track, above its critical speed."""
-    own = built(implementation, CHOSEN, 80.0)
-    return float(np.abs(own.run(own.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
+    equations = built(implementation, CHOSEN, 80.0)
+    return float(np.abs(equations.run(equations.rest, 0.3, STEP).states[:, [eq.Y, eq.ROLL, eq.YAW]]).max())
 
 
 def mirrored(implementation: str, folder: Path) -> float:
     """A start and its mirror image, one wheel in the air: difference of the images."""
-    own = built(implementation)
-    start = off(own, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
-    one, other = (own.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
-    return float(np.abs(one - MIRROR * other).max())
+    equations = built(implementation)
+    start = off(equations, Y=2e-3, Z=-7e-4, ROLL=1e-3, YAW=2e-3, ROLL_RATE=0.05, YAW_RATE=0.1)
+    straight, other = (equations.run(state, 0.05, 1e-4).states for state in (start, MIRROR * start))
+    return float(np.abs(straight - MIRROR * other).max())
 
 
 def refused(implementation: str, folder: Path, place: str, run: Callable[[str], Any]) -> float:
@@ -222,11 +222,11 @@ LANDING: dict[str, Any] = {"Z": -5e-3, "Y_RATE": 0.01, "YAW": 1e-3}
 
 def too_large_naive(folder: Path) -> str:
     """The path without the check of loads, against that of an eighth of the step."""
-    own, ends = built("reference"), []
+    equations, ends = built("reference"), []
     for step in (STEP, STEP / 8.0):
-        states, contacts = np.empty((1, eq.STATES)), own.blank(1)
-        state = off(own, **LANDING)
-        eq.march(state, own.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
+        states, contacts = np.empty((1, eq.STATES)), equations.blank(1)
+        state = off(equations, **LANDING)
+        eq.march(state, equations.parameters, (step, round(0.1 / step), 1_000_000), states, contacts)
         ends.append(state)
     return f"displaced by {1e3 * abs(ends[1][eq.Y] - ends[0][eq.Y]):.2g} mm more or less after 0.1 s"
 

@@ -44,49 +44,49 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
     if implementation == "exudyn":
         f = np.array(Forces(wheels).of(list(q), list(v)))
     elif implementation == "mujoco":
-        own = model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
-        data = mujoco.MjData(own)
+        rig = model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
+        data = mujoco.MjData(rig)
         data.qvel[:] = v
         with installed(native_law()):
-            mujoco.mj_forward(own, data)
+            mujoco.mj_forward(rig, data)
         f = data.qfrc_passive.copy()
     else:
         add_forces(wheels.numbers, q, v, f)
     return f.reshape(-1, 4)
 
 
-def beyond(wheels: Wheels, found: np.ndarray) -> float:
+def beyond(wheels: Wheels, forces: np.ndarray) -> float:
     """Largest force by mu N, less 1; infinite where one has power."""
-    if (found * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(found).all():
+    if (forces * SLIDES).sum(axis=1).max() > 0.0 or not np.isfinite(forces).all():
         return np.inf
-    return max(0.0, float(np.hypot(found[:, 0], found[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
+    return max(0.0, float(np.hypot(forces[:, 0], forces[:, 1]).max() / (wheels.mu * wheels.load) - 1.0))
 
 
 def bounded(implementation: str, folder: Path, **changes: Any) -> float:
     """Force beyond mu N at three speeds, zero included, and both theories that have a bound."""
-    found = []
+    shares = []
     for theory in ("fastsim", "simplified"):
         for speed in (20.0, 0.0, -20.0):
             wheels = Wheels(theory=theory, cells=7, speed=speed, **changes)
-            found.append(beyond(wheels, on_rig(implementation, wheels, SLIDES)))
-    return max(found)
+            shares.append(beyond(wheels, on_rig(implementation, wheels, SLIDES)))
+    return max(shares)
 
 
 def jumps(implementation: str, folder: Path) -> float:
     """Largest change of a force by mu N, as the speed passes 0 and both ends of what is mixed."""
-    found = []
+    shares = []
     for middle in (-REGULAR, 0.0, REGULAR):
-        one, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
-        change = on_rig(implementation, other, SLIDES) - on_rig(implementation, one, SLIDES)
-        found.append(np.abs(change[:, :2]).max() / (one.mu * one.load))
-    return float(max(found))
+        backwards, other = (Wheels(cells=7, speed=middle + part) for part in (-1e-9, 1e-9))
+        change = on_rig(implementation, other, SLIDES) - on_rig(implementation, backwards, SLIDES)
+        shares.append(np.abs(change[:, :2]).max() / (backwards.mu * backwards.load))
+    return float(max(shares))
 
 
 def spinning(implementation: str, folder: Path) -> float:
     """Force along the rail by mu N, of wheels that do nothing but spin; infinite if there is none across."""
     wheels = Wheels(cells=7)
-    found = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
-    return float(np.abs(found[:, 0]).max()) if np.abs(found[:, 1]).min() > 1e-3 else np.inf
+    shares = on_rig(implementation, wheels, SLIDES[[3, 3, 3, 3]]) / (wheels.mu * wheels.load)
+    return float(np.abs(shares[:, 0]).max()) if np.abs(shares[:, 1]).min() > 1e-3 else np.inf
 
 
 def too_long(implementation: str, folder: Path) -> float:
@@ -104,12 +104,12 @@ def too_long(implementation: str, folder: Path) -> float:
 
 def jumping(implementation: str, folder: Path) -> float:
     """Energy that the ledger of a wheelset leaves open while contacts come and go, by what creep took."""
-    own = built(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
-    motion = own.run(off(own, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
+    equations = built(implementation, CHOSEN.changed(profiles=Profiles()), 30.0)
+    motion = equations.run(off(equations, Y=3e-3, Y_RATE=0.2), 0.03, 1e-4)
     carries = motion.contacts["load"] > 0.0
     if (carries[1:] != carries[:-1]).any(axis=1).sum() < 2 or motion.contacts["power"].max() > 0.0:
         return np.inf
-    book = ledger(Equations(own.wheelset, own.speed, own.law, own.cells), motion)
+    book = ledger(Equations(equations.wheelset, equations.speed, equations.law, equations.cells), motion)
     return float(np.abs(book.residual).max() / book.creep[-1])
 
 
@@ -117,11 +117,11 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
     """A run of the car."""
     if implementation != "reference":
         return driven(implementation, handling, speed, duration, step)
-    own, (q, v), n = build("mujoco", handling), handling.straight(speed), len(handling.vehicle.coordinates())
+    model, (q, v), n = build("mujoco", handling), handling.straight(speed), len(handling.vehicle.coordinates())
     states = [np.concatenate((q, v))]
 
     def rates(x: np.ndarray) -> np.ndarray:
-        return np.concatenate((x[n:], own.acceleration(0.0, x[:n], x[n:])))
+        return np.concatenate((x[n:], model.acceleration(0.0, x[:n], x[n:])))
 
     for _ in range(round(duration / step)):
         x = states[-1]

@@ -32,14 +32,14 @@ def momentum_error(engine: str, interpolation: str, values: np.ndarray, period: 
     base = vehicle("asymmetric_twin")
     forces = Sampled(values, period, held=interpolation == "held")
     steps = round((len(values) - 1) * period / step)
-    found = run(engine, setups.driven(base, forces), step, steps * step)
+    path = run(engine, setups.driven(base, forces), step, steps * step)
     p, every = base.parameters, round(period / step)
     masses = np.array([p.m1, p.m2, p.m3])
     total = values.sum(axis=1)
     held = np.concatenate(([0.0], np.cumsum(total[:-1] * period)))
     impulse = held if forces.held else held + period * (total - total[0]) / 2
     truth = masses.sum() * p.g * period * np.arange(len(values)) - impulse
-    return largest(found.states[::every, 4:7] @ masses - truth) / largest(impulse)
+    return largest(path.states[::every, 4:7] @ masses - truth) / largest(impulse)
 
 
 def ramp(engine: str, folder: Path) -> float:
@@ -134,8 +134,8 @@ def c2_road(engine: str, folder: Path) -> float:
 
 def polyline_naive(folder: Path) -> str:
     """Order on straight lines through the same points."""
-    found = order("reference", PolylineProfile.through(*_points()))
-    return f"straight lines through the same points: order {found:.1f}"
+    observed = order("reference", PolylineProfile.through(*_points()))
+    return f"straight lines through the same points: order {observed:.1f}"
 
 
 def noise_adaptive(engine: str, folder: Path) -> float:
@@ -144,8 +144,8 @@ def noise_adaptive(engine: str, folder: Path) -> float:
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
-    found = run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
-    return largest(found.states - exact(setups.driven(base, forces), 1e-3, 200, forces.values))
+    path = run(engine, setups.driven(base, forces), 1e-3, 0.2, name)
+    return largest(path.states - exact(setups.driven(base, forces), 1e-3, 200, forces.values))
 
 
 def noise_adaptive_naive(folder: Path) -> str:
@@ -160,9 +160,9 @@ def noise_adaptive_naive(folder: Path) -> str:
         u = forces.values[min(int(t / 1e-3), 199)]
         return a @ y + np.array([0, 0, 0, 0, g - u[0] / masses[0], g - u[1] / masses[1], g, 0])
 
-    found = solve_ivp(rhs, (0, 0.2), base.initial, rtol=1e-4, atol=1e-6)
-    error = largest(found.y[:, -1] - exact(driven, 1e-3, 200, forces.values)[-1])
-    return f"RK45 straight across the jumps: {found.nfev} force calls for 200 samples, error {error:.0e}"
+    solution = solve_ivp(rhs, (0, 0.2), base.initial, rtol=1e-4, atol=1e-6)
+    error = largest(solution.y[:, -1] - exact(driven, 1e-3, 200, forces.values)[-1])
+    return f"RK45 straight across the jumps: {solution.nfev} force calls for 200 samples, error {error:.0e}"
 
 
 def damaged(engine: str, folder: Path) -> float:
@@ -214,9 +214,9 @@ def bump(engine: str, folder: Path) -> float:
     """An adaptive solver (MuJoCo has none) that has seen nothing for ten seconds must not step over the bump."""
     name = {"reference": "LSODA", "exudyn": "DOPRI5", "mujoco": "RK4"}[engine]
     assembly = vehicle().with_input("road", _bump())
-    found = run(engine, assembly, 1e-3, 10.5, name)
+    path = run(engine, assembly, 1e-3, 10.5, name)
     truth = run("reference", assembly, 5e-4, 10.5).states[:, 3]
-    return abs(largest(found.states[:, 3]) - largest(truth)) / largest(truth)
+    return abs(largest(path.states[:, 3]) - largest(truth)) / largest(truth)
 
 
 def bump_naive(folder: Path) -> str:
@@ -253,14 +253,14 @@ def passed_over(engine: str, folder: Path) -> float:
     is a warning, or no answer at all, which ends in the step that it names, or where that names another one, in
     this."""
     told = _over_waves(engine, 2e-3, error=True)
-    name, one = max(errors_of(told).items(), key=lambda each: each[1].share)
-    cured: Estimate | None = one
+    name, estimate = max(errors_of(told).items(), key=lambda each: each[1].share)
+    cured: Estimate | None = estimate
     for _ in range(3):
         cured = worst_of(_over_waves(engine, cured.step, error=True)) if cured and cured.warned else cured
-    if not one.warned or cured is None or cured.warned:
+    if not estimate.warned or cured is None or cured.warned:
         return np.inf
     off = told[name] - _over_waves(engine, 1e-4)[name][::20]
-    return float(np.sqrt(np.mean(off**2))) / one.error
+    return float(np.sqrt(np.mean(off**2))) / estimate.error
 
 
 def passed_over_naive(folder: Path) -> str:

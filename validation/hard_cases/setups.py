@@ -87,8 +87,8 @@ def unchecked(
     engine: str, assembly: Assembly, step: float, duration: float, integrator: str = "", **other: float
 ) -> Trajectory:
     """The same past the checks before a run, so that only the guard after it stands."""
-    own = settings(engine, step, duration, integrator, **other)
-    return build_unchecked(engine, assembly, own).run()
+    engine_settings = settings(engine, step, duration, integrator, **other)
+    return build_unchecked(engine, assembly, engine_settings).run()
 
 
 def tight(assembly: Assembly, step: float, duration: float) -> Trajectory:

@@ -43,15 +43,15 @@ def sprung(band: float) -> Assembly:
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
-    own = driven(base, static_forces(base, 2, DURATION, held=False))
+    assembly = driven(base, static_forces(base, 2, DURATION, held=False))
     spring = PitchSpring("chassis", STIFFNESS, 0.0, band)
-    return replace(own, initial=start, vehicle=replace(own.vehicle, pitch_springs=(spring,)))
+    return replace(assembly, initial=start, vehicle=replace(assembly.vehicle, pitch_springs=(spring,)))
 
 
 def kink(engine: str, folder: Path) -> float:
     """Pitch over many crossings of the band's edges."""
-    found = run(engine, sprung(BAND), STEP, DURATION)
-    return largest((found.states - _kink_truth().states)[:, 3])
+    path = run(engine, sprung(BAND), STEP, DURATION)
+    return largest((path.states - _kink_truth().states)[:, 3])
 
 
 @cache
@@ -62,8 +62,8 @@ def _kink_truth() -> Trajectory:
 def kink_naive(folder: Path) -> str:
     """Exudyn's own limit stops in place of the law."""
     with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
-        found = kink("exudyn", folder)
-    return f"Exudyn's limit stops, asked once per step: pitch off by {found:.1e} rad"
+        pitch_error = kink("exudyn", folder)
+    return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
 
 
 def _limit_stop(built: exudyn_engine.Build, spring: PitchSpring) -> None:
@@ -83,24 +83,24 @@ def _limit_stop(built: exudyn_engine.Build, spring: PitchSpring) -> None:
 
 def never_left(engine: str, folder: Path) -> float:
     """A band that is wider than the motion, against no spring at all."""
-    own = sprung(1.0)
-    free = replace(own, vehicle=replace(own.vehicle, pitch_springs=()))
-    one, other = (run(engine, assembly, STEP, DURATION).states for assembly in (own, free))
-    return largest(one - other)
+    tied = sprung(1.0)
+    free = replace(tied, vehicle=replace(tied.vehicle, pitch_springs=()))
+    between, other = (run(engine, assembly, STEP, DURATION).states for assembly in (tied, free))
+    return largest(between - other)
 
 
 def beside_held(moment_held: bool = False) -> Assembly:
     """A moment of 2 kN m at 20 Hz beside held forces with noise, both sampled every 4 ms."""
     base = vehicle("asymmetric_twin")
-    own = driven(base, static_forces(base, 126, 4e-3, noise=300.0))
+    assembly = driven(base, static_forces(base, 126, 4e-3, noise=300.0))
     samples = 2e3 * np.sin(2 * np.pi * 20.0 * 4e-3 * np.arange(126))[:, None]
-    return replace(own, moment=Sampled(samples, 4e-3, moment_held))
+    return replace(assembly, moment=Sampled(samples, 4e-3, moment_held))
 
 
 def moving_moment(engine: str, folder: Path) -> float:
     """Pitch under held forces and a moment that is not held."""
-    found = run(engine, beside_held(), STEP, DURATION)
-    return largest((found.states - _moving_truth().states)[:, 3])
+    path = run(engine, beside_held(), STEP, DURATION)
+    return largest((path.states - _moving_truth().states)[:, 3])
 
 
 @cache
@@ -110,8 +110,8 @@ def _moving_truth() -> Trajectory:
 
 def moving_moment_naive(folder: Path) -> str:
     """The moment held like the forces that it stands beside."""
-    found = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
-    return f"held as well: pitch off by {largest((found.states - _moving_truth().states)[:, 3]):.1e} rad"
+    path = unchecked("reference", beside_held(moment_held=True), STEP, DURATION)
+    return f"held as well: pitch off by {largest((path.states - _moving_truth().states)[:, 3]):.1e} rad"
 
 
 def moment_off_the_grid(engine: str, folder: Path) -> float:
@@ -126,8 +126,8 @@ def _free_motion() -> np.ndarray:
     """States every 0.25 ms of the vehicle under its weight, released from a tilt."""
     base = vehicle("asymmetric_twin")
     base.initial[[2, 3]] += 0.02, 0.05
-    own = driven(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
-    return tight(own, 2.5e-4, DURATION).states
+    assembly = driven(base, static_forces(vehicle("asymmetric_twin"), 2, DURATION, held=False))
+    return tight(assembly, 2.5e-4, DURATION).states
 
 
 def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
@@ -137,9 +137,9 @@ def on_rails(noise: float = 0.0, mass: float = 1.0) -> Assembly:
     base = vehicle("asymmetric_twin")
     forces = static_forces(base, 2, DURATION, held=False)
     signal = Stacked((forces, Smooth(motion, 2.5e-4, derivatives=2, degree=5)))
-    own = vehicle("asymmetric_twin", initial=states[0], m3=mass * base.parameters.m3)
-    own.initial[[2, 3, 6, 7]] = signal.at(0.0)[2:6]
-    return own.without_tyres().with_input("heave-pitch", signal)
+    assembly = vehicle("asymmetric_twin", initial=states[0], m3=mass * base.parameters.m3)
+    assembly.initial[[2, 3, 6, 7]] = signal.at(0.0)[2:6]
+    return assembly.without_tyres().with_input("heave-pitch", signal)
 
 
 def _guided(engine: str, assembly: Assembly) -> Trajectory:
@@ -149,25 +149,25 @@ def _guided(engine: str, assembly: Assembly) -> Trajectory:
 def missing_mass(engine: str, folder: Path) -> float:
     """A chassis that is 5 % too light: mean force, by 0.05 m3 (g - z3'')."""
     p, states = vehicle("asymmetric_twin").parameters, _free_motion()
-    found = _guided(engine, on_rails(mass=0.95)).force
-    assert found is not None
+    force = _guided(engine, on_rails(mass=0.95)).force
+    assert force is not None
     wanted = 0.05 * p.m3 * (p.g - (states[-1, 6] - states[0, 6]) / DURATION)
-    return abs(float(found.mean()) / wanted - 1)
+    return abs(float(force.mean()) / wanted - 1)
 
 
 def missing_mass_naive(folder: Path) -> str:
     """What the states of the guided run say of it."""
-    one, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
-    return f"the states of the guided run differ by {largest(one - other):.1e}: only the force can tell"
+    whole, other = (_guided("reference", on_rails(mass=mass)).states for mass in (1.0, 0.95))
+    return f"the states of the guided run differ by {largest(whole - other):.1e}: only the force can tell"
 
 
 def rough_rails(engine: str, folder: Path) -> float:
     """Noise of 1e-6 m and rad on the motion: the loads, in units of their finite-difference values."""
     p = vehicle("asymmetric_twin").parameters
-    found, clean = _guided(engine, on_rails(NOISE)).enforced, _guided("reference", on_rails()).enforced
-    assert found is not None and clean is not None
+    enforced, clean = _guided(engine, on_rails(NOISE)).enforced, _guided("reference", on_rails()).enforced
+    assert enforced is not None and clean is not None
     sizes = np.array([p.m3, p.I]) * NOISE * np.sqrt(6) / 2.5e-4**2
-    return float((np.sqrt(np.mean((found - clean) ** 2, axis=0)) / sizes).max())
+    return float((np.sqrt(np.mean((enforced - clean) ** 2, axis=0)) / sizes).max())
 
 
 def measured_pitch(folder: Path, **values: float) -> Assembly:
@@ -185,11 +185,11 @@ def measured_pitch(folder: Path, **values: float) -> Assembly:
 
 def smoothed(engine: str, folder: Path) -> float:
     """The moment after smoothing to 5 Hz, against the eliminated form."""
-    own = measured_pitch(folder, bandwidth=5.0)
-    found = run(engine, own, STEP, 1.0, CONSTRAINED[engine]).moment
-    true = run("reference", own, STEP / 8, 1.0).moment
-    assert found is not None and true is not None
-    return rms((found - true[::8])[50:]) / rms(true)
+    assembly = measured_pitch(folder, bandwidth=5.0)
+    moment = run(engine, assembly, STEP, 1.0, CONSTRAINED[engine]).moment
+    true = run("reference", assembly, STEP / 8, 1.0).moment
+    assert moment is not None and true is not None
+    return rms((moment - true[::8])[50:]) / rms(true)
 
 
 def smoothed_naive(folder: Path) -> str:

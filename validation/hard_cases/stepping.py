@@ -43,15 +43,15 @@ def _pushed(geometry: str = "linear"):
 def inside_limit(engine: str, folder: Path) -> float:
     """RK4 at 3.9 ms for 300 steps: the fastest mode must have died."""
     assembly = _pushed()
-    found = run(engine, assembly, 3.9e-3, 1.17)
-    return largest(found.states[-1] - exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
+    path = run(engine, assembly, 3.9e-3, 1.17)
+    return largest(path.states[-1] - exact(assembly, 3.9e-3, 300)[-1]) / 1e-3
 
 
 def beyond_limit(engine: str, folder: Path) -> float:
     """RK4 at 5 ms over 40 ms: eight steps, all values small and finite."""
     assembly = vehicle(effects=ROAD)
-    found = run(engine, assembly, 5e-3, 0.04)
-    return _against_tight(assembly, found.states, 5e-3)
+    path = run(engine, assembly, 5e-3, 0.04)
+    return _against_tight(assembly, path.states, 5e-3)
 
 
 def _against_tight(assembly, states, step: float) -> float:
@@ -107,9 +107,9 @@ def huge_naive(folder: Path) -> str:
 def sudden(engine: str, folder: Path) -> float:
     """Front force up by 1 kN from one sample to the next, 1 ms steps."""
     assembly, forces = _step_force()
-    found = run(engine, assembly, 1e-3, 0.2)
+    path = run(engine, assembly, 1e-3, 0.2)
     truth = exact(assembly, 1e-3, 200, forces.sample(0.0, 1e-3, 200))
-    return largest(found.states - truth) / largest(truth[:, 4])
+    return largest(path.states - truth) / largest(truth[:, 4])
 
 
 def _step_force():
@@ -123,9 +123,9 @@ def _step_force():
 def sudden_naive(folder: Path) -> str:
     """Generalised-alpha with a step that does not see the fast pole."""
     assembly, forces = _step_force()
-    found = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
+    path = unchecked("exudyn", assembly, 10e-3, 0.2, "GeneralizedAlpha", spectral_radius=0.9)
     truth = exact(assembly, 10e-3, 20, forces.values)
-    off = (found.states - truth)[6:9, 4]
+    off = (path.states - truth)[6:9, 4]
     return (
         "Exudyn's default at 10 ms overshoots: front wheel velocity off by "
         f"{', '.join(f'{value:+.3f}' for value in off)} m/s (peak {largest(truth[:, 4]):.3f})"
@@ -138,8 +138,8 @@ def repeat(engine: str, folder: Path) -> float:
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     worst = 0.0
     for integrator in ("", "DOP853" if engine == "reference" else IMPLICIT[engine]):
-        own = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
-        model = build(engine, driven(base, own), settings(engine, 1e-3, 0.2, integrator))
+        signal = replace(forces, held=False) if integrator == "GeneralizedAlpha" else forces
+        model = build(engine, driven(base, signal), settings(engine, 1e-3, 0.2, integrator))
         first = model.run().states
         model.acceleration(0.05, first[50])
         worst = max(worst, largest(model.run().states - first))
@@ -160,19 +160,19 @@ def stamps(engine: str, folder: Path) -> float:
     name = {"reference": "DOP853"}.get(engine, "DOPRI5")
     build_scene({"title": "", "run": {"duration": 0.2}, "engines": {engine: {"integrator": name}}})
     assembly = _pushed()
-    found = run(engine, assembly, 1e-3, 0.2, name)
-    return largest(found.states - exact_decay(assembly, found.times))
+    path = run(engine, assembly, 1e-3, 0.2, name)
+    return largest(path.states - exact_decay(assembly, path.times))
 
 
 def stamps_naive(folder: Path) -> str:
     """Rows taken for times."""
     assembly = _pushed()
-    found = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
-    off = np.abs(found.times - 1e-3 * np.arange(len(found.times)))
-    truth = exact(assembly, 1e-3, len(found.times) - 1)
+    path = run("exudyn", assembly, 1e-3, 0.2, "DOPRI5")
+    off = np.abs(path.times - 1e-3 * np.arange(len(path.times)))
+    truth = exact(assembly, 1e-3, len(path.times) - 1)
     return (
         f"Exudyn's rows lie up to {off.max() * 1e3:.2g} ms off the grid: compared row by row the same run "
-        f"shows an error of {largest(found.states - truth):.0e}"
+        f"shows an error of {largest(path.states - truth):.0e}"
     )
 
 

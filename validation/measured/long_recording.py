@@ -44,9 +44,9 @@ def pattern(seconds: float = 20.0) -> tuple[tuple[Signal, ...], np.ndarray]:
         travels=names[:10],
         sections=names[:9],
     )
-    found = virtual_measurement(car, table, "mujoco")
-    assert len(found.signals) == 60
-    return found.signals, found.samples(Faults(), 1)
+    virtual = virtual_measurement(car, table, "mujoco")
+    assert len(virtual.signals) == 60
+    return virtual.signals, virtual.samples(Faults(), 1)
 
 
 def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
@@ -132,8 +132,8 @@ def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") 
     def told(done: float, of: float) -> None:
         print(done, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
 
-    own = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
-    run(own, Path(folder) / "run", told, float(block))
+    job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
+    run(job, Path(folder) / "run", told, float(block))
 
 
 if __name__ == "__main__":

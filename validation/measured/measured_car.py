@@ -35,24 +35,26 @@ def samples(path: Path) -> np.ndarray:
 
     Roll and pitch are those of the vertical at the place where the car was, by the earth's centre.
     """
-    own = car.read(path)
+    read_car = car.read(path)
     with np.load(path) as data:
         begin, end = (side([data["gyro_t"][i], data["frame_t"][i]]) for side, i in ((max, 0), (min, -1)))
         clock = np.arange(begin, end, car.PERIOD)
         felt = np.column_stack([np.interp(clock, data["acc_t"], column) for column in data["acc"].T])
         place = data["frame_p"].mean(axis=0)
-    up = np.einsum("nji,j->ni", matrix(own.pose), place / np.linalg.norm(place)) * TURNED
-    return np.column_stack([felt * TURNED, own.rates * TURNED, np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(up[:, 0])])
+    up = np.einsum("nji,j->ni", matrix(read_car.pose), place / np.linalg.norm(place)) * TURNED
+    return np.column_stack(
+        [felt * TURNED, read_car.rates * TURNED, np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(up[:, 0])]
+    )
 
 
 def recording(values: np.ndarray, path: Path) -> Recording:
     """Samples (n, channels) as a recording; its columns lie at ``path``."""
-    own = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
-    own.write(0, values)
+    columns = Columns(path, tuple(name for name, *_ in CHANNELS), len(values))
+    columns.write(0, values)
     signals = tuple(
         Signal(name, "", name, what, "body", component, "body", 1, "", 1.0) for name, what, component in CHANNELS
     )
-    return Recording(signals, own, car.PERIOD)
+    return Recording(signals, columns, car.PERIOD)
 
 
 def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
@@ -95,8 +97,8 @@ def scene(path: Path, vehicle: CutVehicle, folder: Path) -> MeasuredScene:
         header = ",".join(("time [s]", *(f"{row[0]} [{row[-1]}]" for row in rows[name])))
         np.savetxt(folder / f"{name}.csv", np.column_stack([times, *columns]), "%.9g", ",", header=header, comments="")
     files = [
-        {"file": f"{name}.csv", "channels": [dict(zip(keys, row, strict=True)) for row in own]}
-        for name, own in rows.items()
+        {"file": f"{name}.csv", "channels": [dict(zip(keys, row, strict=True)) for row in rows_of_file]}
+        for name, rows_of_file in rows.items()
     ]
     return build(
         {

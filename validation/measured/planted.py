@@ -69,8 +69,8 @@ def lost(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: flo
 @spoiling
 def held(virtual: VirtualMeasurement, samples: np.ndarray, name: str, begin: float, length: float) -> None:
     """A channel that keeps its value from a time on, for another (s)."""
-    first, (own,) = round(begin / virtual.period), columns(virtual, name)
-    samples[first : first + round(length / virtual.period), own] = samples[first, own]
+    first, (column,) = round(begin / virtual.period), columns(virtual, name)
+    samples[first : first + round(length / virtual.period), column] = samples[first, column]
 
 
 @spoiling
@@ -82,8 +82,8 @@ def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: fl
 @spoiling
 def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, part: float) -> None:
     """The largest samples of a channel cut off."""
-    (own,) = columns(virtual, name)
-    samples[:, own] = np.minimum(samples[:, own], np.quantile(samples[:, own], 1 - part))
+    (column,) = columns(virtual, name)
+    samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - part))
 
 
 @spoiling
@@ -114,14 +114,14 @@ def measurement(
 ) -> VirtualMeasurement:
     """A car on a road; it and the four accelerometers are read at a rate (Hz)."""
     kind, seed, speed, duration = road
-    own = VirtualTable(
+    virtual = VirtualTable(
         road=Road(iso8608=kind, seed=seed, speed=speed),
         duration=duration,
         step=2e-3,
         sampling_rate=rate,
         accelerometers=SENSORS,
     )
-    return virtual_measurement(_vehicle(vehicle), own, "mujoco")
+    return virtual_measurement(_vehicle(vehicle), virtual, "mujoco")
 
 
 def _vehicle(name: str) -> CutVehicle:
@@ -145,10 +145,10 @@ def _sprung(whole: SpatialVehicle, stiffer: float, damped: float) -> SpatialVehi
 
 def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> tuple[Finding, ...]:
     """Errors and doubts of samples (m, signals)."""
-    own = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
+    spoilt = recording(virtual, samples, folder / f"{len(list(folder.iterdir()))}.columns")
     places = {name: Place("body", (x, y, z)) for name, (x, y, z) in SENSORS.items()}
     claimed = {s.name: NOISE[s.quantity] for s in virtual.signals}
-    return tuple(finding for finding in check(own, virtual.vehicle, places, claimed) if finding.weight != "note")
+    return tuple(finding for finding in check(spoilt, virtual.vehicle, places, claimed) if finding.weight != "note")
 
 
 def planted(

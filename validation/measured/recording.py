@@ -42,5 +42,5 @@ def read(path: Path) -> Recording:
 
 def gyro_error(recording: Recording) -> np.ndarray:
     """Angle (n,) in rad between the attitude that the gyro alone gives and the camera's, which starts it."""
-    found = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
-    return np.linalg.norm(logarithm(product(conjugate(recording.pose), found)), axis=1)
+    attitudes = integrate(recording.rates, PERIOD, recording.pose[0], "mean")
+    return np.linalg.norm(logarithm(product(conjugate(recording.pose), attitudes)), axis=1)

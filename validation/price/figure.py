@@ -82,14 +82,14 @@ def draw(measured: Measured) -> Figure:
 
 def _styles(measured: Measured) -> dict[str, Style]:
     """Colour by engine, marker by method, line by declared order (solid from 4 up)."""
-    found: dict[str, Style] = {}
+    styles: dict[str, Style] = {}
     for curve, (first, *_) in measured.curves().items():
         setting, colour = first.setting, _colour(first, measured)
-        used = {style["marker"] for style in found.values() if style["color"] == colour}
+        used = {style["marker"] for style in styles.values() if style["color"] == colour}
         marker = SHARED.get(setting.method) or next((m for m in MARKERS if m not in used), ".")
         line, size = STYLES.get(setting.order, "-"), SIZES.get(setting.engine, 5)
-        found[curve] = {"color": colour, "marker": marker, "linestyle": line, "markersize": size}
-    return found
+        styles[curve] = {"color": colour, "marker": marker, "linestyle": line, "markersize": size}
+    return styles
 
 
 def _colour(point: Point, measured: Measured) -> str:
@@ -117,10 +117,10 @@ def _curve(ax: Axes, measured: Measured, points: list[Point], kind: str, style: 
 
 def _floor(ax: Axes, measured: Measured) -> None:
     """The band in which the reference itself is not certain."""
-    own = measured.uncertainty[measured.quantity]
-    for low, high, alpha in ((1e-30, own, 0.6), (own, measured.floor(), 0.25)):
+    known = measured.uncertainty[measured.quantity]
+    for low, high, alpha in ((1e-30, known, 0.6), (known, measured.floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
-    told = f"reference known to {own:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
+    told = f"reference known to {known:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
     ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=8, color="#555555")
 
 
@@ -162,19 +162,19 @@ def _within(ax: Axes, places: Any) -> np.ndarray:
 
 def _drawn(ax: Axes) -> np.ndarray:
     """Places along all lines of a panel, in its fractions (n, 2)."""
-    found = [np.empty((0, 2))]
+    points = [np.empty((0, 2))]
     for line in ax.get_lines():
         ends = _within(ax, line.get_xydata())
-        found += [a + (b - a) * np.linspace(0.0, 1.0, 9)[:, None] for a, b in pairwise(ends)] + [ends]
-    return np.vstack(found)
+        points += [a + (b - a) * np.linspace(0.0, 1.0, 9)[:, None] for a, b in pairwise(ends)] + [ends]
+    return np.vstack(points)
 
 
-def _emptiest(taken: np.ndarray, own: np.ndarray) -> np.ndarray:
+def _emptiest(taken: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Of CORNERS, one whose name keeps off what is taken, near its own place where several do."""
     middles = CORNERS + LABEL * np.array([0.5, 0.0])
     apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL)
     clear = np.minimum(apart.max(axis=2).min(axis=1), 1.8)
-    far = np.hypot(*(middles - own).T)
+    far = np.hypot(*(middles - places).T)
     return np.asarray(CORNERS[np.argmax(clear - 0.3 * far)])
 
 

@@ -69,9 +69,9 @@ class Ride:
         """Two tracks as modelled, the rear delayed."""
         return self.roads["3"]
 
-    def errors(self, found: np.ndarray) -> dict[str, float]:
+    def errors(self, deviations: np.ndarray) -> dict[str, float]:
         """Largest relative error of the standard deviations (p,) by kind of output."""
-        off = np.abs(found / self.truth - 1.0)
+        off = np.abs(deviations / self.truth - 1.0)
         return {
             name: float(max(e for e, o in zip(off, self.vehicle.outputs, strict=True) if o.kind == kind))
             for name, kind in KINDS.items()
@@ -110,7 +110,7 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     swept = 3 if quick else SWEPT
     points = [_lyapunov(ride), _swept(ride, swept)]
     jobs: list[Callable[[], Any]] = [partial(direct, ride), partial(fast, ride, swept)]
-    for count, last, even in (*((*one, False) for one in GRIDS[quick]), (*UNIFORM, True)):
+    for count, last, even in (*((*net, False) for net in GRIDS[quick]), (*UNIFORM, True)):
         name = f"{'uniform' if even else 'logarithmic'} grid to {last:g} Hz"
         begun = time.perf_counter()
         errors = ride.errors(grid(ride, count, last, even))
@@ -119,8 +119,8 @@ def measure(quick: bool, rounds: int, least: float) -> tuple[list[Row], dict[str
     for copies, lasting in COPIES[quick]:
         jobs.append(partial(at_constant_speed, ride.vehicle, ride.road, SPEED, lasting, copies=copies, seed=SEED))
         begun = time.perf_counter()
-        found: Estimate = jobs[-1]()
-        errors, z = ride.errors(np.sqrt(found.variance[0])), float(np.abs(found.z(ride.truth[None])).max())
+        estimate: Estimate = jobs[-1]()
+        errors, z = ride.errors(np.sqrt(estimate.variance[0])), float(np.abs(estimate.z(ride.truth[None])).max())
         name, seconds = f"Monte Carlo, {lasting:g} s each", time.perf_counter() - begun
         points.append(Point(name, "copies", copies, errors, seconds, z))
     few = [i for i, p in enumerate(points) if p.unit != "copies" and p.count < 10_000]
@@ -134,16 +134,16 @@ def _lyapunov(ride: Ride) -> Point:
     import control
 
     with mock.patch.object(control, "lyap", wraps=control.lyap) as solve:
-        found = direct(ride)
-    return Point("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(found), 0.0)
+        deviations = direct(ride)
+    return Point("Lyapunov, delay exact", "solves", solve.call_count, ride.errors(deviations), 0.0)
 
 
 def _swept(ride: Ride, speeds: int) -> Point:
     from models.ride import sweep as module
 
     with mock.patch.object(module, "modes", wraps=module.modes) as made:
-        found = fast(ride, speeds)
-    return Point(f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(found), 0.0)
+        deviations = fast(ride, speeds)
+    return Point(f"sweep, one of {5 * speeds} points", "decompositions", made.call_count, ride.errors(deviations), 0.0)
 
 
 def judged(ride: Ride, points: list[Point]) -> list[Row]:

@@ -52,10 +52,10 @@ def _label(p: Point) -> str:
     return f"{p.setting.curve} {p.setting.label()}"
 
 
-def _none_of(name: str, what: str, found: list[str], why: str) -> Row:
+def _none_of(name: str, what: str, those: list[str], why: str) -> Row:
     """Row that passes if a list of offenders is empty, and names them if it is not."""
-    offenders = f": {', '.join(found)}" if found else ""
-    return Observed(name, SYSTEM, what + offenders, len(found), "settings").within(0, 0, why, "closed form")
+    offenders = f": {', '.join(those)}" if those else ""
+    return Observed(name, SYSTEM, what + offenders, len(those), "settings").within(0, 0, why, "closed form")
 
 
 def _reference(problem: Problem, measured: Measured) -> Row:
@@ -83,7 +83,7 @@ def _orders(measured: Measured) -> list[Row]:
             f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
             f"observed order of the largest {quantity} error, {named(curve)}",
-            found,
+            order,
             "",
         ).within(
             setting.order,
@@ -93,7 +93,7 @@ def _orders(measured: Measured) -> list[Row]:
             "closed form",
         )
         for quantity in measured.units
-        for curve, found in measured.orders(quantity).items()
+        for curve, order in measured.orders(quantity).items()
         if (setting := settings[curve]).order and not setting.adaptive
     ]
 
@@ -104,8 +104,8 @@ def _promises(problem: Problem, measured: Measured) -> Row:
     for target in problem.tolerances:
         best = cheapest(measured.reaches(target, measured.costs[0]))
         if best is not None:
-            found = attempt(problem, _runnable(problem, measured, *best))
-            worst = max(worst, found.errors.get(measured.quantity, float("inf")) / target)
+            point = attempt(problem, _runnable(problem, measured, *best))
+            worst = max(worst, point.errors.get(measured.quantity, float("inf")) / target)
     return Observed(
         f"price.{problem.key}.cheapest",
         SYSTEM,

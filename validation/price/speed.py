@@ -35,7 +35,7 @@ def callback_cost(driven: Assembly, duration: float, integrator: str, rounds: in
         "gap": float(np.abs(compiled.run() - models[2].run().states).max()),
         "all compiled to no forces": paired_ratio(seconds[4], seconds[3]),
         "callbacks": [model.plan()["callbacks"] for model in models],
-        "seconds": {name: describe(own) for name, own in zip(names, seconds, strict=True)},
+        "seconds": {name: describe(times) for name, times in zip(names, seconds, strict=True)},
         "to no forces": paired_ratio(seconds[2], seconds[0]),
         "to no callback": paired_ratio(seconds[2], seconds[1]),
     }

@@ -94,14 +94,14 @@ def _road_exudyn() -> Runs:
         return (scale * derivative(y, road, p)[4:]).tolist()
 
     return [
-        partial(exudyn_marches(masses, one, [METHODS["exudyn"]])[0], STEPS["road"]) for one in (nothing, handed(), of)
+        partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"]) for law in (nothing, handed(), of)
     ]
 
 
 def _road_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assemble(road_excited.scene()), settings)
-    return [partial(_within, one, compiled.coast) for one in (empty_law(), native_law(damper), law())]
+    return [partial(_within, counted, compiled.coast) for counted in (empty_law(), native_law(damper), law())]
 
 
 def _wheel_exudyn() -> Runs:
@@ -116,8 +116,8 @@ def _wheel_mujoco() -> Runs:
     wheels, steps, step = _wheels()
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
-        partial(_within, one, partial(marcher.run, start, steps))
-        for one in (empty_law(), native_law(damper), native_law(forces))
+        partial(_within, law, partial(marcher.run, start, steps))
+        for law in (empty_law(), native_law(damper), native_law(forces))
     ]
 
 

@@ -64,7 +64,7 @@ def rounds_of(points: list[Point]) -> str:
     told = " and ".join(f"{n} interleaved rounds for {count}" for n, count in sorted(numbers.items(), reverse=True))
     if not in_rounds:
         return "Seconds are those of one run each."
-    spread = float(np.median([one["mad"] / one["median"] for one in map(describe, in_rounds)]))
+    spread = float(np.median([times["mad"] / times["median"] for times in map(describe, in_rounds)]))
     return (
         f"Seconds are medians of {told} settings whose seconds decide something (fewer where a run is longer than "
         f"{1e3 * runner.SLOW:g} ms; median absolute deviation {100 * spread:.0f} %), and of one run for "
@@ -74,8 +74,10 @@ def rounds_of(points: list[Point]) -> str:
     )
 
 
-def _won(measured: Measured, found: Reaches, among: str, unit: str, groups: list[tuple[str, ...]] | None = None) -> str:
-    best = runner.cheapest(found, among)
+def _won(
+    measured: Measured, reaches: Reaches, among: str, unit: str, groups: list[tuple[str, ...]] | None = None
+) -> str:
+    best = runner.cheapest(reaches, among)
     if best is None:
         return "none of those tried"
     curve, least = best
@@ -124,12 +126,12 @@ def losses(measured: Measured) -> Table:
     return Table("Factor that a default setting loses", note, (f"{measured.quantity} error at most", *heads), rows)
 
 
-def _lost(found: Loss | None) -> str:
-    if found is None:
+def _lost(loss: Loss | None) -> str:
+    if loss is None:
         return "-"
-    factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (found.factor, found.low, found.high))
-    mark = "*" if found.how == "extrapolated" else ""
-    told = f" [{low}, {high}]" if found.low < found.high else ""  # none of a count, or after too few rounds
+    factor, low, high = (f"{x:,.0f}" if x >= 100 else f"{x:.3g}" for x in (loss.factor, loss.low, loss.high))
+    mark = "*" if loss.how == "extrapolated" else ""
+    told = f" [{low}, {high}]" if loss.low < loss.high else ""  # none of a count, or after too few rounds
     return f"{factor}{mark}{told}"
 
 
@@ -195,11 +197,11 @@ def outcomes(measured: Measured) -> Table:
 
 def failures(measured: Measured) -> Table:
     """Everything that gave no answer to rely on, with what was said."""
-    found = defaultdict(list)
+    labels_of = defaultdict(list)
     for p in measured.points:
         if p.status != "ok":
-            found[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
-    rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in found.items())
+            labels_of[_plain(p.setting.curve), STATUSES[p.status], p.reason].append(p.setting.label())
+    rows = tuple((curve, ", ".join(labels), status, reason) for (curve, status, reason), labels in labels_of.items())
     return Table(
         "Settings that gave no answer to rely on",
         "What was said, by how the setting ended.",

@@ -75,10 +75,10 @@ class Verdict:
     @property
     def factor(self) -> float:
         """Predicted by true error, or its inverse, whichever is above 1; errors below the floor count as the floor."""
-        one, other = max(self.predicted, self.floor), max(self.true, self.floor)
-        if one == other:
+        first, other = max(self.predicted, self.floor), max(self.true, self.floor)
+        if first == other:
             return 1.0
-        return max(one, other) / min(one, other) if min(one, other) > 0.0 else math.inf
+        return max(first, other) / min(first, other) if min(first, other) > 0.0 else math.inf
 
 
 def drawn(number: int, folder: Path) -> Drawn:
@@ -174,30 +174,32 @@ def _written(rng: Random, folder: Path, number: int, period: float) -> str:
     return name
 
 
-def judge(one: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
+def judge(drawn: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene: of all these engines, and of each."""
-    return verdicts(one, engines, lambda found, settings: true_errors(found.scene, settings))
+    return verdicts(drawn, engines, lambda recommendation, settings: true_errors(recommendation.scene, settings))
 
 
 def verdicts(
-    one: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
+    drawn: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
 ) -> list[Verdict]:
     """The same by what a function makes of the recommendation and its settings: the true error of each."""
-    found = recommend(priced(one.scene, one.quantity, engines), one.tolerance)
-    errors = true(found, list(dict.fromkeys(choice.tried.setting for choice in found.winners.values())))
+    recommendation = recommend(priced(drawn.scene, drawn.quantity, engines), drawn.tolerance)
+    errors = true(
+        recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))
+    )
     return [
         Verdict(
-            one.scene.title,
+            drawn.scene.title,
             choice.tried.setting.curve,
             choice.tried.setting.label(),
-            one.tolerance,
+            drawn.tolerance,
             choice.error,
             errors[choice.tried.setting],
-            found.truth.uncertainty,
-            slower(found, key, choice),
+            recommendation.truth.uncertainty,
+            slower(recommendation, key, choice),
             key[1],
         )
-        for key, choice in found.winners.items()
+        for key, choice in recommendation.winners.items()
     ]
 
 
@@ -223,31 +225,37 @@ def _exact(scene: OwnPitchPlane, spacing: float) -> Answer:
     return scene.answer(scene.run("reference", Settings("DOP853", spacing, scene.whole, TIGHT)))
 
 
-def slower(found: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
+def slower(recommendation: Recommendation, key: tuple[str, str], choice: Choice) -> bool:
     """Whether an engine's default that meets the tolerance would have cost less than the recommended setting."""
     engine, kind = key
-    rivals = [one for one in _defaults(found) if one.setting.engine.startswith(engine)]
+    rivals = [attempt for attempt in _defaults(recommendation) if attempt.setting.engine.startswith(engine)]
     if kind == "calls":
         return any(rival.calls < choice.calls for rival in rivals)
-    return any(_loses(found, choice, rival) for rival in rivals)
+    return any(_loses(recommendation, choice, rival) for rival in rivals)
 
 
-def _defaults(found: Recommendation) -> list[Tried]:
+def _defaults(recommendation: Recommendation) -> list[Tried]:
     """The coarsest setting of each default method that meets the tolerance, of all that were tried where the whole run
     was searched: what is recommended may have forgotten one."""
-    if not found.whole:
+    if not recommendation.whole:
         return [
-            one.refined.tried for one in found.defaults.values() if one.refined is not None and not one.extrapolated
+            each.refined.tried
+            for each in recommendation.defaults.values()
+            if each.refined is not None and not each.extrapolated
         ]
-    held = found.tolerance - found.searched.uncertainty
+    held = recommendation.tolerance - recommendation.searched.uncertainty
     able = sorted(
-        (one for one in found.tried if one.setting.default and one.error <= held), key=lambda one: one.setting.value
+        (each for each in recommendation.tried if each.setting.default and each.error <= held),
+        key=lambda each: each.setting.value,
     )
-    return list({one.setting.curve: one for one in able}.values())
+    return list({each.setting.curve: each for each in able}.values())
 
 
-def _loses(found: Recommendation, choice: Choice, rival: Tried) -> bool:
+def _loses(recommendation: Recommendation, choice: Choice, rival: Tried) -> bool:
     if rival.setting == choice.tried.setting or rival.seconds > CONTEST * choice.seconds:
         return False
-    jobs = [partial(found.scene.solve, one.setting, found.scene.first) for one in (choice.tried, rival)]
+    jobs = [
+        partial(recommendation.scene.solve, attempt.setting, recommendation.scene.first)
+        for attempt in (choice.tried, rival)
+    ]
     return all(paired_ratio(*interleave(jobs, rounds, LEAST, clock=time.process_time))[1] > SLOWER for rounds in ROUNDS)

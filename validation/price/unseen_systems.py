@@ -68,44 +68,44 @@ def _wheelset(rng: Random) -> Asked:
 
 
 def _handling(rng: Random) -> Asked:
-    own = {
+    manoeuvre = {
         "speed": float(rng.uniform(12.0, 30.0)),
         "duration": 0.5,
         "rough": bool(rng.integers(2)),
         "steer": [[0.05, 0.0], [float(rng.uniform(0.2, 0.4)), float(rng.uniform(-0.06, 0.06))]],
     }
     tyres = {"friction": float(rng.uniform(0.4, 1.0))}
-    return {"tyres": tyres, "manoeuvres": {"drawn": own}}, ["yaw_rate", "load"]
+    return {"tyres": tyres, "manoeuvres": {"drawn": manoeuvre}}, ["yaw_rate", "load"]
 
 
 def _braking(rng: Random) -> Asked:
     kind, surface = str(rng.choice(["straight", "j_turn", "split"])), str(rng.choice(["snow", "wet", "ice"]))
-    own: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
+    procedure: dict[str, Any] = {"kind": kind, "speed": float(rng.uniform(4.0, 9.0))}
     if kind == "j_turn":
-        own["steer"] = float(rng.uniform(0.01, 0.05))
+        procedure["steer"] = float(rng.uniform(0.01, 0.05))
     if kind == "split":
-        own["right"] = "ice"
+        procedure["right"] = "ice"
     controller = {"kind": str(rng.choice(["none", "slip_bang_bang", "slip_pi"]))}
     quantities = ["stopping_distance"] if kind == "straight" else ["stopping_distance", "yaw"]
     return {
         "controller": controller,
         "pressure": {},
         "load_transfer": {},
-        "procedures": {"drawn": own},
+        "procedures": {"drawn": procedure},
         "road": {"stretches": [{"left": surface}]},
     }, quantities
 
 
-def judge(one: Drawn) -> list[Verdict]:
+def judge(drawn: Drawn) -> list[Verdict]:
     """A verdict on every setting that is recommended for a scene."""
-    return verdicts(one, ENGINES[one.scene.system], true_errors)
+    return verdicts(drawn, ENGINES[drawn.scene.system], true_errors)
 
 
-def true_errors(found: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
+def true_errors(recommendation: Recommendation, settings: list[Setting]) -> dict[Setting, float]:
     """Largest error of each setting over the whole run, beside a truth of another kind than the search's."""
-    scene: Any = found.scene
+    scene: Any = recommendation.scene
     ladder = scene.reference()
-    finer = Setting(ladder.engine, ladder.method, ladder.values[found.truth.rung] / MORE, ladder.order)
+    finer = Setting(ladder.engine, ladder.method, ladder.values[recommendation.truth.rung] / MORE, ladder.order)
 
     def error(setting: Setting) -> float:
         exact = _exact(scene, setting) if isinstance(scene, Meshed) else scene.answer(scene.solve(finer, scene.whole))

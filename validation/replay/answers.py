@@ -214,9 +214,9 @@ def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, 
 
 def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, str]) -> str | None:
     """Name of a channel in later arrays: its own, its new one, or that of the same channel in the only other file."""
-    if (own := renamed.get(name, name)) in arrays:
-        return own
-    channel = own.partition(": ")[2]
+    if (name_then := renamed.get(name, name)) in arrays:
+        return name_then
+    channel = name_then.partition(": ")[2]
     others = [other for other in arrays if other.partition(": ")[2] == channel]
     return others[0] if len(others) == 1 else None
 

@@ -122,10 +122,10 @@ def _verdict(resolved: bool, residual: float) -> str:
     return "first order" if resolved else "a level only"
 
 
-def fits_table(found: list[dict[str, Any]]) -> Table:
+def fits_table(roads: list[dict[str, Any]]) -> Table:
     """Both processes of every road, with what is not known."""
     rows = []
-    for road in found:
+    for road in roads:
         for process, unit, values in zip(("mean", "roll"), ("m", "1/m"), road["fits"], strict=True):
             columns = ["none", "none", "", "same heights twice"]
             if values is not None:

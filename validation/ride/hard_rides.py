@@ -37,9 +37,11 @@ def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car
     def error(implementation: str, folder: Path) -> float:
         worst, vehicle = 0.0, quarter(*vars(exact).values())
         for speed in speeds:
-            found = stationary(excited(linear(vehicle, implementation), one_track((0.0,), corner), speed))
+            covariance = stationary(excited(linear(vehicle, implementation), one_track((0.0,), corner), speed))
             q, w = INTENSITY * speed, corner * speed
-            worst = max(worst, off(found.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)]))
+            worst = max(
+                worst, off(covariance.variance[:2], [exact.body_acceleration(q, w), exact.suspension_travel(q, w)])
+            )
         return worst
 
     return error
@@ -47,10 +49,10 @@ def closed_form(corner: float = 0.3, speeds: tuple[float, ...] = (SPEED,), **car
 
 def quarter(m_s: float, m_u: float, k: float, c: float, k_t: float, c_t: float = 0.0) -> SpatialVehicle:
     """A quarter car; outputs: acceleration of the body, travel, and force of the tyre."""
-    own = replace(load_vehicle("quarter_car"), name="quarter")
-    bodies = tuple(replace(body, mass=m) for body, m in zip(own.bodies, (m_s, m_u), strict=True))
-    springs = (replace(own.springs[0], stiffness=k, damping=c),)
-    return replace(own, bodies=bodies, springs=springs, tyres=(replace(own.tyres[0], stiffness=k_t, damping=c_t),))
+    car = replace(load_vehicle("quarter_car"), name="quarter")
+    bodies = tuple(replace(body, mass=m) for body, m in zip(car.bodies, (m_s, m_u), strict=True))
+    springs = (replace(car.springs[0], stiffness=k, damping=c),)
+    return replace(car, bodies=bodies, springs=springs, tyres=(replace(car.tyres[0], stiffness=k_t, damping=c_t),))
 
 
 def single(mass: float, stiffness: float, damping: float) -> SpatialVehicle:

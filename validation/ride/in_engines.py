@@ -52,17 +52,17 @@ def bent_in_engines(quick: bool) -> list[Row]:
     rows = [_apart("bent", f"{NONLINEAR} under gravity, {NONLINEAR_DRIVEN[not quick]:g} s", runs)]
     if quick:
         return rows
-    found = statistically_linear(vehicle, excitation_, SPEED)
-    travel, force = (found.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
-    size, left = found.covariance.deviation, found.left_out
-    error, _ = standard_errors(found.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
+    linear = statistically_linear(vehicle, excitation_, SPEED)
+    travel, force = (linear.covariance.names.index(f"{kind} front left") for kind in ("travel", "tyre force"))
+    size, left = linear.covariance.deviation, linear.left_out
+    error, _ = standard_errors(linear.vehicle, excitation_, SPEED, NONLINEAR_DRIVEN[1] - SKIPPED)
     for engine, run in runs.items():
-        shift = abs(run.outputs[:, travel].mean() - found.mean[travel]) / size[travel]
+        shift = abs(run.outputs[:, travel].mean() - linear.mean[travel]) / size[travel]
         rows.append(
             Observed(
                 f"ride_nonlinear.mean.{engine}",
                 SYSTEM,
-                f"the same in {engine}: mean travel, predicted {1e3 * found.mean[travel]:.2f} mm, by its deviation",
+                f"the same in {engine}: mean travel, predicted {1e3 * linear.mean[travel]:.2f} mm, by its deviation",
                 float(shift),
                 "",
             ).at_most(
@@ -85,8 +85,8 @@ def bent_in_engines(quick: bool) -> list[Row]:
 
 
 def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
-    one, other = (runs[engine].run for engine in ENGINES)
-    gap = max(np.abs(one.positions - other.positions).max(), np.abs(one.rates - other.rates).max())
+    first, other = (runs[engine].run for engine in ENGINES)
+    gap = max(np.abs(first.positions - other.positions).max(), np.abs(first.rates - other.rates).max())
     return Observed(
         f"ride_nonlinear.path.{id}",
         SYSTEM,
@@ -151,10 +151,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     figure, axes = plt.subplots(2, 2, figsize=(10.0, 6.4), sharex=True)
     for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
         for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
-            own = shown[engine]
+            curves = shown[engine]
             axis.loglog(
-                own["frequency"],
-                own[name],
+                curves["frequency"],
+                curves[name],
                 style,
                 color=COLOURS[engine],
                 linewidth=width,

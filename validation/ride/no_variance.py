@@ -47,16 +47,16 @@ def without_variance() -> list[Row]:
 def _white_rows() -> list[Row]:
     """Tyre damping: what has no variance is said, with its reason, and what has one is right."""
     vehicle = corners([(0.0, CORNER)], tyre_damping=100.0)
-    found = stationary(excited(vehicle, one_track((0.0,), 0.3), 20.0))
+    covariance = stationary(excited(vehicle, one_track((0.0,), 0.3), 20.0))
     other = quadrature(vehicle, one_track((0.0,), 0.3), 20.0)
     rows = [
         behaves(
             f"ride_covariance.white.{name}",
             SYSTEM,
             f"tyre damping under a road of first order: {what}",
-            found.status[i],
+            covariance.status[i],
             expected,
-            found.reason[i],
+            covariance.reason[i],
         )
         for name, what, i, expected in (
             ("body", "body acceleration", 0, "finite"),
@@ -70,7 +70,7 @@ def _white_rows() -> list[Row]:
             "ride_covariance.white.value",
             SYSTEM,
             "the outputs that stay finite, against quadrature",
-            off(found.variance[:4], other.variance[:4]),
+            off(covariance.variance[:4], other.variance[:4]),
             "",
         ).at_most(1e-10, "both routes at their best", "native"),
     ]
@@ -82,8 +82,8 @@ def _free_rows() -> list[Row]:
     vehicle = linearise(free, 20.0)
     road = paper_road(vehicle.wheels)
     system = excited(vehicle, road, 20.0)
-    split, found = parts(system.A), stationary(system)
-    same = np.array_equal(_with_slycot(system), found.variance)
+    split, covariance = parts(system.A), stationary(system)
+    same = np.array_equal(_with_slycot(system), covariance.variance)
     steer = {"fl": 0.05, "fr": 0.05}
     forces = tuple(replace(force, roll_steer=steer.get(force.name, 0.0)) for force in free.side_forces)
     turning = linearise(replace(free, side_forces=forces), 20.0)
@@ -101,9 +101,9 @@ def _free_rows() -> list[Row]:
             "ride_covariance.free.status",
             SYSTEM,
             "all outputs of R19-free",
-            " and ".join(set(found.status)),
+            " and ".join(set(covariance.status)),
             FINITE,
-            found.reason[0],
+            covariance.reason[0],
         ),
         behaves(
             "ride_covariance.free.slycot",

@@ -69,5 +69,5 @@ def path_error(engine: str, vehicle: CutVehicle, steps: int) -> float:
 
 
 def _difference(rows: list[list[np.ndarray]]) -> float:
-    found, wanted = map(np.array, rows)
-    return float((np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())
+    computed, wanted = map(np.array, rows)
+    return float((np.abs(computed - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max())

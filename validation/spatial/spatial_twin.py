@@ -61,8 +61,8 @@ def _bodies() -> tuple[Body, ...]:
     )
 
 
-def _spring(name: str, one: str, two: str, point: Vector, axis: Vector, k: float, c: float) -> SpringDamper:
-    return SpringDamper(name, one, two, point, point, axis, k, c)
+def _spring(name: str, from_body: str, two: str, point: Vector, axis: Vector, k: float, c: float) -> SpringDamper:
+    return SpringDamper(name, from_body, two, point, point, axis, k, c)
 
 
 def _springs() -> tuple[SpringDamper, ...]:

@@ -54,9 +54,9 @@ def signals(
         if start is not None:
             file.header.start_time = start
         for group, family in zip(groups, families or [""] * len(groups), strict=True):
-            plain = {name: own if isinstance(own, dict) else {"samples": own} for name, own in group.items()}
+            plain = {name: data if isinstance(data, dict) else {"samples": data} for name, data in group.items()}
             file.append(
-                [Signal(name=name, timestamps=times[: len(own["samples"])], **own) for name, own in plain.items()],
+                [Signal(name=name, timestamps=times[: len(data["samples"])], **data) for name, data in plain.items()],
                 acq_name=family,
                 comment=family,
                 common_timebase=True,

@@ -119,33 +119,33 @@ def _state(folder: Path) -> dict[str, str]:
 
 def read(source: Source) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and values of every channel, read in several blocks."""
-    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    channels: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for group in {channel.group for channel in source.channels}:
         names = [channel.name for channel in source.channels if channel.group == group]
         count = next(channel.count for channel in source.channels if channel.group == group)
         blocks = list(source.blocks(names, 1 + count // (6 if len(names) < 100 else 1)))
-        times, values = (np.concatenate([getattr(one, key) for one in blocks]) for key in ("times", "values"))
-        found |= {name: (times, values[:, i]) for i, name in enumerate(names)}
-    return found
+        times, values = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("times", "values"))
+        channels |= {name: (times, values[:, i]) for i, name in enumerate(names)}
+    return channels
 
 
 def difference(source: Source, truth: Truth, says: str) -> float:
     """Largest difference between a file and the truth; inf where a channel, a sample or the sentence is missing."""
-    found, said = read(source), [one.text for one in source.noticed if one.weight != "note" or says]
-    if set(found) != set(truth) or not (any(says in text for text in said) if says else not said):
+    channels, said = read(source), [finding.text for finding in source.noticed if finding.weight != "note" or says]
+    if set(channels) != set(truth) or not (any(says in text for text in said) if says else not said):
         return np.inf
-    return max(_apart(found[name], truth[name], bool(says)) for name in truth)
+    return max(_apart(channels[name], truth[name], bool(says)) for name in truth)
 
 
-def _apart(found: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], part: bool) -> float:
+def _apart(read_channel: tuple[np.ndarray, np.ndarray], truth: tuple[np.ndarray, np.ndarray], part: bool) -> float:
     """Largest difference of times and values; a part of the samples will do where that was said."""
-    count = len(found[0])
+    count = len(read_channel[0])
     if count == 0 or count > len(truth[0]) or (count < len(truth[0]) and not part):
         return np.inf
     times, values = truth[0][:count], truth[1][:count]
-    if not np.array_equal(np.isnan(found[1]), np.isnan(values)):
+    if not np.array_equal(np.isnan(read_channel[1]), np.isnan(values)):
         return np.inf
-    return float(max(np.abs(found[0] - times).max(), np.nanmax(np.abs(found[1] - values), initial=0.0)))
+    return float(max(np.abs(read_channel[0] - times).max(), np.nanmax(np.abs(read_channel[1] - values), initial=0.0)))
 
 
 def written(path: Path, names: tuple[str, ...] = ("Fz", "Fx"), values: np.ndarray | None = None) -> Path:
@@ -197,7 +197,7 @@ def two_rates(extension: str) -> Make:
     clocks = (("Fz", PERIOD, FZ), ("Fx", SLOW, FX))
 
     def make(folder: Path) -> Path:
-        groups = [Group((name,), ("N",), ("",), period, COUNT, [own[:, None]]) for name, period, own in clocks]
+        groups = [Group((name,), ("N",), ("",), period, COUNT, [samples[:, None]]) for name, period, samples in clocks]
         return write(folder / f"odd{extension}", groups)
 
     return make
@@ -234,7 +234,7 @@ class Sweep:
         path.write_bytes(data)
         try:
             source = open_source(path)
-            own = {name: truth[name] for name in truth if name in {channel.name for channel in source.channels}}
-            return difference(source, own, "cut off") > TOLERANCE
+            kept = {name: truth[name] for name in truth if name in {channel.name for channel in source.channels}}
+            return difference(source, kept, "cut off") > TOLERANCE
         except InputError as refusal:
             return path.name not in str(refusal)

@@ -31,7 +31,7 @@ def by_rpc3(path: Path) -> Read:
     import rpc3
 
     rpc3.rpc3.progressbar = False
-    return {one.name: (np.asarray(one.data), one.unit) for one in rpc3.read(str(path))[0]}
+    return {channel.name: (np.asarray(channel.data), channel.unit) for channel in rpc3.read(str(path))[0]}
 
 
 def by_nptdms(path: Path) -> Read:

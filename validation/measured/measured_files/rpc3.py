@@ -47,7 +47,7 @@ def _values(data: bytes) -> dict[str, Any]:
     """Parameters of a header."""
     count = int(data[2 * RECORD + KEY : 3 * RECORD].rstrip(b"\0"))
     records = [data[i * RECORD : (i + 1) * RECORD] for i in range(count)]
-    texts = [[part.rstrip(b"\0").decode("latin-1") for part in (own[:KEY], own[KEY:])] for own in records]
+    texts = [[part.rstrip(b"\0").decode("latin-1") for part in (record[:KEY], record[KEY:])] for record in records]
     return dict(texts)
 
 

@@ -39,14 +39,14 @@ CLOCK = {"wf_increment": PERIOD, "wf_start_offset": 0.0}
 TDMS = plain(".tdms")
 
 
-def channels(*own: tuple[str, str, Any, dict[str, Any]]) -> Make:
+def channels(*columns: tuple[str, str, Any, dict[str, Any]]) -> Make:
     """Make a file of channels: group, name, samples, properties."""
 
     def make(folder: Path) -> Path:
         from nptdms import ChannelObject, TdmsWriter
 
         with TdmsWriter(str(folder / "odd.tdms")) as file:
-            file.write_segment([ChannelObject(*one) for one in own])
+            file.write_segment([ChannelObject(*column) for column in columns])
         return folder / "odd.tdms"
 
     return make
@@ -94,7 +94,7 @@ def at(hour: int) -> np.datetime64:
 
 def prefix(**values: np.ndarray) -> Truth:
     """Truth of some channels on the usual clock."""
-    return {name: (TIMES, own) for name, own in values.items()}
+    return {name: (TIMES, samples) for name, samples in values.items()}
 
 
 REFUSED: Files = {

@@ -29,6 +29,6 @@ def each(curves: Curves, setting: Callable[[str, str, float], Setting]) -> tuple
     return tuple(setting(*curve, value) for curve, values in curves.items() for value in values)
 
 
-def apart(found: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
+def apart(channels: dict[str, np.ndarray], true: dict[str, np.ndarray]) -> dict[str, float]:
     """Largest difference of each quantity from its reference."""
-    return {name: float(np.abs(values - true[name]).max()) for name, values in found.items()}
+    return {name: float(np.abs(values - true[name]).max()) for name, values in channels.items()}

@@ -116,7 +116,7 @@ class BrakingStop:
         self.duration = self.valves.size * SAMPLE
         solvers = SOLVERS[quick]
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in solvers)
-        self.true, other = (self._by(*one) for one in solvers)
+        self.true, other = (self._by(*each) for each in solvers)
         self.uncertainty = {"stopping distance": abs(self.true - other)}
 
     def settings(self, quick: bool) -> tuple[Setting, ...]:
@@ -159,11 +159,11 @@ class BrakingStop:
     def _torques(self, substeps: int) -> np.ndarray:
         """Torque (N m) at the ends of all steps."""
         air, part = still(self._chambers, SAMPLE), np.zeros((substeps + 1, 1))
-        found = [np.zeros(1)]
+        torques = [np.zeros(1)]
         for valve in self.valves:
             by_valves(np.array([valve]), SAMPLE, air, self._chambers, self._brakes, part)
-            found.append(part[1:, 0].copy())
-        return np.concatenate(found)
+            torques.append(part[1:, 0].copy())
+        return np.concatenate(torques)
 
     def _ours(self, substeps: int) -> Result:
         stop = braked(FRONT, stacked(self._tables), self._road, self._torques(substeps), SAMPLE / substeps, self.speed)

@@ -79,7 +79,7 @@ class ForceExcited:
 
     def __init__(self, quick: bool) -> None:
         self.units = dict((*self.first, ("state", "m, rad, m/s, rad/s")))
-        steps = [1e3 * one.value for one in self.settings(quick)]
+        steps = [1e3 * setting.value for setting in self.settings(quick)]
         self.title = (
             f"Pitch-plane vehicle {self.what}, {DURATION:g} s at {SPEED:g} m/s, before "
             f"drift-off, fixed steps of {min(steps):g} to {max(steps):g} ms"
@@ -144,8 +144,8 @@ class NoisyForces(ForceExcited):
 
     def read(self, run: Trajectory) -> dict[str, np.ndarray]:
         """Both suspension forces, and states."""
-        found = outputs(self.assembly, run)
-        return {"suspension force": np.column_stack([found[name][2] for name in ("f3", "f4")]), "state": run.states}
+        channels = outputs(self.assembly, run)
+        return {"suspension force": np.column_stack([channels[name][2] for name in ("f3", "f4")]), "state": run.states}
 
 
 class PrescribedPitch(ForceExcited):

@@ -86,7 +86,7 @@ class FreeVehicle:
     tolerances: tuple[float, ...] = (100.0, 10.0, 1.0, 0.1)
 
     def __init__(self, quick: bool) -> None:
-        steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
+        steps = [1e3 * setting.value for setting in self.settings(quick) if not setting.adaptive]
         self.title = (
             f"Passenger car of 19 freedoms, free on a road of two tracks, {DURATION:g} s at {SPEED:g} m/s, "
             f"steps of {min(steps):g} to {max(steps):g} ms"
@@ -98,17 +98,19 @@ class FreeVehicle:
         self._outputs = linearise(self.vehicle, SPEED).outputs
         self._model = build("mujoco", self.vehicle, None, SPEED)
         laws = SpatialReference(self.vehicle, SPEED).acceleration, self._model.acceleration
-        self.states, self.others = (self._solved(law, *one[:2]) for law, one in zip(laws, REFERENCES, strict=True))
+        self.states, self.others = (
+            self._solved(law, *setting[:2]) for law, setting in zip(laws, REFERENCES, strict=True)
+        )
         self._true = self.read(self.states, self.instants)
         self.uncertainty = apart(self.read(self.others, self.instants), self._true)
         self.bound = 10 * float(np.abs(self._true["wheel load"]).max())
 
     def road(self, times: ArrayLike) -> np.ndarray:
         """Heights (m) under the wheels at times (..., ) in s, then their rates (m/s): (..., 2 w)."""
-        found = [
+        waves = [
             heights(SPEED * np.asarray(times) + tyre.point[0], int(tyre.point[1] < 0)) for tyre in self.vehicle.tyres
         ]
-        return np.stack([*(height for height, _ in found), *(SPEED * slope for _, slope in found)], axis=-1)
+        return np.stack([*(height for height, _ in waves), *(SPEED * slope for _, slope in waves)], axis=-1)
 
     def _solved(self, acceleration: Callable[..., np.ndarray], method: str, tolerance: float) -> np.ndarray:
         """States (m, 2 n) at the instants, from rest."""
@@ -117,7 +119,7 @@ class FreeVehicle:
         def rates(t: float, y: np.ndarray) -> np.ndarray:
             return np.concatenate([y[n:], acceleration(y[:n], y[n:], self.road(t))])
 
-        found = solve_ivp(
+        solution = solve_ivp(
             rates,
             (0.0, DURATION),
             np.zeros(2 * n),
@@ -126,7 +128,7 @@ class FreeVehicle:
             rtol=tolerance,
             atol=1e-2 * tolerance,
         )
-        return found.y.T
+        return solution.y.T
 
     def read(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
         """Wheel loads beside the static ones (m, w) in N and accelerations (m, p) in m/s^2 of states (m, 2 n)."""
@@ -146,14 +148,14 @@ class FreeVehicle:
     def setting(self, engine: str, method: str, value: float) -> Setting:
         """A setting by its curve and the longest step (s) up to ``value`` that meets every instant, or a tolerance."""
         known = CATALOGUE[engine][method.split()[0]]
-        own = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
-        return setting(engine, method, float(own))
+        step = value if known.adaptive else GRID / np.ceil(GRID / value * (1 - 1e-9))
+        return setting(engine, method, float(step))
 
     def build(self, setting: Setting) -> Solver:
         """The vehicle in one engine."""
-        own = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
-        times = 0.5 * own.step * np.arange(2 * own.steps + 1)
-        model = build(setting.engine, self.vehicle, own, SPEED, self.road(times))
+        settings = replace(settings_of(setting, DURATION), step=1e-3 if setting.adaptive else setting.value)
+        times = 0.5 * settings.step * np.arange(2 * settings.steps + 1)
+        model = build(setting.engine, self.vehicle, settings, SPEED, self.road(times))
         rest = np.zeros(len(self.vehicle.coordinates()))
         return Solver(partial(model.run, rest, rest))
 

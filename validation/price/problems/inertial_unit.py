@@ -86,16 +86,16 @@ def magnus(step: float) -> np.ndarray:
     start = step * np.arange(round(DURATION / step))
     first, middle, last = (step * gyro(start + step * (0.5 + off)) for off in np.array([-1, 0, 1]) * np.sqrt(0.15))
     slope, bend = np.sqrt(15) / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
-    one = -np.cross(middle, slope)
-    two = np.cross(middle, 2 * bend + one) / 60
-    turn = middle + bend / 12 - np.cross(-20 * middle - bend + one, slope + two) / 240
+    odd = -np.cross(middle, slope)
+    two = np.cross(middle, 2 * bend + odd) / 60
+    turn = middle + bend / 12 - np.cross(-20 * middle - bend + odd, slope + two) / 240
     # a chain of rotations is what rates that are held for one second each make
     return integrate(np.concatenate([turn, turn[-1:]]), 1.0, attitude(np.zeros(1))[0], "held")
 
 
-def apart(found: np.ndarray, true: np.ndarray) -> float:
+def apart(computed: np.ndarray, true: np.ndarray) -> float:
     """Largest angle (rad) between attitudes (n, 4)."""
-    return float(np.linalg.norm(logarithm(product(conjugate(found), true)), axis=-1).max())
+    return float(np.linalg.norm(logarithm(product(conjugate(computed), true)), axis=-1).max())
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,8 @@ class Solver:
         count, every, start = round(DURATION / period), round(GRID / period), attitude(np.zeros(1))[0]
         if engine != "reference":
             return (in_exudyn if engine == "exudyn" else in_mujoco)(method, period, count, every, start, gyro)
-        found = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
-        return Attitudes(found[::every], {"steps": count, "force calls": count})
+        attitudes = integrate(gyro(period * np.arange(count + 1)), period, start, RULES[method][0])
+        return Attitudes(attitudes[::every], {"steps": count, "force calls": count})
 
 
 class InertialUnit:
@@ -125,7 +125,7 @@ class InertialUnit:
     tolerances: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
     def __init__(self, quick: bool) -> None:
-        rates = [1 / one.value for one in self.settings(quick)]
+        rates = [1 / setting.value for setting in self.settings(quick)]
         self.title = (
             f"Attitude of a car for {DURATION:g} s from {min(rates):g} to {max(rates):g} samples of its rates a second"
         )

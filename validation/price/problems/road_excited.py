@@ -159,7 +159,7 @@ class RoadExcited:
     )
 
     def __init__(self, quick: bool) -> None:
-        steps = [1e3 * one.value for one in self.settings(quick) if not one.adaptive]
+        steps = [1e3 * setting.value for setting in self.settings(quick) if not setting.adaptive]
         self.title = (
             f"Pitch-plane vehicle on the study road, {DURATION:g} s at {SPEED:g} m/s, "
             f"fixed steps of {min(steps):g} to {max(steps):g} ms"
@@ -173,7 +173,7 @@ class RoadExcited:
         self._states = self._solution(times).T
         others = [dense(self.assembly, *solver)(times).T for solver in solvers[1:]]
         differences = [self._largest(other - self._states) for other in others]
-        self.uncertainty = {name: max(found[name] for found in differences) for name in self.units}
+        self.uncertainty = {name: max(gaps[name] for gaps in differences) for name in self.units}
         signal, p = self.assembly.input, self.assembly.parameters
         assert signal is not None
         off = self._states[:, [0, 1, 4, 5]] - signal.sample(0.0, GRID, len(times))

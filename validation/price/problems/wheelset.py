@@ -138,7 +138,7 @@ class RollingWheels:
         self._start = np.concatenate([part * LEVEL for part in self.wheels.state()])
         self._table = np.array([self.wheels.masses, self.wheels.stiffness, self.wheels.damping])
         self.reference = " and ".join(f"{method} at {tolerance:g}" for method, tolerance in SOLVERS)
-        self._true, other = (self.read(self._by(*one).state) for one in SOLVERS)
+        self._true, other = (self.read(self._by(*solver).state) for solver in SOLVERS)
         self.uncertainty = self._off(other)
         self.bound = self.wheels.mu * self.wheels.load
 
@@ -186,8 +186,8 @@ class RollingWheels:
         add_forces(self.wheels.numbers, state[:FREEDOMS].copy(), state[FREEDOMS:].copy(), force)
         return {"creep force": force[:2], "displacement": state[:2]}
 
-    def _off(self, found: dict[str, Array]) -> dict[str, float]:
-        return {name: float(np.abs(values - self._true[name]).max()) for name, values in found.items()}
+    def _off(self, channels: dict[str, Array]) -> dict[str, float]:
+        return {name: float(np.abs(values - self._true[name]).max()) for name, values in channels.items()}
 
     def _by(self, method: str, value: float) -> Result:
         """The written equations by RK4 in steps, or by scipy at a relative tolerance."""

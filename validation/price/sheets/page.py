@@ -27,10 +27,10 @@ def columns(folder: Path, name: str, heads: Sequence[str], values: np.ndarray) -
     np.savetxt(folder / f"{name}.csv", values, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
 
 
-def matrices(folder: Path, name: str, found: dict[str, np.ndarray]) -> None:
+def matrices(folder: Path, name: str, arrays: dict[str, np.ndarray]) -> None:
     """Write the entries of matrices that are not 0 to ``name``.csv: matrix, row, column (from 1), value."""
     lines = ["matrix,row,column,value"]
-    for key, values in found.items():
+    for key, values in arrays.items():
         lines += [f"{key},{i + 1},{j + 1},{values[i, j]:.17g}" for i, j in np.argwhere(values != 0.0)]
     (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
 

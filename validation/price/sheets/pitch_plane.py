@@ -92,7 +92,9 @@ def ends(problem: ForceExcited) -> list[Value]:
 
 
 def _values(key: str, time: float, states: np.ndarray, sure: np.ndarray) -> list[Value]:
-    return [Value(key, *one[:2], time, *map(float, one[2:])) for one in zip(NAMES, UNITS, states, sure, strict=True)]
+    return [
+        Value(key, *entry[:2], time, *map(float, entry[2:])) for entry in zip(NAMES, UNITS, states, sure, strict=True)
+    ]
 
 
 def _numbers(problem: ForceExcited | road_excited.RoadExcited) -> str:

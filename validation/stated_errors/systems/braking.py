@@ -95,8 +95,8 @@ def _procedure(random: np.random.Generator, surface: str) -> dict[str, Any]:
     kind, speed = str(random.choice(["straight", "split", "turn", "j_turn"])), random.uniform(5.0, 20.0)
     radius = random.choice([-1.0, 1.0]) * max(speed**2 / (SURFACES[surface] * 9.81 * random.uniform(0.2, 0.6)), 25.0)
     other = str(random.choice([name for name in SURFACES if name != surface]))
-    own = {"split": {"right": other}, "turn": {"radius": radius}, "j_turn": {"steer": random.uniform(-0.06, 0.06)}}
-    return {"kind": kind, "speed": speed, **own.get(kind, {})}
+    of_kind = {"split": {"right": other}, "turn": {"radius": radius}, "j_turn": {"steer": random.uniform(-0.06, 0.06)}}
+    return {"kind": kind, "speed": speed, **of_kind.get(kind, {})}
 
 
 def _sample(scene: BrakingScene, engine: str) -> Sample:

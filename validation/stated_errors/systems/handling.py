@@ -70,9 +70,11 @@ def _sample(scene: HandlingScene, engine: str) -> Sample:
 
 def _true(scene: HandlingScene, drive: Drive, engine: str, told: Result) -> dict[str, float]:
     """Errors of every channel that is told."""
-    own = scene.manoeuvres["drawn"]
+    manoeuvre = scene.manoeuvres["drawn"]
     fine = scene.model_copy(update={"tyres": scene.tyres.model_copy(update={"cells": CELL * scene.tyres.cells})})
-    truth = principal(driven(engine, fine.handling("drawn"), own.speed, own.duration, scene.run.step / STEP))
+    truth = principal(
+        driven(engine, fine.handling("drawn"), manoeuvre.speed, manoeuvre.duration, scene.run.step / STEP)
+    )
     return {
         name: float(np.sqrt(np.mean((values - truth.channels[name][::STEP]) ** 2)))
         for name, values in principal(drive).channels.items()

@@ -84,8 +84,8 @@ def _true(scene: HubScene, engine: str, told: Result, names: list[str]) -> dict[
     """Errors of every channel that is told."""
     fine = scene.model_copy(update={"run": scene.run.model_copy(update={"step": scene.run.step / FINER})})
     vehicle = scene.cut_vehicle()
-    truth, own = principal(vehicle, run(fine, engine).detail).channels, principal(vehicle, told.detail).channels
-    return {name: float(np.sqrt(np.mean((own[name] - truth[name][::FINER]) ** 2))) for name in names}
+    truth, stated = principal(vehicle, run(fine, engine).detail).channels, principal(vehicle, told.detail).channels
+    return {name: float(np.sqrt(np.mean((stated[name] - truth[name][::FINER]) ** 2))) for name in names}
 
 
 @contextmanager

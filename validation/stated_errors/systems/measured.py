@@ -59,10 +59,10 @@ def _table(random: np.random.Generator) -> dict[str, Any]:
 
 def _sample(table: dict[str, Any], engine: str) -> Sample:
     """Run with its error, and truth."""
-    own = build(table, "drawn.toml")
+    scene = build(table, "drawn.toml")
     with counted() as calls:
         try:
-            told = run(own, engine, error=True)
+            told = run(scene, engine, error=True)
         except RunFailed as error:
             if error.partial is None:
                 raise

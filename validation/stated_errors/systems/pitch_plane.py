@@ -47,8 +47,8 @@ def _sample(random: np.random.Generator, folder: Path) -> Sample:
     truth = _truth(scene, engine)
     told = errors_of(run)
     true = {name: float(np.sqrt(np.mean((run[name] - _at(truth, name, run.times)) ** 2))) for name in told}
-    own = settings_of(scene, engine)
-    fine = f"tolerance {own.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{own.step:.3g} s"
+    settings = settings_of(scene, engine)
+    fine = f"tolerance {settings.tolerance:.1e}" if CATALOGUE[engine][integrator].adaptive else f"{settings.step:.3g} s"
     what = " ".join((*scene.effects, scene.vehicle.geometry, integrator, fine))
     return Sample(what, engine, told, true, calls[0], sum(calls[1:]))
 
@@ -64,8 +64,8 @@ def _run(scene: Scene, engine: str) -> Result:
 
 def _truth(scene: Scene, engine: str) -> Result:
     """The run in steps of a whole part of its own."""
-    own = settings_of(scene, engine)
-    step, adaptive = own.step, CATALOGUE[engine][own.integrator].adaptive
+    settings = settings_of(scene, engine)
+    step, adaptive = settings.step, CATALOGUE[engine][settings.integrator].adaptive
     finer = max(1, round(step / FINEST if adaptive else min(FINER, step / FINEST)))
     return single.run(scene, "reference", Settings("RK4", step / finer, scene.run.duration))
 
@@ -140,17 +140,17 @@ def _lift_off(drawn: np.random.Generator) -> dict[str, Any]:
 def _road(drawn: np.random.Generator, folder: Path) -> dict[str, Any]:
     speed = float(drawn.uniform(5.0, 35.0))
     source = str(drawn.choice(["study", "hills", "iso8608", "csv"]))
-    own: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     if source == "iso8608":
-        own = {"road_class": str(drawn.choice(list("ABCDE"))), "seed": int(drawn.integers(1000))}
+        options = {"road_class": str(drawn.choice(list("ABCDE"))), "seed": int(drawn.integers(1000))}
     if source == "csv":
         spacing = float(drawn.choice([0.01, 0.05, 0.2]))
         stations = spacing * np.arange(round(20.0 / spacing) + 1)
         heights = np.cumsum(drawn.normal(0.0, 0.01 * np.sqrt(spacing), len(stations)))
         lines = [f"{s:.3f}, {h:.6f}, {h:.6f}" for s, h in zip(stations, heights - heights[0], strict=True)]
         (folder / "road.csv").write_text("\n".join(["s [m], left [m], right [m]", *lines]) + "\n")
-        own = {"file": "road.csv", "beyond_end": "mirrored"}
-    return {"source": source, "speed": speed, **own}
+        options = {"file": "road.csv", "beyond_end": "mirrored"}
+    return {"source": source, "speed": speed, **options}
 
 
 def _forces(drawn: np.random.Generator, folder: Path, table: dict[str, Any]) -> dict[str, Any]:

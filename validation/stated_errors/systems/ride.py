@@ -65,7 +65,7 @@ def _varied(rng: np.random.Generator, vehicle: SpatialVehicle) -> SpatialVehicle
 
 
 def _of(result: Result, name: str, engine: str, true: Mapping[str, float], calls: float, extra: float) -> Sample:
-    told = {channel: one for channel, one in errors_of(result).items() if channel in true}
+    told = {channel: estimate for channel, estimate in errors_of(result).items() if channel in true}
     return Sample(name, engine, told, true, calls, extra)
 
 
@@ -76,9 +76,9 @@ def _swept(rng: np.random.Generator, number: int) -> Sample:
     scene = _scene(rng, file, speeds={"values": sorted(rng.uniform(2.0, 60.0, 9).tolist())})
     vehicle = _varied(rng, vehicle_of(scene))
     result = run(scene, engine, vehicle=vehicle, error=True)
-    road, own = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
+    road, deviation = excitation_of(scene, wheels(vehicle)), result["deviation"][0]
     true = np.array([exact(linearise(vehicle), road, float(speed)) for speed in result["speed"]])
-    gaps = np.sqrt(np.mean((own - true) ** 2, axis=0))
+    gaps = np.sqrt(np.mean((deviation - true) ** 2, axis=0))
     names = result["output"].tolist()
     return _of(result, f"{number}: {file}, sweep", engine, dict(zip(names, gaps.tolist(), strict=True)), 9.0, 3.0)
 
@@ -146,19 +146,19 @@ def _copies(rng: np.random.Generator, number: int) -> Sample:
     scene = _scene(rng, "quarter_car_nonlinear", speeds={"values": [speed]}, study="ride_nonlinear")
     vehicle, sampling = vehicle_of(scene), Sampling(beside=[speed], copies=100, lasting=6.0, seed=number)
     result = linearised(scene, vehicle, sampling, lambda text, share: None, error=True)
-    own, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
-    fine = copies_in_time(vehicle, road, speed, 10.0, copies=MANY, seed=1000 + number, longest=own.step / 4.0)
+    run, road = result.detail.copies[speed], excitation_of(scene, wheels(vehicle))
+    fine = copies_in_time(vehicle, road, speed, 10.0, copies=MANY, seed=1000 + number, longest=run.step / 4.0)
     chance = json.loads(result.data.attrs["error"])["chance"]["channels"]
     told, true = dict[str, Estimate](), dict[str, float]()
-    for i, (name, gains) in enumerate(zip(own.names, result["deviation"][0], strict=True)):
-        for part, value in (("copies", own.deviation[i]), ("gains", gains)):
+    for i, (name, gains) in enumerate(zip(run.names, result["deviation"][0], strict=True)):
+        for part, value in (("copies", run.deviation[i]), ("gains", gains)):
             channel = f"{name}, {part}"
-            one = errors_of(result)[channel]
+            estimate = errors_of(result)[channel]
             more = chance.get(channel, {"error": 0.0, "share": 0.0})
-            error, share = np.hypot(one.error, more["error"]), np.hypot(one.share, more["share"])
-            told[channel] = replace(one, error=float(error), share=float(share))
+            error, share = np.hypot(estimate.error, more["error"]), np.hypot(estimate.share, more["share"])
+            told[channel] = replace(estimate, error=float(error), share=float(share))
             true[channel] = abs(float(value - fine.deviation[i]))
-    steps = sampling.copies * 6.0 / own.step
+    steps = sampling.copies * 6.0 / run.step
     return Sample(f"{number}: bent quarter car at {speed:.3g} m/s", "reference", told, true, steps, 0.375 * steps)
 
 

@@ -46,7 +46,9 @@ def _sample(scene: WheelRailScene) -> Sample | None:
     held = scene.contact(case)
     fine = replace(held, coarser=held.coarser / FINER)
     placed = made.detail.placed
-    gaps = np.array([sums(one) - sums(fine.at(one.shift, one.yaw)) for one in placed])
+    gaps = np.array(
+        [sums(wheelset_place) - sums(fine.at(wheelset_place.shift, wheelset_place.yaw)) for wheelset_place in placed]
+    )
     true = {name: rms(gaps[:, :, k]) for k, name in enumerate(SUMS)}
     calls, again = len(placed) * scene.method.cells**2, len(placed[::EVERY]) * (scene.method.cells / 2.0) ** 2
     name = f"{scene.wheelset.load:.3g} N, {scene.method.cells} cells, {'rolling' if case.friction else 'pressed'}"

@@ -69,11 +69,11 @@ def compression(pieces: np.ndarray, period: float, stiffness: float, damping: fl
     particular = _particular(pieces, tau) / stiffness
     piece = np.clip(np.floor(times / period + 1e-9).astype(int), 0, pieces.shape[1] - 1)
     since = np.maximum(times - piece * period, 0.0)
-    found = sum(particular[power, piece] * since**power for power in range(len(particular)))
+    steady_part = sum(particular[power, piece] * since**power for power in range(len(particular)))
     if tau == 0.0:
-        return np.asarray(found)
+        return np.asarray(steady_part)
     starts = _starts(particular, pieces[0, 0] / stiffness, period, tau)
-    return found + (starts - particular[0])[piece] * np.exp(-since / tau)
+    return steady_part + (starts - particular[0])[piece] * np.exp(-since / tau)
 
 
 def _particular(pieces: np.ndarray, tau: float) -> np.ndarray:
