@@ -1,4 +1,6 @@
-"""How figures look: one style, SVG and PNG, the same bytes from the same results.
+"""How figures look: one style, one set of colours, SVG and PNG, the same bytes from the same results.
+
+Pages show figures ``WIDE`` inches wide: no figure is wider, so that its letters are read in the size they are drawn.
 
 Logarithmic axes have decades labelled in plain text, 10⁻³, or few decades by numbers, with marks between them: formulas
 in labels and eight marks to every decade are half of what drawing a figure of many panels takes.
@@ -6,6 +8,7 @@ in labels and eight marks to every decade are half of what drawing a figure of m
 
 import re
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib
@@ -14,6 +17,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.scale import LogScale, register_scale
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
@@ -21,10 +25,28 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from models.core.told import Results, remarks
 from models.core.whole_files import whole_file
 
+WIDE = 8.0
+"""Width (inches) of the column in which pages show figures: at most that of a figure."""
+TITLE, SMALL = 9.5, 7.5
+"""Size (points) of titles, and the smallest one, of remarks and crowded legends."""
+LEAST = 7.0
+"""Size (points) below which nobody reads a figure."""
+
+DARK, BLUE, VERMILION, GREEN = "#222222", "#0072b2", "#d55e00", "#009e73"
+PINK, ORANGE, SKY, YELLOW = "#cc79a7", "#e69f00", "#56b4e9", "#f0e442"
+GREY, PALE = "#767676", "#b5b5b5"
+"""Colours that eyes of every kind tell apart (Okabe and Ito, 2008), and what is no curve of its own."""
+TURNS = (BLUE, VERMILION, GREEN, PINK, ORANGE, SKY, DARK, GREY)
+"""Colours of curves that have none of their own, in turn."""
+TRUTH, MEASURED = DARK, PALE
+"""What is true, and what was measured, beside what was computed."""
+GOOD, DOUBTFUL, BAD = "#00795a", "#a86400", "#b00020"
+"""Words and bands of a verdict: accepted or within the limit, in between, rejected or broken."""
+
 
 class _Colours(dict[str, str]):
     def __missing__(self, engine: str) -> str:
-        return "#009e73"
+        return GREEN
 
 
 class _Labels(dict[str, str]):
@@ -32,7 +54,7 @@ class _Labels(dict[str, str]):
         return engine
 
 
-COLOURS = _Colours({"reference": "#222222", "exudyn": "#0072b2", "mujoco": "#d55e00"})
+COLOURS = _Colours({"reference": DARK, "exudyn": BLUE, "mujoco": VERMILION})
 """One colour per implementation in every figure; told apart by people who see colours differently."""
 LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoCo"})
 """As figures call them; one from outside the tree by its own name and in a colour of its own."""
@@ -40,9 +62,15 @@ LABELS = _Labels({"reference": "reference", "exudyn": "Exudyn", "mujoco": "MuJoC
 plt.rcParams.update(
     {
         "figure.dpi": 110,
-        "savefig.dpi": 130,
-        "font.size": 9.5,
-        "axes.titlesize": 10.5,
+        "savefig.dpi": 150,
+        "font.size": 8.5,
+        "axes.titlesize": TITLE,
+        "axes.prop_cycle": matplotlib.cycler(color=TURNS),
+        "figure.titlesize": 10.5,
+        "figure.labelsize": 8.5,
+        "legend.fontsize": 8,
+        "xtick.labelsize": 8,
+        "ytick.labelsize": 8,
         "axes.titlelocation": "left",
         "axes.spines.top": False,
         "axes.spines.right": False,
@@ -58,14 +86,42 @@ plt.rcParams.update(
 
 REMARK = 8
 """Size (points) of remarks."""
+LETTER = 0.6
+"""Width of a letter by its size, of bold ones; of others a tenth less."""
+
+
+def wrapped(text: str, inches: float, size: float) -> str:
+    """Lines of text broken where letters of a size (points) would leave a width."""
+    most = max(int(72 * inches / (LETTER * size)), 12)
+    return "\n".join("\n".join(wrap(line, most)) for line in text.split("\n"))
 
 
 def heading(figure: Figure, title: str, results: Results | None = None) -> None:
     """Title of a whole figure, above its left edge; below the figure what its results must be doubted for."""
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    size, wide = plt.rcParams["figure.titlesize"], figure.get_figwidth()
+    figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
-        lines = "\n".join((*told, *[" "] * _lines_of_legends(figure)))
-        figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color="#b00020")
+        broken = wrapped("\n".join(told), 1.1 * wide, REMARK)
+        lines = "\n".join((broken, *[" "] * _lines_of_legends(figure)))
+        figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color=BAD)
+
+
+def panels(count: int, across: int, height: float, wide: float = WIDE, **more: Any) -> tuple[Figure, list[Axes]]:
+    """A figure of so many panels, ``across`` of them beside each other, each so many inches high; no place is empty.
+
+    more : as for ``plt.subplots``; panels that share an axis show its numbers once.
+    """
+    down = -(-count // across)
+    figure, axes = plt.subplots(down, across, figsize=(wide, height * down), squeeze=False, **more)
+    for place, axis in enumerate(axes.flat[count:], count):
+        axes.flat[place - across].xaxis.set_tick_params(labelbottom=True)
+        axis.remove()
+    return figure, list(axes.flat[:count])
+
+
+def legend_below(figure: Figure, axis: Axes, columns: int = 4, **more: Any) -> None:
+    """The legend of an axis below all panels."""
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=columns, **more)
 
 
 def _lines_of_legends(figure: Figure) -> int:
@@ -89,6 +145,8 @@ def save(figure: Figure, path: Path) -> Path:
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MANY = 2.0
 """Decades on an axis from which on only whole powers of ten are marked."""
+FEW = ("", "2", "4")
+"""What stands before a power of ten that is written on an axis of one decade to ``MANY``."""
 
 
 def _narrow(low: float, high: float) -> bool:
@@ -103,7 +161,10 @@ class _Powers(LogFormatterSciNotation):
         power = re.search(r"(?:([\d.]+)\\times)?10\^\{(-?\d+)\}", text := super().__call__(x, pos))
         if not power:
             return text
-        if self.axis and _narrow(*sorted(self.axis.get_view_interval())) and 1e-3 <= x < 1e5:
+        low, high = sorted(self.axis.get_view_interval()) if self.axis else (0.0, 0.0)
+        if _narrow(low, high) and high > 10 * low and (power[1] or "") not in FEW:
+            return ""
+        if _narrow(low, high) and 1e-3 <= x < 1e5:
             return f"{x:g}"
         return f"{power[1] + ' × ' if power[1] else ''}10{power[2].translate(RAISED)}"
 

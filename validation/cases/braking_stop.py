@@ -219,9 +219,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Error over step, a panel per headline case."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import GREY, WIDE, heading, legend_below, plt
 
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True, sharey=True)
+    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 5.8), sharex=True, sharey=True)
     milliseconds = 1e3 * np.array(data["steps"])
     styles = {"ours": "o-", "explicit Euler": "D:", "RK4": "s--", "paper's, literal": "^-."}
     for ax, (name, curve) in zip(axes.flat, data["curves"].items(), strict=True):
@@ -230,12 +230,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             label = "exact wheel, mean force (ours)" if scheme == "ours" else scheme
             ax.loglog(milliseconds, np.maximum(errors, 1e-7), style, label=label)
             ax.plot(milliseconds[left > 0.0], errors[left > 0.0], "x", color="black", markersize=9)
-        ax.axhline(100.0 * BOUND, color="grey", linewidth=0.8)
-        ax.axvline(1e3 * STEP, color="grey", linewidth=0.8, linestyle=":")
+        ax.axhline(100.0 * BOUND, color=GREY, linewidth=0.8)
+        ax.axvline(1e3 * STEP, color=GREY, linewidth=0.8, linestyle=":")
         ax.set(title=name, xlabel="step [ms]", ylabel="error of the stopping distance [%]")
         ax.label_outer()
-    figure.suptitle("A quarter vehicle braked to a stop by a constant torque")
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    heading(figure, "Braked to a stop by a constant torque: which step each scheme needs")
+    legend_below(figure, axes.flat[0])
     caption = (
         f"Error of the stopping distance over the step; grey: the bound of {100 * BOUND:g} % and the paper's "
         "step. Crosses: it has not stopped in three times its time. Errors below 1e-7 % are drawn there."

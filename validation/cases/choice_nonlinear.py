@@ -199,9 +199,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     for i, system in enumerate(data["systems"]):
@@ -227,9 +227,10 @@ def draw(data: Saved) -> Drawn:
         title="All that was left out, and longer steps",
     )
     right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
-    right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls", title="What it saves")
+    right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     left.legend(loc="upper left")
-    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    right.legend(loc="best")
+    heading(figure, "Choice by runs: changes as predicted and as confirmed, and calls saved")
     return [(SAID, figure)]
 
 

@@ -206,9 +206,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Coefficients over the ratio of axes, and how far the library is from the exact theory."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, legend_below, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.9))
     ratio = np.geomspace(0.01, 100.0, 201)
     c = coefficients(ratio, 0.25)
     solved = np.array([row for part in data.values() for row in part])
@@ -217,17 +217,12 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         left.loglog(ratio, curve, color=f"C{i}", label=name)
         left.loglog(quarter[:, 0], quarter[:, 2 + i], "o", color=f"C{i}", markersize=3.5)
         right.semilogx(solved[:, 0], 100 * deviation(solved)[:, i], "o", color=f"C{i}", markersize=3.5, label=name)
-    left.set(title="coefficients, nu = 1/4 (dots: exact theory)", xlabel="a/b")
-    right.set(title="library above the exact theory [%], nu = 0 to 1/2", xlabel="a/b", ylim=(-5, 20))
+    left.set(title="Coefficients [-], ν = 1/4 (dots: exact theory)", xlabel="a/b [-]")
+    right.set(title="Library above exact theory [%], ν = 0 to 1/2", xlabel="a/b [-]", ylim=(-5, 20))
     for axes in (left, right):
-        axes.axvspan(0.1, 10.0, color="0.9", zorder=0, label="table")
-        axes.legend(loc="upper center", ncols=3, fontsize=8)
-    figure.suptitle(
-        "Kalker's table holds against the exact theory, and so does what leads on beyond it",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
+        axes.axvspan(0.1, 10.0, color="0.9", zorder=0, label="range of the table")
+    legend_below(figure, left, 5)
+    heading(figure, "Kalker's table holds against the exact theory, and so does what leads on beyond it")
     return [
         (
             "Creepage and spin coefficients; outside the grey range asymptotes take the table's place, for C33 of "

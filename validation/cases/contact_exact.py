@@ -339,27 +339,28 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Carter's strip, and how the forces settle with the cells."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.2))
     x, traction = data["strip"]
     fine = np.linspace(-1, 1, 801)
     left.plot(fine, carter(fine, 1.0, 0.5), color="0.4", label="Carter")
     left.plot(x, traction, ".", label="40 cells, middle of a/b = 1/50")
-    left.set(xlabel="x / a (leading edge at 1)", ylabel="traction / (mu p0)")
-    left.set_title("Rolling cylinder at half the creepage of sliding")
+    left.set(xlabel="x / a [-] (leading edge at 1)", ylabel="traction / (μ p0) [-]")
+    left.set_title("Cylinder at half the creepage of sliding")
     left.set_xticks([-1, -0.5, 0, 0.5, 1])
     left.legend()
     for name, values in data["refined"].items():
         numbers = np.array(values)
         left_over = np.linalg.norm(np.diff(numbers[:, 1:3], axis=0), axis=1)
         right.loglog(numbers[1:, 0], 100 * left_over, "o-", label=name)
-    right.set(xlabel="cells along each axis", ylabel="change from half as many [% of mu N]")
+    right.set(xlabel="cells along each axis [-]", ylabel="change from half as many [% of μN]")
     right.set_xticks(ticks := numbers[1:, 0].astype(int), ticks)
     right.minorticks_off()
     right.set_yticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
-    right.set_title("Rolling forces settle with the cells")
-    right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    right.set_title("Rolling forces by their cells")
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    heading(figure, "The exact theory meets Carter's closed form, and its forces settle as cells are halved")
     return [
         (
             "Traction of a rolling cylinder beside Carter's closed form, and how much the forces change where cells "

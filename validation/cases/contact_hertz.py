@@ -203,22 +203,20 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Axes over the ratio of curvatures, and the error over the ratio of axes."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     curvature = np.geomspace(1e-4, 1e4, 201)
     touching = by_load(curvature, 1.0, LOAD, Pair())
     for values, name in ((touching.a, "a, along x"), (touching.b, "b, along y")):
         left.loglog(curvature, values * 1e3, label=name)
-    left.set(title="semi-axes, steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B", ylabel="[mm]")
+    left.set(title="Steel, 100 kN, B = 1 1/m", xlabel="ratio of curvatures A/B [-]", ylabel="semi-axis [mm]")
     left.legend()
     ratio = np.array(data["ratio"])
     for name, errors in data["errors"].items():
         right.loglog(ratio[: len(RANGE)], np.maximum(errors[: len(RANGE)], 1e-17), ".", markersize=4, label=name)
     right.axhline(BOUND, color="black", linestyle=":", label="allowed")
-    right.set(title="relative error against 60 digits", xlabel="short axis / long axis", ylim=(3e-18, 1e-9))
-    right.legend(loc="center", ncols=3, fontsize=8)
-    figure.suptitle(
-        "Hertzian contact loses no digits from a thin line to the circle", x=0.01, ha="left", fontweight="bold"
-    )
+    right.set(title="Relative error against 60 digits [-]", xlabel="short axis / long axis [-]", ylim=(3e-18, 1e-9))
+    right.legend(loc="center", ncols=3)
+    heading(figure, "Hertzian contact loses no digits from a thin line to the circle")
     return [("Semi-axes of Hertz's ellipse and their error.", figure)]

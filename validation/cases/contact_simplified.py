@@ -366,10 +366,10 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Errors of the two pressure profiles by shape."""
     if "shapes" not in data:
         return []
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
     shapes = data["shapes"]
-    figure, axes = plt.subplots(1, 4, figsize=(10.0, 4.2), sharey=True)
+    figure, axes = plt.subplots(1, 4, figsize=(WIDE, 4.2), sharey=True)
     place = np.arange(len(shapes))
     for axis, (key, label) in zip(
         axes,
@@ -377,7 +377,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             "approach": "approach [%]",
             "area": "area [%]",
             "peak": "peak pressure [%]",
-            "force": "mean force [% mu N]",
+            "force": "force [% of μN]",
         }.items(),
         strict=True,
     ):
@@ -389,6 +389,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axes[0].set_yticks(place, list(shapes))
     axes[0].invert_yaxis()
     axes[0].legend(loc="upper right")
+    heading(figure, "Theory of 1983 against exact contact: errors with Hertz's and with the paper's pressure")
     caption = (
         "Errors of the theory of 1983 against the exact contact: with Hertz's profile of the pressure "
         "(elliptic) area and forces are nearer than with the paper's, the peak on ellipses alone."

@@ -190,13 +190,13 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Measured over predicted."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, plt
 
     figure, axis = plt.subplots(figsize=(5.2, 4.2))
     ends = [one["predicted"] for one in data["combinations"]]
     line = np.array([0.9 * min(ends), 1.1 * max(ends)])
-    axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color="#222222", linewidth=0, label="within 10 %")
-    for source, colour in (("noise", "#0072b2"), ("interpolation", "#d55e00"), ("model", "#009e73")):
+    axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color=DARK, linewidth=0, label="within 10 %")
+    for source, colour in (("noise", BLUE), ("interpolation", VERMILION), ("model", GREEN)):
         own = [one for one in data["combinations"] if one["source"].startswith(source)]
         if own:
             predicted, middle, quartiles = (
@@ -206,5 +206,6 @@ def draw(data: Saved) -> Drawn:
             axis.errorbar(predicted, middle, spread, fmt="o", color=colour, label=source, markersize=4, elinewidth=0.8)
     axis.set(xlabel="predicted before the run [s]", ylabel="measured: median and quartiles [s]")
     axis.legend(loc="upper left")
+    heading(figure, "Drift-off is known before the run")
     caption = "Time at which the pitch is 0.05 rad off, over roads, speeds, sampling rates and sources of error."
     return [(caption, figure)]

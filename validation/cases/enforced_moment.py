@@ -213,15 +213,15 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Start-up ringing of the multiplier."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, axis = plt.subplots(figsize=(8, 3))
+    figure, axis = plt.subplots(figsize=(WIDE, 3.2))
     paths = data["ringing"]
     for i, (name, path) in enumerate((name, path) for name, path in paths.items() if name != "time"):
         style, width = ("--", 2) if name.startswith("consistent") else ("-", 1)
         axis.plot(1e3 * np.array(paths["time"]), path, style, label=name, color=f"C{i // 2}", linewidth=width)
-    title = "Exudyn's enforced moment after an abrupt start, against the eliminated form"
-    axis.set(xlabel="time [ms]", ylabel="error of the moment [N m]", title=title)
+    axis.set(xlabel="time [ms]", ylabel="error of the moment [N m]")
+    heading(figure, "Exudyn's enforced moment rings after an abrupt start, and not after a consistent one")
     axis.legend()
     caption = (
         "A start whose accelerations do not belong to the constraint makes the multiplier ring; it dies out with the "

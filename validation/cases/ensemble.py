@@ -345,13 +345,14 @@ def draw(data: Saved) -> Drawn:
     if not data:
         return []
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import plt
+    from models.drawing.figures import BLUE, WIDE, heading, plt
 
-    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.6), width_ratios=(3, 2))
+    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(WIDE, 3.6), width_ratios=(3, 2))
     draw_fan(fan, np.array(data["times"]), np.array(data["fan"]))
     fan.legend(loc="lower right")
-    histogram.stairs(data["counts"], data["edges"], fill=True, color="C0", alpha=0.6)
-    histogram.set_title("drift-off time, paths per half second")
+    histogram.stairs(data["counts"], data["edges"], fill=True, color=BLUE, alpha=0.6)
+    histogram.set_title("Drift-offs: paths per half second [-]")
     for axis in (fan, histogram):
         axis.set_xlabel("time [s]")
+    heading(figure, f"One measured run, {MANY:,} samples of its noise: how far its pitch is off")
     return [(f"{MANY:,} noise paths in the reference: how the pitch error spreads, and when paths drift off.", figure)]

@@ -347,9 +347,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Largest error over the cells."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, legend_below, plt
 
-    figure, axis = plt.subplots(figsize=(8.5, 4.0))
+    figure, axis = plt.subplots(figsize=(WIDE, 4.4))
     for i, (name, values) in enumerate(data["cells"].items()):
         axis.loglog(
             CELLS,
@@ -361,11 +361,8 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     axis.axhline(0.4, color="black", linestyle=":", label="0.4 % asked for at 21")
     axis.set_xticks(CELLS, [str(n) for n in CELLS])
     axis.minorticks_off()
-    axis.set(
-        xlabel="cells per strip",
-        ylabel="largest error of the force [% of mu N]",
-        title="FASTSIM: the second-order march needs a tenth of the cells",
-    )
+    axis.set(xlabel="cells per strip [-]", ylabel="largest error of the force [% of μN]")
     axis.set_yticks([0.01, 0.1, 0.4, 1, 10], ["0.01", "0.1", "0.4", "1", "10"])
-    figure.legend(loc="outside right center")
+    legend_below(figure, axis)
+    heading(figure, "FASTSIM: the second-order march needs a tenth of the cells")
     return [("Largest error of FASTSIM's force over its cells, three bounds and both marches.", figure)]

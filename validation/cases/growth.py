@@ -327,7 +327,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Spread of the pitch over time with its laws, on logarithmic axes."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import heading, plt
 
     spread = data["spread"]
     figure, axis = plt.subplots(figsize=(7.0, 3.6))
@@ -335,12 +335,13 @@ def draw(data: Saved) -> Drawn:
         "pitch": ("ok", f"Monte Carlo, {PATHS} paths"),
         "covariance": ("x", "covariance along the true path"),
         "law, run": ("-", "closed law, rate from the run"),
-        "t^1.5": ("--", "no growth, t^1.5"),
+        "t^1.5": ("--", "noise alone, without growth: t^1.5"),
     }
     for name, (style, label) in marks.items():
         if name in spread:
             axis.loglog(spread["time"], spread[name], style, label=label, markersize=4)
     axis.set(xlabel="time [s]", ylabel="standard deviation of the pitch [rad]")
     axis.legend()
+    heading(figure, "A pitch error under force noise grows faster than noise alone would have it")
     caption = "Spread of the pitch under white noise on the wheel forces: growth makes it four times wider by 10 s."
     return [(caption, figure)]

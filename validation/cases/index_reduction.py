@@ -258,9 +258,9 @@ def _id(name: str) -> str:
 
 def draw(data: Saved) -> Drawn:
     """Gaps from a wrong start by formulation, and errors by noise, in which all formulations lie on each other."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.6))
     for name, gap in data["gaps"].items():
         if max(map(abs, gap[1:])) > 1e-12:
             left.semilogy(data["times"], [abs(value) for value in gap], label=name)
@@ -270,11 +270,12 @@ def draw(data: Saved) -> Drawn:
         ylim=(1e-9, None),
         title=f"Start off by {OFF:g} rad and {RATE_OFF:g} rad/s",
     )
-    left.legend(title="projection, index 3, eliminated: 0", title_fontsize="small", fontsize="small")
+    left.legend(title="projection, index 3, eliminated: 0", title_fontsize=8)
     for i, (name, error) in enumerate(data["loose"].items()):
         right.plot([10 * STEP * j for j in range(len(error))], error, label=name, linewidth=4 - 1.5 * i)
     right.set(xlabel="time [s]", ylabel="pitch - true pitch [rad]", title="No guidance, noise on the forces")
-    right.legend(fontsize="small")
+    right.legend()
+    heading(figure, "Drift of a reduced constraint can be cured, drift by noise cannot")
     for axis in (left, right):
         axis.locator_params(axis="x", nbins=5)  # runs of the quick report are short, their times have many digits
     caption = (

@@ -356,18 +356,18 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import BLUE, WIDE, heading, plt
 
     found = []
     if data["ten minutes"]:
-        figure, axes = plt.subplots(1, 3, figsize=(10, 3.4), sharey=True)
+        figure, axes = plt.subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
         paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
         times = np.arange(paths.shape[1])
         for i, axis in enumerate(axes):
-            axis.plot(times, paths[:, :, i].T, color="#0072b2", linewidth=0.6)
+            axis.plot(times, paths[:, :, i].T, color=BLUE, linewidth=0.6)
             for sign in (1, -1):
                 axis.plot(times, sign * walk * times**0.5, color="black", linestyle=":", label="s sqrt(t)" * (sign > 0))
-            axis.set(title=f"about the global {'xyz'[i]} axis [deg]", xlabel="time [s]")
+            axis.set(title=f"about global {'xyz'[i]} [deg]", xlabel="time [s]")
         axes[0].legend(loc="upper left")
         heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
         found.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))

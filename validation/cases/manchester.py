@@ -271,10 +271,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Mean place and force of the right wheel beside CONTACT's."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import BLUE, GREY, WIDE, heading, legend_below, plt
 
     published = np.array(data["published"])
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.4))
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.5))
     for axis, value, column, scale in ((axes[0], 0, 2, 1.0), (axes[1], 3, 3, 1e-3)):
         axis.plot(
             published[:, 0],
@@ -282,13 +282,14 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             "s",
             markersize=8,
             markerfacecolor="none",
-            color="0.4",
+            color=GREY,
             label="CONTACT, all patches together",
         )
         points = [(one["shift"], patch[value]) for one in data["A-2"] for patch in one["right"]]
-        axis.plot(*np.array(points).T, "o", markersize=4, color="#0072b2", label="every patch here")
+        axis.plot(*np.array(points).T, "o", markersize=4, color=BLUE, label="every patch here")
         axis.set_xlabel("displacement of the wheelset [mm]")
     axes[0].set_ylabel("place of contact in the track [mm]")
     axes[1].set_ylabel("normal force [kN]")
-    axes[0].legend()
+    legend_below(figure, axes[0])
+    heading(figure, "Manchester case A-2, right wheel: patches here and by CONTACT")
     return [("Right wheel in case A-2, rolling with yaw: patches here and the reference output of CONTACT.", figure)]

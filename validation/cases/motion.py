@@ -343,9 +343,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Noise gain by height, and the error of the rate over time."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.9))
     heights = np.geomspace(0.02, 1.2, 40)
     for formula, label in (("spatial", "plain formula"), ("plane", "formula for a plane")):
         arrays = [sensor_array(tilted(float(height), np.eye(3)), formula) for height in heights]  # type: ignore[arg-type]
@@ -354,8 +354,8 @@ def draw(data: Saved) -> Drawn:
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)
     left.set(
-        title="noise of the angular acceleration by that of the readings [1/m]",
-        xlabel="height of the fifth sensor above the plane of the others [m]",
+        title="Noise of the angular acceleration\nper noise of the readings [1/m]",
+        xlabel="height of the fifth sensor above the others [m]",
     )
     curves = data["curves"]
     for key, style, label in (
@@ -365,7 +365,8 @@ def draw(data: Saved) -> Drawn:
         ("stated", "C7--", "what the filter states"),
     ):
         right.plot(curves["time"][: len(curves[key])], curves[key], style, label=label, linewidth=1)
-    right.set(title="error of the angular velocity, rms [rad/s]", xlabel="time [s]")
+    right.set(title="Error of the angular velocity,\nrms [rad/s]", xlabel="time [s]")
     for axis in (left, right):
         axis.legend()
+    heading(figure, "What a flat arrangement of sensors costs, and what holds the rate")
     return [("What a flat arrangement costs, and what holds the rate", figure)]

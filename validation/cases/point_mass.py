@@ -183,9 +183,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Standard deviations over time, and how the Euler scheme nears them."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     times = np.geomspace(0.01, 100.0, 81)
     for i, eta in enumerate((0.0, 0.1, 1.0)):
         exact = [continuous(t, DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for t in times]
@@ -193,14 +193,14 @@ def draw(data: Saved) -> Drawn:
         euler = [discrete(int(n), DEVIATION, STEP, MASS, eta)[0, 0] ** 0.5 for n in whole]
         axes[0].loglog(times, exact, color=f"C{i}", label=f"damping {eta:g} 1/s")
         axes[0].loglog(whole * STEP, euler, "o", color=f"C{i}", markersize=3.5)
-    axes[0].set(title="error of position, standard deviation [m]", xlabel="time [s]")
+    axes[0].set(title="Position: standard deviation [m]", xlabel="time [s]")
     axes[0].legend(title="line: eq. (11); dots: Euler scheme", loc="upper left")
     steps, *columns = np.array(data["differences"]).T
     for x, column in zip((0, 1, 10), columns, strict=True):
         axes[1].loglog(steps, np.abs(column), "o-", markersize=3.5, label=f"damping times time {x}")
     axes[1].loglog(steps, 1.5 / steps, color="black", linestyle=":", label="3 / (2n)")
-    axes[1].set(title="Euler scheme against the limit, relative", xlabel="steps n")
+    axes[1].set(title="Euler scheme against its limit [-]", xlabel="steps n [-]")
     axes[1].legend()
-    heading(figure, "A point mass under white force noise: 32 N at 1 kHz on 780 kg")
+    heading(figure, "A point mass under white force noise, 32 N at 1 kHz on 780 kg: Euler steps and their limit")
     caption = "Error of a point mass's position over time, continuous and in Euler steps; the two differ by O(1/n)."
     return [(caption, figure)]

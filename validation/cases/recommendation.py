@@ -153,9 +153,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted over true error by tolerance."""
-    from models.drawing.figures import COLOURS, plt
+    from models.drawing.figures import BAD, COLOURS, DARK, LABELS, heading, plt
 
-    figure, ax = plt.subplots(figsize=(7.5, 5.2))
+    figure, ax = plt.subplots(figsize=(6.0, 4.6))
     every = [one for own in data["verdicts"] for one in own]
     for engine in dict.fromkeys(one["curve"].split()[0] for one in every):
         own = [one for one in every if one["curve"].startswith(engine)]
@@ -163,25 +163,25 @@ def draw(data: Saved) -> Drawn:
             [one["true"] / one["tolerance"] for one in own],
             [one["predicted"] / one["tolerance"] for one in own],
             "o",
-            color=COLOURS.get(engine, "grey"),
+            color=COLOURS[engine],
             markersize=4,
             alpha=0.6,
-            label=engine,
+            label=LABELS[engine],
         )
     span = np.array([1e-6, 10.0])
-    ax.plot(span, span, color="#333333", linewidth=0.8)
+    ax.plot(span, span, color=DARK, linewidth=0.8)
     ax.fill_between(
         span, span / FACTOR, span * FACTOR, color="#bbbbbb", alpha=0.4, linewidth=0, label=f"within a factor {FACTOR:g}"
     )
-    ax.axvline(1.0, color="#aa0000", linewidth=1.0, label="tolerance")
+    ax.axvline(1.0, color=BAD, linewidth=1.0, label="tolerance")
     ax.set(
         xscale="log",
         yscale="log",
-        xlabel="true error by tolerance",
-        ylabel="predicted error by tolerance",
+        xlabel="true error / tolerance [-]",
+        ylabel="predicted error / tolerance [-]",
         xlim=span,
         ylim=span,
-        title=f"Recommended for {len(data['verdicts'])} scenes never seen",
     )
-    ax.legend(loc="upper left", fontsize=9)
+    ax.legend(loc="upper left")
+    heading(figure, f"Settings recommended for scenes never seen ({len(data['verdicts'])}): errors predicted and true")
     return [("Errors of recommended settings: predicted by the search, and true by another solver.", figure)]

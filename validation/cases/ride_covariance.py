@@ -283,18 +283,19 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviation of the vertical acceleration along the body over speed, one line per case."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, legend_below, plt
 
     shown = data["figure"]
-    figure, axes = plt.subplots(1, 3, figsize=(11, 4.4), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 3, figsize=(WIDE, 4.2), sharey=True)
     for axis, place in zip(axes, ALONG, strict=True):
         for i, case in enumerate(shown["cases"]):
             words = "left/right {}, front/rear {}".format(*CASES[int(case)])
             axis.plot(shown["speeds"], shown[place][i], label=f"{case}: {words}")
         axis.set(title=place, xlabel="speed [m/s]")
-    axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s$^2$]")
+    axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    legend_below(figure, axes[0], 2)
+    heading(figure, "Which roads belong together matters most at the centre of the body")
     return [(SAID, figure)]
 
 

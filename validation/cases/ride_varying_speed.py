@@ -304,9 +304,9 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Standard deviations over time, quasi-stationary beside."""
     if not data:
         return []
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.9), sharey=True)
     for axis, (name, found) in zip(axes, data.items(), strict=True):
         for column, point in enumerate(POINTS):
             pick = [row[column] for row in found["deviation"]]
@@ -324,10 +324,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
                 capsize=2,
             )
         axis.set(title=f"{name}, {found['speed'][0]:.0f} to {found['speed'][-1]:.0f} m/s", xlabel="time [s]")
-    axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s$^2$]")
+    axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
     axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")
-    axes[0].legend(fontsize=8)
+    axes[0].legend(fontsize=7.5)
+    heading(figure, "A drive of varying speed is no row of constant speeds")
     caption = (
         "Standard deviation of the body's vertical acceleration (19 freedoms, the paper's road) while the speed "
         "varies; dashed as if the momentary speed had always been driven."

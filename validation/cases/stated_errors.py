@@ -33,7 +33,7 @@ SHARE, FEW, COST = 0.95, 0.1, 0.6
 """Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
 EDGE = 1e-12
 """True errors below this share of their channel are rounding."""
-COLOURS = ("#222222", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999", "#b00020")
+COLOURS = ("#222222", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#767676", "#b00020")
 
 
 @allowing("what is judged is how well equations are solved, whatever a random vehicle does")
@@ -190,9 +190,9 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """True over stated error, both by the channel's deviation."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import GREY, ORANGE, heading, plt
 
-    figure, axis = plt.subplots(figsize=(7.5, 5.6))
+    figure, axis = plt.subplots(figsize=(6.5, 5.0))
     known = [one for one in data["samples"] if one["ratio"] is not None and one["share"] > 0.0]
     for name, colour in zip(dict.fromkeys(one["system"] for one in known), COLOURS, strict=False):
         stated = np.array([one["share"] for one in known if one["system"] == name])
@@ -200,9 +200,15 @@ def draw(data: Saved) -> Drawn:
         axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)
     ends = np.array([1e-16, 1.0])
     for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):
-        axis.plot(ends, factor * ends, style, color="#777777", lw=0.9)
-    axis.axvspan(WARNED, 10.0, color="#e69f00", alpha=0.15, lw=0)
-    axis.set(xscale="log", yscale="log", xlabel="stated error by the channel's deviation", ylabel="true error, same")
-    axis.set_title("dashed: three times the stated error; dotted: ten times and a tenth; shaded: warnings")
+        axis.plot(ends, factor * ends, style, color=GREY, lw=0.9)
+    axis.axvspan(WARNED, 10.0, color=ORANGE, alpha=0.15, lw=0)
+    axis.set(
+        xscale="log",
+        yscale="log",
+        xlabel="stated error / deviation of the channel [-]",
+        ylabel="true error / deviation of the channel [-]",
+    )
+    axis.set_title("dashed: 3 times the stated error; dotted: 10 times and a tenth; shaded: warned")
+    heading(figure, "Errors of random scenes, true and as their results state them")
     axis.legend(loc="upper left")
     return [("True errors of random scenes over what their results state.", figure)]

@@ -11,7 +11,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from models.advice.price.runner import Measured, Point
-from models.drawing.figures import COLOURS, plt
+from models.drawing.figures import (
+    BAD,
+    BLUE,
+    COLOURS,
+    DARK,
+    GREEN,
+    GREY,
+    PINK,
+    SKY,
+    SMALL,
+    VERMILION,
+    WIDE,
+    heading,
+    plt,
+    wrapped,
+)
 from validation.price.tables import named
 
 Style = dict[str, Any]
@@ -20,34 +35,34 @@ SHARED = {"RK4": "o", "RK44": "o", "Euler": "D", "ExplicitEuler": "D"}
 MARKERS = "s^v<>PXhp*d"
 """Markers of the others, in turn within each engine."""
 STYLES = {1: ":", 2: "--", 3: "-.", 4: "-"}
-MORE = ("#999999", "#0072b2", "#009e73", "#cc79a7", "#d55e00", "#56b4e9")
+MORE = (GREY, BLUE, GREEN, PINK, VERMILION, SKY)
 """Colours of families that are no implementation."""
-LONGEST = 26
-"""Letters of a curve's name of which five stand beside each other."""
-SIZES = {"reference": 8.5, "exudyn": 6.5, "mujoco": 4.5}
+LONGEST = 27
+"""Letters of a curve's name of which four stand beside each other."""
+SIZES = {"reference": 6.5, "exudyn": 5.0, "mujoco": 3.5}
 """Coinciding curves show as rings within each other."""
 ONCE = 0.5
 """Size of a marker whose seconds are those of one run, by that of the others."""
-FRONT: Style = {"color": "#f0c808", "linewidth": 9, "alpha": 0.45}
+FRONT: Style = {"color": "#f0c808", "linewidth": 7, "alpha": 0.45}
 BROKEN: Style = {
     "marker": "o",
     "linestyle": "none",
-    "markersize": 11,
+    "markersize": 8.5,
     "markerfacecolor": "none",
-    "markeredgecolor": "#b00020",
+    "markeredgecolor": BAD,
     "markeredgewidth": 0.8,
 }
-LABEL = np.array([0.27, 0.09])
+LABEL = np.array([0.37, 0.1])
 """Width and height of a default's name, in fractions of the panel."""
-CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.74, 13) for y in np.linspace(0.2, 0.92, 17)])
+CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.92, 17)])
 """Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
 def draw(measured: Measured) -> Figure:
     """Two panels that share the error axis; failures stand above the first, whose axis they have a place on."""
-    figure, axes = plt.subplots(1, 2, figsize=(12.5, 8.4), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 7.6), sharey=True)
     styles = _styles(measured)
-    top = 6 * max(measured.error(p) for p in measured.points if p.status == "ok")
+    top = 8 * max(measured.error(p) for p in measured.points if p.status == "ok")
     rounds = max(len(p.seconds) for p in measured.points)
     several = f"up to {rounds} interleaved rounds (small: one run)" if rounds > 1 else "one run"
     for ax, kind in zip(axes, measured.costs, strict=True):
@@ -56,26 +71,27 @@ def draw(measured: Measured) -> Figure:
         for curve, points in measured.curves().items():
             _curve(ax, measured, points, kind, styles[curve])
         timed = kind == "seconds"
-        label = "seconds for the run, model built anew (median)" if timed else f"{kind} in the run"
+        label = "time [s] of a run, model built anew (median)" if timed else f"{kind} in the run [-]"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        ax.set_title(f"by {kind}, {several if timed else 'exact'}")
+        ax.set_title(f"By {kind}" + (f":\n{several}" if timed else ", counted exactly"))
     _failures(axes[0], measured, top)
     axes[0].set_ylabel(f"error of the {measured.quantity} [{measured.unit}]")
-    axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 12 * top)
+    axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 15 * top)
     for ax, kind in zip(axes, measured.costs, strict=True):
         _defaults(ax, measured, kind)
     alike = "; ".join(named(group[0], [group]) for group in measured.same())
-    title = fill(f"What accuracy costs. {measured.title}", 120)
-    same = fill(f"Same error at the same setting: {alike}.", 165) if alike else ""
-    figure.suptitle(title + "\n" * (1 + same.count("\n")), x=0.01, ha="left", fontsize=12)
-    figure.text(0.011, 0.98 - 0.026 * (1 + title.count("\n")), same, va="top", fontsize=9, color="#333333")
+    heading(figure, f"What accuracy costs: {measured.title}")
     longest = max(map(len, map(named, styles)))
     figure.legend(
         handles=_legend(measured, styles),
         loc="outside lower center",
-        ncols=5 if longest <= LONGEST else 4,
-        fontsize=8.5,
-        handlelength=3.2,
+        ncols=4 if longest <= LONGEST else 3,
+        fontsize=SMALL,
+        handlelength=2.6,
+        columnspacing=1.2,
+        title=wrapped(f"Same error at the same setting: {alike}.", 1.1 * WIDE, SMALL) if alike else None,
+        title_fontsize=SMALL,
+        alignment="left",
     )
     return figure
 
@@ -121,7 +137,7 @@ def _floor(ax: Axes, measured: Measured) -> None:
     for low, high, alpha in ((1e-30, known, 0.6), (known, measured.floor(), 0.25)):
         ax.axhspan(low, high, color="#bbbbbb", alpha=alpha, zorder=0, linewidth=0)
     told = f"reference known to {known:.1g} {measured.unit} (dark);\nbelow ten times that: hollow"
-    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=8, color="#555555")
+    ax.text(0.015, 0.012, told, transform=ax.transAxes, ha="left", va="bottom", fontsize=SMALL, color=GREY)
 
 
 def _front(ax: Axes, measured: Measured, kind: str) -> None:
@@ -134,7 +150,7 @@ def _front(ax: Axes, measured: Measured, kind: str) -> None:
 def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
     """Ring and name each engine's default setting, where the panel is emptiest."""
     taken = _drawn(ax)
-    ring: Style = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "#111111", "markeredgewidth": 1.4}
+    ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured.defaults.items():
         if p.status != "ok":
             continue
@@ -145,13 +161,13 @@ def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
             place,
-            fontsize=8.5,
+            fontsize=SMALL,
             xytext=(float(corner[0]), float(corner[1])),
             textcoords="axes fraction",
             ha="left",
             va="center",
             zorder=6,
-            arrowprops={"arrowstyle": "-", "color": "#111111", "linewidth": 0.7, "shrinkB": 7},
+            arrowprops={"arrowstyle": "-", "color": DARK, "linewidth": 0.7, "shrinkB": 5},
         )
 
 
@@ -187,7 +203,8 @@ def _failures(ax: Axes, measured: Measured, top: float) -> None:
             ax.plot(calls, top, "x", color=_colour(p, measured), markersize=size, markeredgewidth=1.6)
     if failed:
         text = "; ".join(f"{status}: {_who(failed, status)}" for status in dict.fromkeys(p.status for p in failed))
-        ax.annotate(text, (0.995, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=8)
+        text = wrapped(text, 0.42 * WIDE, SMALL)
+        ax.annotate(text, (0.995, 0.995), xycoords="axes fraction", ha="right", va="top", fontsize=SMALL)
 
 
 def _expected(p: Point, measured: Measured) -> float:
@@ -221,8 +238,8 @@ def _legend(measured: Measured, styles: dict[str, Style]) -> list[Line2D]:
     handles = [Line2D([], [], **styles[curve], label=named(curve)) for curve in names]
     handles.append(Line2D([], [], **FRONT, label="no other setting is better (Pareto)"))
     for text in dict.fromkeys(text for p in measured.points for text in p.broken):
-        handles.append(Line2D([], [], **BROKEN, label=f"assumption broken: {text}"))
+        handles.append(Line2D([], [], **BROKEN, label=fill(f"assumption broken: {text}", LONGEST)))
     if any(p.status != "ok" for p in measured.points):
         failed = "no answer to rely on"
-        handles.append(Line2D([], [], color="#777777", marker="x", linestyle="none", label=failed))
+        handles.append(Line2D([], [], color=GREY, marker="x", linestyle="none", label=failed))
     return handles

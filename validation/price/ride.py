@@ -232,19 +232,19 @@ def table(data: dict[str, Any]) -> Table:
 
 def draw(data: dict[str, Any]) -> tuple[str, Figure]:
     """Error over milliseconds, a panel per kind of output."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, legend_below, plt
 
-    figure, axes = plt.subplots(1, len(KINDS), figsize=(11, 4.8), sharey=True)
+    figure, axes = plt.subplots(1, len(KINDS), figsize=(WIDE, 4.4), sharey=True)
     markers = {"solves": "*", "decompositions": "D", "frequencies": "o", "copies": "s"}
     for ax, kind in zip(axes, KINDS, strict=True):
         for p in data["points"]:
             x, y = 1e3 * p["seconds"], max(p["errors"][kind], np.finfo(float).eps)
             ax.plot(x, y, markers[p["unit"]], markersize=8, label=f"{p['name']}, {p['count']:,} {p['unit']}")
         ax.axhspan(1e-30, data["uncertainty"], color="#bbbbbb", alpha=0.4, linewidth=0)
-        ax.set(xscale="log", yscale="log", xlabel="milliseconds (median)", title=kind)
+        ax.set(xscale="log", yscale="log", xlabel="time [ms] (median)", title=kind)
         ax.set_ylim(1e-16, 1.0)
-    axes[0].set_ylabel("largest relative error of a standard deviation")
-    figure.suptitle(f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5)
+    axes[0].set_ylabel("largest relative error\nof a standard deviation [-]")
+    legend_below(figure, axes[0], 2)
+    heading(figure, f"What accuracy costs in ride: R19-ride at {SPEED:g} m/s, rear axle delayed")
     caption = "Standard deviations by every route against quadrature with the delay exact (grey: its own error)."
     return caption, figure

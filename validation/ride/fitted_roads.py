@@ -147,22 +147,22 @@ def fits_table(roads: list[dict[str, Any]]) -> Table:
 
 def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple[str, Any]:
     """Left the spectra over the wavenumber, right the coherency of left and right; measured roads thin."""
-    from models.drawing.figures import plt
+    from models.drawing.figures import WIDE, heading, plt
 
     road, k = road_of_level(half_track), np.geomspace(0.02, 100.0, 300)
     isotropic = isotropic_like(road, half_track)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.8))
     left.fill_between(
         k,
         level_of_class("C") / 2 / k**2,
         level_of_class("C") * 2 / k**2,
         color="0.92",
         zorder=0,
-        label="ISO 8608 class C, limits halved: two-sided",
+        label="ISO 8608 class C, limits halved",
     )
     left.loglog(k, road.spectrum(k, half_track), "k", lw=2, label="track: mean and roll process")
     left.loglog(k, road.mean.spectrum(k), "k--", label="mean process")
-    left.loglog(k, half_track**2 * road.roll.spectrum(k), "k:", label="roll process, times $b^2$")
+    left.loglog(k, half_track**2 * road.roll.spectrum(k), "k:", label="roll process, times b²")
     right.semilogx(k, road.coherency(k, half_track, -half_track), "k", lw=2, label="mean and roll process")
     right.semilogx(k, isotropic.coherency(k, 2 * half_track), "k-.", label="isotropic, same track spectrum")
     for i, shown in enumerate(measured):
@@ -172,26 +172,12 @@ def coherency_figure(half_track: float, measured: list[dict[str, Any]]) -> tuple
             right.semilogx(shown["wavenumber"], shown["coherency"], label=_label(shown), **thin)
             right.axhline(shown["chance"], ls=(0, (1, 3)), **thin)
     left.set(
-        title="Spectral density of the left track [m$^3$], two-sided",
-        xlabel="wavenumber [rad/m]",
-        xlim=(0.02, 100),
-        ylim=(1e-10, 1e-1),
+        title="Left track: two-sided density [m³]", xlabel="wavenumber [rad/m]", xlim=(0.02, 100), ylim=(1e-10, 1e-1)
     )
-    right.set(
-        title="Coherency of left and right",
-        xlabel="wavenumber [rad/m]",
-        xlim=(0.02, 100),
-        ylim=(0, 1.4),
-        yticks=np.linspace(0, 1, 6),
-    )
-    left.legend(fontsize=7.5, loc="lower left")
-    right.legend(fontsize=7.5, loc="upper right", ncols=2)
-    figure.suptitle(
-        "A road of mean and roll process: both tracks move together in long waves and part in short ones",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
+    right.set(title="Coherency of left and right [-]", xlabel="wavenumber [rad/m]", xlim=(0.02, 100), ylim=(0, 1.05))
+    for axis in (left, right):
+        axis.legend(fontsize=7.5, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+    heading(figure, "A road of mean and roll process: both tracks move together in long waves and part in short ones")
     said = (
         f"Tracks {2 * half_track:g} m apart with the values read from the paper; its vehicle and measurements are "
         "not recoverable. Dotted levels: what chance alone shows in 95 % of the windowed estimates."

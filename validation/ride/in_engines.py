@@ -144,11 +144,11 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Spectra of both engines' runs over the covariance's own."""
     if not data["spectra"]:
         return []
-    from models.drawing.figures import COLOURS, LABELS, plt
+    from models.drawing.figures import COLOURS, DARK, LABELS, WIDE, heading, legend_below, plt
 
     shown = data["spectra"]
-    units = ("(m/s$^2$)$^2$/Hz", "(m/s$^2$)$^2$/Hz", "m$^2$/Hz", "N$^2$/Hz")
-    figure, axes = plt.subplots(2, 2, figsize=(10.0, 6.4), sharex=True)
+    units = ("(m/s²)²/Hz", "(m/s²)²/Hz", "m²/Hz", "N²/Hz")
+    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 6.0), sharex=True)
     for axis, name, unit in zip(axes.ravel(), SHOWN, units, strict=True):
         for engine, width, style in zip(ENGINES, (2.2, 1.0), ("-", "--"), strict=True):
             curves = shown[engine]
@@ -160,13 +160,13 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
                 linewidth=width,
                 label=f"{LABELS[engine]}, {DRIVEN - SKIPPED:g} s in time",
             )
-        axis.loglog(shown["own"]["frequency"], shown["own"][name], "k", linewidth=1.2, label="of the covariance")
+        axis.loglog(shown["own"]["frequency"], shown["own"][name], color=DARK, linewidth=1.2, label="of the covariance")
         top = max(shown["own"][name])
         axis.set(title=name.capitalize(), ylabel=f"one-sided density [{unit}]", ylim=(1e-5 * top, 5 * top))
     for axis in axes[1]:
         axis.set_xlabel("frequency [Hz]")
-    axes[0, 0].legend(fontsize=8)
-    figure.suptitle(f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
+    legend_below(figure, axes[0, 0])
+    heading(figure, f"R19-ride at {SPEED:g} m/s: one path through both engines, over the spectra of its covariance")
     caption = (
         "Spectra of one path of 19 freedoms on the paper's road through both engines, gravity on, by Welch's "
         "method; black, what the covariance's own linear vehicle and road say."
