@@ -172,12 +172,6 @@ def test_every_shipped_scene_of_braking_is_valid():
         assert describe(build(tomllib.loads(path.read_text()), path.name))
 
 
-def test_the_braking_scene_of_the_readme_is_valid():
-    text = (Path(__file__).parents[1] / "README.md").read_text()
-    block = next(block for block in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if '"braking"' in block)
-    check(build(tomllib.loads(block), "README.md"), ())
-
-
 @pytest.mark.parametrize(
     ("tables", "place", "said"),
     [

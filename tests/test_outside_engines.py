@@ -24,15 +24,15 @@ from validation.common import checks, wrong_engines
 from validation.common.scenes import force_scene, road_scene
 
 
-def of_the_readme():
-    """The class that the README shows."""
+def of_the_page():
+    """The class that the page on own engines shows."""
     shown: dict = {}
-    readme = (Path(__file__).parents[1] / "README.md").read_text()
-    exec(re.search(r"```python\n(.*?)```", readme, flags=re.DOTALL).group(1), shown)
+    page = (Path(__file__).parents[1] / "docs" / "how-to" / "own_engine.md").read_text()
+    exec(re.search(r"```python\n(.*?)```", page, flags=re.DOTALL).group(1), shown)
     return shown["Scipy"]
 
 
-Scipy = of_the_readme()
+Scipy = of_the_page()
 
 
 class Euler:

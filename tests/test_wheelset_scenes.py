@@ -1,7 +1,6 @@
 """Scenes of a wheelset, their studies, and orbits."""
 
 import json
-import tomllib
 from dataclasses import replace
 from functools import partial
 
@@ -160,17 +159,6 @@ def test_limit_cycles_need_a_bound_and_a_range():
         limit_cycle.check(scene(contact={"law": "linear"}), ())
     with pytest.raises(InputError, match="range of speeds"):
         limit_cycle.check(scene(speeds={"values": [60.0]}), ())
-
-
-def test_the_scene_of_the_readme_is_a_valid_scene():
-    import re
-    from pathlib import Path
-
-    text = (Path(__file__).parents[1] / "README.md").read_text()
-    (block,) = (
-        found for found in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if 'system = "wheelset"' in found
-    )
-    plan.check(build(tomllib.loads(block), "README.md"), ("reference",))
 
 
 def test_limit_of_climbing() -> None:

@@ -1,0 +1,46 @@
+"""When two printed outputs say the same: seconds and versions may differ, numbers by their last digit.
+
+- white space counts as one space, as the widths of columns depend on the numbers in them
+- a number before a unit of time (s, ms, us, min) stands for any number: seconds are those of the machine
+- a version, such as 1.13.6, a date and a commit stand for any other
+- a number with digits after its point may differ by one in the last digit printed
+- numbers below 1e-9 are rounding, and stand for any other such number
+- everything else, whole numbers included, is the same
+"""
+
+import re
+from decimal import Decimal
+
+TIME = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]?\d+)?(?= ?(?:s|ms|us|min)\b(?!/))")
+DATE = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
+COMMIT = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
+DATE = r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?)?"
+COMMIT = r"\b(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b"
+VERSION = re.compile(rf"\b\d+(?:\.\d+){{2,}}\w*|{DATE}|{COMMIT}")
+NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
+ROUNDING = Decimal("1e-9")
+
+
+def alike(written: str, printed: str) -> bool:
+    """Whether a printed output says what stands in a page."""
+    (words, numbers), (others, values) = _parts(written), _parts(printed)
+    return words == others and all(map(_same, numbers, values))
+
+
+def _parts(text: str) -> tuple[str, list[str]]:
+    """The text with a sign in place of every number, and the numbers."""
+    text = TIME.sub("TIME", VERSION.sub("VERSION", " ".join(text.split())))
+    return NUMBER.sub("#", text), NUMBER.findall(text)
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two numbers agree to the last digit that both have."""
+    if one == other:
+        return True
+    first, second = Decimal(one), Decimal(other)
+    if max(abs(first), abs(second)) < ROUNDING:
+        return True
+    if not {".", "e"} & {*one, *other}:
+        return False
+    digit = Decimal(1).scaleb(max(int(number.as_tuple().exponent) for number in (first, second)))
+    return abs(first - second) <= digit

@@ -1,0 +1,66 @@
+"""Pages of the documentation and the fenced blocks in them.
+
+A block is marked by a comment in the line before its fence:
+
+- ``<!-- run -->``: a ``console`` block, whose lines after ``$`` are commands, or a ``python`` block; the build runs it
+- ``<!-- run: fails -->``: a ``console`` block whose last command ends with an error that the page shows
+- ``<!-- output -->``: a ``text`` block, what the block that ran last printed
+- ``<!-- file: NAME -->``: the text of a file, written into the folder in which the page's examples run
+- ``<!-- picture: NAME -->``: before an image of Markdown, a file that the examples drew in that folder
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+OUTSIDE = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+"""Pages that lie at the top of the repository."""
+MARK = re.compile(r"<!--\s*(run|run: fails|output|file: (?P<file>\S+)|picture: (?P<picture>\S+))\s*-->")
+IMAGE = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def pages(root: Path = ROOT) -> list[Path]:
+    """All pages, sorted; those at the top of the repository first."""
+    outside = [root / name for name in OUTSIDE if (root / name).is_file()]
+    return [*outside, *sorted((root / "docs").rglob("*.md"))]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page, or an image that examples draw.
+
+    mark : text of the comment before it, "" where there is none; language : the word after the fence, "image" for an
+    image; text : what stands between the fences, or the address of the image; first, last : its lines, counted from 0,
+    the last one excluded.
+    """
+
+    mark: str
+    language: str
+    text: str
+    first: int
+    last: int
+
+    @property
+    def file(self) -> str:
+        """Name of the file that the mark names, "" where it names none."""
+        return self.mark.partition(": ")[2] if self.mark.startswith(("file: ", "picture: ")) else ""
+
+
+def blocks(text: str) -> list[Block]:
+    """All fenced blocks and marked images of a page, in order."""
+    from markdown_it import MarkdownIt
+
+    lines, found, mark = text.splitlines(keepends=True), [], ""
+    for token in MarkdownIt("commonmark").parse(text):
+        if token.type == "html_block":
+            matched = MARK.fullmatch(token.content.strip())
+            mark = matched[1] if matched else ""
+        elif token.type == "fence" and token.map:
+            first, last = token.map
+            found.append(Block(mark, token.info.strip(), "".join(lines[first + 1 : last - 1]), first + 1, last - 1))
+            mark = ""
+        elif token.type == "inline" and mark.startswith("picture: ") and token.map:
+            found += [Block(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
+            mark = ""
+    return found

@@ -1,0 +1,240 @@
+"""The reference of scene keys: a page written from the models that read scenes.
+
+``python -m docs.scene_keys`` writes ``docs/reference/scenes.md``. For every system the page has the keys of its scenes
+and of the effects that have tables, each with its type, unit, default and meaning; then the keys of vehicle files, of
+parameter sets and the options of studies. What stands there is what the models check, and nothing is written by hand.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from inspect import getdoc
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from docs.pages import ROOT
+from models.core.scene_effects import listing, module_of, names_of
+from models.core.scene_file import SceneFile
+from models.core.strict import LARGEST
+from models.core.systems import SYSTEMS
+from studies.command.asked import studies
+
+PAGE = ROOT / "docs" / "reference" / "scenes.md"
+HEAD = """# Scene keys
+
+<!-- written by `python -m docs.scene_keys`; do not edit -->
+
+A scene is a TOML file. Its key `system` says which of the sections below holds; without it the system is `pitch-plane`.
+A key that is not here is refused, with the nearest name that is. Quantities are in SI units. A default of *needed*
+means that the scene must have the key; *none* means that what the key describes is absent.
+"""
+NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false", Any: "any value"}
+MADE_BY_READER = ("file", "folder")
+"""Fields of a scene that are no keys: they say where it was read."""
+OTHER_TABLES = (
+    ("Vehicle files", "models.vehicles.vehicle_tables", "VehicleTable"),
+    ("Parameters of the pitch-plane vehicle", "models.vehicles.pitch_plane", "Parameters"),
+    ("Parameters of a wheelset", "models.rail.wheelset", "Wheelset"),
+    ("Parameters of a braked vehicle", "models.brake.plane_vehicle", "Truck"),
+)
+
+
+@dataclass(frozen=True)
+class Key:
+    """One line of the reference."""
+
+    name: str
+    kind: str
+    unit: str
+    default: str
+    meaning: str
+
+    def row(self) -> str:
+        """The line as Markdown."""
+        cells = (f"`{self.name}`", self.kind, self.unit, self.default, self.meaning)
+        return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+
+
+def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[Key]:
+    """Keys of a table and of the tables in it; a name that the user chooses is NAME, an entry of a list has []."""
+    for name, field in model.model_fields.items():
+        if issubclass(model, SceneFile) and name in MADE_BY_READER:
+            continue
+        place, inner = _inner(field.annotation)
+        meaning = _sentence(field.description or (_summary(inner) if inner else "")) or MEANINGS.get(name, "")
+        yield Key(prefix + name, _kind(field), _unit(field), _default(field, inner), meaning)
+        if inner is not None:
+            yield from keys_of(inner, f"{prefix}{name}{place}.")
+
+
+MEANINGS = {
+    "system": "the system of the scene",
+    "engines": "settings of single engines",
+    "run": "how long, and how finely",
+    "body": "name of the body",
+    "name": "name of the entry",
+    "kind": "what is read",
+}
+"""What keys mean whose model gives no words to them."""
+
+
+def _inner(annotation: Any) -> tuple[str, type[BaseModel] | None]:
+    """The table that a field holds, None where it holds none, and how its entries are named."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return "", annotation
+    if origin in (Union, UnionType, Annotated):
+        return next((found for found in map(_inner, arguments) if found[1]), ("", None))
+    if origin in (dict, list, tuple, Mapping) and arguments:
+        place, inner = _inner(arguments[-1] if origin is not list else arguments[0])
+        return ("[]" if origin is list else ".NAME") + place, inner
+    return "", None
+
+
+def _kind(field: FieldInfo) -> str:
+    """Type of a field, and the limits of a number."""
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    limits = [(sign, getattr(rule, kind, None)) for rule in field.metadata for kind, sign in signs.items()]
+    said = [f"{sign} {limit:g}" for sign, limit in limits if limit is not None and abs(limit) < LARGEST]
+    return ", ".join([_words(field.annotation), *said])
+
+
+def _words(annotation: Any) -> str:
+    """A type in plain words."""
+    origin, arguments = get_origin(annotation), [each for each in get_args(annotation) if each is not type(None)]
+    if annotation in NAMES:
+        return NAMES[annotation]
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return "table"
+    if origin is Literal:
+        return ", ".join(f"`{value}`" for value in arguments)
+    if origin is Annotated:
+        return _words(arguments[0])
+    if origin in (Union, UnionType):
+        return " or ".join(dict.fromkeys(map(_words, arguments)))
+    if origin is list:
+        return f"list of {_plural(_words(arguments[0]))}"
+    if origin is tuple:
+        return f"list of {_plural(_words(arguments[0]))}"
+    return "table" if origin in (dict, Mapping) else getattr(annotation, "__name__", str(annotation))
+
+
+def _plural(word: str) -> str:
+    """More than one of a type."""
+    known = {"text": "texts", "any value": "values"}
+    return known.get(word, word if word.startswith("`") else re.sub(r"^(list|\S+( number)?)", r"\1s", word))
+
+
+def _unit(field: FieldInfo) -> str:
+    extra = field.json_schema_extra
+    return str(extra.get("unit") or "") if isinstance(extra, dict) else ""
+
+
+def _default(field: FieldInfo, inner: type[BaseModel] | None) -> str:
+    """What holds where a scene does not have the key."""
+    if field.is_required():
+        return "*needed*"
+    value = field.get_default(call_default_factory=True)
+    if value is None:
+        return "*none*"
+    if isinstance(value, BaseModel):
+        return "as below" if inner is not None else "usual"
+    if value in ([], {}, (), ""):
+        return "empty"
+    return f"`{_toml(value)}`"
+
+
+def _toml(value: Any) -> str:
+    """A value as a scene has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, BaseModel):
+        return _toml(value.model_dump(exclude_none=True))
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:.6g}"
+
+
+def _summary(model: type[BaseModel]) -> str:
+    """First sentence of what a table is."""
+    return (getdoc(model) or "").partition("\n\n")[0].replace("\n", " ").rstrip(".")
+
+
+def _sentence(meaning: str) -> str:
+    """The meaning in one line, without the name of the table before it."""
+    return re.sub(r"^(One of )?\[[^\]]*\]+(, \[[^\]]*\]+)*[:.,]? *", "", " ".join(meaning.split()))
+
+
+def scene_model(system: str) -> type[SceneFile]:
+    """The model that reads scenes of a system."""
+    module = import_module(SYSTEMS[system].scene)
+    models = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, SceneFile)]
+    return next(each for each in models if each.__module__ == module.__name__)
+
+
+def table(model: type[BaseModel], prefix: str = "") -> list[str]:
+    """Lines of a table of Markdown: all keys of a model."""
+    head = ["| key | type | unit | default | meaning |", "|---|---|---|---|---|"]
+    return [*head, *(key.row() for key in keys_of(model, prefix))]
+
+
+def of_system(system: str) -> list[str]:
+    """Section of a system: what it is, its keys, its effects."""
+    says = (getdoc(import_module(SYSTEMS[system].package)) or "").partition("\n\n")[0].replace("\n", " ")
+    lines = ["", f"## {system}", "", says, "", *table(scene_model(system))]
+    if SYSTEMS[system].effects:
+        lines += ["", f"### Effects of {system}", "", "| effect | named by | what it adds | what it takes |"]
+        lines += ["|---|---|---|---|", *(_effect(system, name, says) for name, says in listing(system).items())]
+    for name in names_of(system):
+        model = getattr(module_of(system, name), "Parameters", None)
+        if model is not None and model.model_fields:
+            lines += ["", f"`[effects.{name}]` of {system}", "", *table(model)]
+    return lines
+
+
+def _effect(system: str, name: str, says: str) -> str:
+    module = module_of(system, name)
+    place = module.PLACE if hasattr(module, "named") else f"[effects.{name}]"
+    cells = (f"`{name}`", f"`{place}`", says, str(module.COST).rstrip("."))
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def options() -> list[str]:
+    """Section of the options of studies, which a scene sets in its table [options]."""
+    lines = ["", "## Options of studies", "", "A scene sets the options of its study in the table `[options]`."]
+    for name in studies():
+        model = getattr(import_module(f"studies.{name}"), "Options", None)
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            lines += ["", f"### Study `{name}`", "", *table(model)]
+    return lines
+
+
+def others() -> list[str]:
+    """Sections of the files that scenes name."""
+    lines = []
+    for title, module, name in OTHER_TABLES:
+        model = getattr(import_module(module), name)
+        lines += ["", f"## {title}", "", f"{_summary(model)}.", "", *table(model)]
+    return lines
+
+
+def page() -> str:
+    """The whole page."""
+    lines = [line for system in SYSTEMS for line in of_system(system)]
+    return HEAD + "\n".join([*lines, *others(), *options()]) + "\n"
+
+
+def main(path: Path = PAGE) -> None:
+    """Write the page."""
+    path.write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""Build the site: every example is run anew, and what it prints is compared with the pages and shown.
+
+``python -m docs.website FOLDER`` copies the pages into a folder beside the site, runs their examples there, and builds
+the site with MkDocs (extra ``docs``) into ``FOLDER``, where every warning is an error: a broken link, an anchor that is
+not there, a page without a place. It ends with code 1 where a page of the repository shows what its examples do not
+print. ``--as-shown`` leaves the examples out and shows what stands in the pages. ``python -m mkdocs`` cannot build from
+``docs`` itself: its pages link to those at the top of the repository.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from docs.outputs import run_pages
+from docs.pages import OUTSIDE, ROOT, pages
+from docs.validation_cases import newest_report, rows
+
+SKIPPED = shutil.ignore_patterns("*.py", "__pycache__", "mkdocs.yml")
+
+
+def copy_pages(to: Path) -> None:
+    """Copy all pages and the pictures in them, at the same places as in the repository."""
+    shutil.copytree(ROOT / "docs", to / "docs", ignore=SKIPPED)
+    for name in OUTSIDE:
+        shutil.copyfile(ROOT / name, to / name)
+    (to / "studies").mkdir()
+    for picture in (ROOT / "studies").glob("*.png"):
+        shutil.copyfile(picture, to / "studies" / picture.name)
+
+
+def add_rows(pages_folder: Path) -> None:
+    """Put the rows of the newest report, where there is one, into the page that explains them."""
+    report = newest_report()
+    if report is not None:
+        page = pages_folder / "docs" / "reference" / "report_rows.md"
+        page.write_text(page.read_text(encoding="utf-8") + rows(report), encoding="utf-8")
+
+
+def build(site: Path, work: Path, as_shown: bool) -> bool:
+    """Build the site in ``site`` from copies in ``work``; returns whether the pages show what their examples print."""
+    sources = work / "pages"
+    copy_pages(sources)
+    well = as_shown or run_pages(pages(sources), check=False, strict=True)
+    add_rows(sources)
+    shutil.copyfile(ROOT / "docs" / "mkdocs.yml", work / "mkdocs.yml")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict"]
+    command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
+    subprocess.run(command, check=True, cwd=ROOT)
+    return well
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description="Build the site of the documentation.")
+    parser.add_argument("site", type=Path, help="folder of the site")
+    parser.add_argument("--as-shown", action="store_true", help="do not run the examples")
+    asked = parser.parse_args()
+    with TemporaryDirectory(prefix="website") as work:
+        try:
+            well = build(asked.site, Path(work), asked.as_shown)
+        except subprocess.CalledProcessError as error:
+            sys.exit(error.returncode)
+    differs = "pages show what their examples do not print; `python -m docs.outputs` writes it"
+    print(f"the site is in {asked.site}" if well else differs)
+    sys.exit(0 if well else 1)
+
+
+if __name__ == "__main__":
+    main()
