@@ -8,6 +8,7 @@ print. ``--as-shown`` leaves the examples out and shows what stands in the pages
 """
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -18,12 +19,15 @@ from docs.outputs import run_pages
 from docs.pages import OUTSIDE, ROOT, pages
 from docs.validation_cases import newest_report, rows
 
-SKIPPED = shutil.ignore_patterns("*.py", "__pycache__", "mkdocs.yml")
+QUIET = {"NO_MKDOCS_2_WARNING": "1"}
+"""No news of MkDocs in the output."""
+SKIPPED = shutil.ignore_patterns("*.py", "__pycache__", "*.yml")
 
 
 def copy_pages(to: Path) -> None:
     """Copy all pages and the pictures in them, at the same places as in the repository."""
     shutil.copytree(ROOT / "docs", to / "docs", ignore=SKIPPED)
+    shutil.copyfile(ROOT / "docs" / "nav.yml", to / "nav.yml")
     for name in OUTSIDE:
         shutil.copyfile(ROOT / name, to / name)
     (to / "studies").mkdir()
@@ -48,7 +52,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     shutil.copyfile(ROOT / "docs" / "mkdocs.yml", work / "mkdocs.yml")
     command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
-    subprocess.run(command, check=True, cwd=ROOT)
+    subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET)
     return well
 
 
