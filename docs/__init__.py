@@ -1,0 +1,9 @@
+"""The documentation: pages in Markdown, and what runs their examples, writes the reference and builds the site.
+
+- ``pages``: the pages, and their fenced blocks with the marks before them
+- ``outputs``: runs the examples of pages and writes or compares what they print
+- ``alike``: when two printed outputs say the same
+- ``scene_keys``: the reference of scene keys and effects, from the models that read scenes
+- ``validation_cases``: the reference of the cases of the validation report
+- ``website``: the site, built with every example run anew
+"""
