@@ -1,0 +1,62 @@
+"""Small pictures of the studies' figures, put beside their names in a copy of the gallery page.
+
+``python -m docs.gallery RESULTS PAGE`` reads the page, looks for each listed figure below the folder RESULTS, writes a
+small picture of it into the folder ``gallery`` beside the page, and shows it in the page. A figure that is not there
+stays a name, so that the page can be built before any study ran.
+"""
+
+import argparse
+import re
+from pathlib import Path
+
+WIDTH = 480
+"""Pixels of a small picture: half a page, readable in its outlines."""
+COLOURS = 64
+"""Of a small picture: lines and text need no more, and a file is a third of the size."""
+LISTED = re.compile(r"^\| `(?P<figure>[\w/]+\.png)` \|", re.MULTILINE)
+
+
+def listed(text: str) -> list[str]:
+    """Figures that the page lists, as ``SCENE/NAME.png``, in its order."""
+    return LISTED.findall(text)
+
+
+def shrink(figure: Path, to: Path) -> Path:
+    """Write a small picture (PNG, ``WIDTH`` pixels wide or less) of a figure; returns its path."""
+    from PIL import Image
+
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with Image.open(figure) as image:
+        small = image.convert("RGB")
+        small.thumbnail((WIDTH, 10 * WIDTH))
+        small.quantize(COLOURS).save(to, optimize=True)
+    return to
+
+
+def add_pictures(results: Path, page: Path) -> list[str]:
+    """Show small pictures in a page, which is changed; returns the figures that are not there."""
+    text, missing = page.read_text(encoding="utf-8"), list[str]()
+    for name in listed(text):
+        figure = results / name
+        if not figure.is_file():
+            missing.append(name)
+            continue
+        small = shrink(figure, page.parent / "gallery" / name.replace("/", "_"))
+        shown = f"![{name}](gallery/{small.name})<br>`{name}`"
+        text = text.replace(f"| `{name}` |", f"| {shown} |")
+    page.write_text(text, encoding="utf-8")
+    return missing
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description="Put small pictures of the studies' figures into a gallery page.")
+    parser.add_argument("results", type=Path, help="folder in which the studies left their results")
+    parser.add_argument("page", type=Path, help="copy of docs/gallery.md, which is changed")
+    asked = parser.parse_args()
+    missing = add_pictures(asked.results, asked.page)
+    print(f"{len(missing)} figures are not there: {', '.join(missing)}" if missing else "all figures are shown")
+
+
+if __name__ == "__main__":
+    main()
