@@ -141,19 +141,17 @@ def _save(scene: BrakingScene, stops: list[dict[str, Any]], folder: Path, result
     write_whole(folder / "controllers.csv", "".join(",".join(row) + "\n" for row in [(*LABELS, *heads), *rows]))
 
 
-PANELS = {"v0^2/2d [m/s^2]": "Equivalent deceleration", "yaw [deg]": "Final yaw angle"}
+PANELS = {"v0^2/2d [m/s^2]": "equivalent deceleration [m/s²]", "yaw [deg]": "final yaw angle [deg]"}
 
 
 def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, results: Results) -> None:
     """Bars by procedure, a column of panels per surface, one colour per controller."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import WIDE, heading, legend_below, plt, save
 
     options = read(Options, scene.options, scene.file, "options")
     surfaces, _, kinds = (list(dict.fromkeys(stop[name] for stop in stops)) for name in LABELS)
     names, each = list(scene.procedures), len(options.controllers)
-    figure, axes = plt.subplots(
-        len(PANELS), max(len(surfaces), 1), figsize=(4.4 * max(len(surfaces), 1), 6.4), squeeze=False, sharey="row"
-    )
+    figure, axes = plt.subplots(len(PANELS), max(len(surfaces), 1), figsize=(WIDE, 6.0), squeeze=False, sharey="row")
     width = 0.8 / max(len(kinds), 1)
     for column, surface in enumerate(surfaces):
         for row, (key, quantity) in enumerate(PANELS.items()):
@@ -173,13 +171,13 @@ def _figure(scene: BrakingScene, stops: list[dict[str, Any]], file: Path, result
                     color=f"C{k % each}",
                     alpha=1.0 if k < each else 0.5,
                 )
-            axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names])
+            axis.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names])
             axis.set(
-                title=f"{quantity} on {surface}; split: {options.surfaces[surface]} on the right",
-                ylabel=key.replace("^2", "²") if column == 0 else "",
+                title=f"{surface.capitalize()}; split: {options.surfaces[surface]} right" if row == 0 else "",
+                ylabel=quantity if column == 0 else "",
             )
     if stops:
-        axes[0, 0].legend(fontsize=8)
+        legend_below(figure, axes[0, 0])
     heading(figure, f"{scene.title}, each procedure from its speed to a stop", results)
     save(figure, file)
 

@@ -128,9 +128,9 @@ def _figure(
     results: Results,
     folder: Path,
 ) -> None:
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import DARK, SMALL, WIDE, heading, plt, save
 
-    figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(11, 4.2))
+    figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
     for i, (arrays, figures) in enumerate(zip(ensembles, scatters, strict=True)):
         distance = figures["distance"]
@@ -142,15 +142,15 @@ def _figure(
     cloud.plot(
         speeds,
         scatters[0]["distance"].mean * (speeds / speeds.mean()) ** 2,
-        color="#222222",
+        color=DARK,
         lw=0.9,
         label="by the square of the speed alone",
     )
     said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
-    histogram.set(xlabel="stopping distance [m]", ylabel="stops", title="Stopping distances and their means")
-    cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="They scatter by more than the speed")
-    histogram.legend(fontsize=8)
-    cloud.legend(fontsize=8)
+    histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
+    cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
+    histogram.legend(fontsize=SMALL)
+    cloud.legend(fontsize=SMALL)
     heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
     save(figure, folder / "ensemble.png")
 

@@ -1,6 +1,7 @@
 """Figures of a stop: speeds, slips, pressures and torques over time, and the path on the road with its surfaces."""
 
 from pathlib import Path as File
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -8,14 +9,14 @@ import numpy as np
 from models.brake.plane_chain import Point, place_of
 from models.brake.plane_vehicle import Plane
 from models.core.told import Results
-from models.drawing.figures import heading, save
+from models.drawing.figures import BLUE, DARK, GREEN, ORANGE, PINK, SKY, SMALL, VERMILION, WIDE, heading, save
 from models.systems.braking.measured_pressures import MeasuredPressures
 from models.systems.braking.of_scene import plane_of, sides, vehicle_of
 from models.systems.braking.plan import behind
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import SLOWEST, WHEELS, Stop
 
-COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#66c2a5", "#cc79a7", "#e7b5d1")
+COLOURS = (BLUE, SKY, VERMILION, ORANGE, GREEN, "#66c2a5", PINK, "#e7b5d1")
 GROUND = {"dry": "#9a9a9a", "wet": "#7f9bb3", "snow": "#eceff1", "ice": "#cfe8f3"}
 OTHER = "#e8dcc8"
 """Colours of the road; of a surface of the user's own."""
@@ -26,12 +27,28 @@ OVERHANG, BESIDE = 1.2, 1.1
 def stop_figure(
     scene: BrakingScene, name: str, results: Results, file: File, measured: MeasuredPressures | None = None
 ) -> File:
-    """Six panels of the first result: speeds, slips, pressures, motion, torques, path; of a vehicle on its suspension
-    also its body's lean, and loads."""
+    """Panels of the first result: speeds, slips, pressures, torques, the path; motion to the side where there is any,
+    and of a vehicle on its suspension also its body's lean, and loads."""
     procedure, stop = scene.procedures[name], Stop(next(iter(results.values())).detail)
-    lean = stop.lean
-    columns = 3 if lean is None else 4
-    figure, axes = plt.subplots(2, columns, figsize=(14 * columns / 3, 7.2))
+    aside, lean = _moves_aside(stop), stop.lean
+    rows: list[Any] = [["speeds", "slips"], ["pressures", "torques"]]
+    rows += ([["angles", "across"]] if aside else []) + ([["lean", "loads"]] if lean is not None else [])
+    figure, axes = plt.subplot_mosaic([*rows, ["road", "road"]], figsize=(WIDE, 2.3 * (len(rows) + 1) + 0.4))
+    _speeds(axes["speeds"], stop, stop.path.turning * plane_of(scene).radius, measured)
+    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
+    _wheels(axes["slips"], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
+    _wheels(axes["pressures"], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
+    _wheels(axes["torques"], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
+    if aside:
+        _angles(axes["angles"], stop, scene.trailer is not None)
+        axes["across"].plot(stop.times[1:], stop.across, color=DARK, lw=0.8)
+        axes["across"].set(xlabel="time [s]", ylabel="acceleration [m/s²]", title="Lateral acceleration")
+    if lean is not None:
+        _lean(axes["lean"], stop.times, lean)
+        _wheels(axes["loads"], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
+    road(axes["road"], scene, name, stop)
+    handles, labels = axes["speeds"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
     distance, time = stop.of_vehicle()["stopping distance [m]"], stop.times[-1]
     ended = f"stands after {distance:.2f} m and {time:.2f} s" if stop.path.stands else f"still moves at {time:.1f} s"
     heading(
@@ -40,18 +57,18 @@ def stop_figure(
         f"{behind(scene).replace('{procedure}', name)}; {ended}",
         results,
     )
-    _speeds(axes[0, 0], stop, stop.path.turning * plane_of(scene).radius, measured)
-    slips = np.where(stop.speed[:-1, None] > SLOWEST, stop.path.reports.slip, np.nan)
-    _wheels(axes[0, 1], stop.times[1:], slips, "Slip of each wheel (above 1 m/s)", "slip [-]")
-    _wheels(axes[0, 2], stop.times, stop.path.pressures, "Pressure in each chamber", "pressure [bar]")
-    _motion(axes[1, 0], stop, scene.trailer is not None)
-    _wheels(axes[1, 1], stop.times, stop.path.torques / 1e3, "Torque of each brake", "torque [kN m]")
-    road(axes[1, 2], scene, name, stop)
-    if lean is not None:
-        _lean(axes[0, 3], stop.times, lean)
-        _wheels(axes[1, 3], stop.times[1:], stop.path.reports.load / 1e3, "Load of each wheel", "load [kN]")
-    axes[0, 1].legend(ncols=2, fontsize=8)
     return save(figure, file)
+
+
+STRAIGHT = 0.05
+"""Degrees, and m/s^2, below which a stop is called straight and its motion to the side is not drawn."""
+
+
+def _moves_aside(stop: Stop) -> bool:
+    """Whether a vehicle turns, or is pushed, to the side."""
+    moving = stop.speed > SLOWEST
+    turned = np.degrees(stop.path.states[:, 0, 2]), np.degrees(stop.side_slip[moving]), stop.across
+    return any(np.abs(values).max(initial=0.0) > STRAIGHT for values in turned)
 
 
 def _speeds(axis: plt.Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPressures | None) -> None:
@@ -60,9 +77,8 @@ def _speeds(axis: plt.Axes, stop: Stop, rims: np.ndarray, measured: MeasuredPres
     if measured is not None and measured.speeds is not None:
         for i, values in enumerate(measured.speeds.T):
             axis.plot(measured.times, values, color=COLOURS[i], lw=1.4, ls=":", label="measured" if i == 0 else None)
-    axis.plot(stop.times, stop.speed, color="#222222", lw=1.6, label="vehicle")
-    axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle, and of each wheel's rim")
-    axis.legend(fontsize=8)
+    axis.plot(stop.times, stop.speed, color=DARK, lw=1.6, label="vehicle")
+    axis.set(xlabel="time [s]", ylabel="speed [m/s]", title="Speed of the vehicle and of each rim")
 
 
 def _wheels(axis: plt.Axes, times: np.ndarray, values: np.ndarray, title: str, label: str) -> None:
@@ -78,21 +94,18 @@ def _lean(axis: plt.Axes, times: np.ndarray, lean: np.ndarray) -> None:
     ):
         axis.plot(times, values, color=colour, label=label)
     axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Roll and pitch of the body")
-    axis.legend(fontsize=8)
+    axis.legend(fontsize=SMALL)
 
 
-def _motion(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
-    """Yaw, side slip and, of a train, the hitch in degrees; lateral acceleration."""
-    axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color="#0072b2", label="yaw angle [deg]")
+def _angles(axis: plt.Axes, stop: Stop, trailer: bool) -> None:
+    """Yaw, side slip and, of a train, the hitch."""
+    axis.plot(stop.times, np.degrees(stop.path.states[:, 0, 2]), color=BLUE, label="yaw")
     slip = np.where(stop.speed > SLOWEST, np.degrees(stop.side_slip), np.nan)
-    axis.plot(stop.times, slip, color="#d55e00", label="side slip [deg]")
+    axis.plot(stop.times, slip, color=VERMILION, label="side slip")
     if trailer:
-        axis.plot(stop.times, np.degrees(stop.hitch), color="#cc79a7", label="hitch angle [deg]")
-    axis.plot(stop.times[1:], stop.across, color="#009e73", lw=0.8, label="lateral acceleration [m/s²]")
-    axis.set(xlabel="time [s]", ylabel="see legend", title="Motion beside the direction of travel")
-    low, high = axis.get_ylim()
-    axis.set_ylim(min(low, -1.0), max(high, 1.0))
-    axis.legend(fontsize=8)
+        axis.plot(stop.times, np.degrees(stop.hitch), color=PINK, label="hitch")
+    axis.set(xlabel="time [s]", ylabel="angle [deg]", title="Angles to the direction of travel")
+    axis.legend(fontsize=SMALL)
 
 
 def outlines(scene: BrakingScene) -> list[tuple[int, np.ndarray]]:
@@ -120,7 +133,7 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
     low, high = min(y.min(), 0.0) - 4.0, max(y.max(), 0.0) + 4.0
     behind_it = 0.0 if scene.trailer is None else scene.trailer.drawbar - scene.trailer.hook
     first, last = x.min() - 6.0 - behind_it, x.max() + 6.0
-    lacking = max(0.7 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
+    lacking = max(0.2 * (last - first) - (high - low), 0.0) / 2.0  # one scale both ways, in an axis of the usual shape
     low, high = low - lacking, high + lacking
     told = set[str]()
     starts = [first] + [s.x for s in scene.road.stretches[1:]] + [last]
@@ -136,11 +149,11 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
                 label=None if surface in told else surface,
             )
             told.add(surface)
-    axis.plot(x, y, color="#222222", label="centre of mass")
+    axis.plot(x, y, color=DARK, label="centre of mass")
     plane, drawn = plane_of(scene), outlines(scene)
     for i in np.searchsorted(stop.way, np.linspace(0.0, stop.way[-1], 6 - len(drawn) // 2)).clip(0, len(x) - 1):
         for unit, corners in drawn:
-            axis.plot(*on_ground(unit, corners, stop.path.states[i, 0], plane).T, color="#222222", lw=0.7)
+            axis.plot(*on_ground(unit, corners, stop.path.states[i, 0], plane).T, color=DARK, lw=0.7)
     axis.set(
         xlabel="x [m]",
         ylabel="y [m]",
@@ -150,4 +163,4 @@ def road(axis: plt.Axes, scene: BrakingScene, name: str, stop: Stop) -> None:
         aspect="equal",
     )
     axis.grid(False)
-    axis.legend(fontsize=8, loc="upper left", frameon=True, facecolor="white", framealpha=1.0)
+    axis.legend(fontsize=SMALL, loc="upper left", ncols=4, frameon=True, facecolor="white", framealpha=1.0)

@@ -24,7 +24,6 @@ LOWEST, HIGHEST = 1e-3, 1e3
 """Ends of the axis of changes (percent): what is smaller or larger is drawn at the end."""
 ELEMENTS = 8
 """Elements whose activity is drawn, the most active first."""
-LEFT, STAYS = "#009e73", "#d55e00"
 Progress = Callable[[str, float], None]
 
 
@@ -301,25 +300,25 @@ def misled(one: Found) -> list[str]:
 
 def choice_figure(found: list[Found], path: Path) -> None:
     """A panel per scene; one more for the activity of those that have it."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import WIDE, heading, plt, save
 
-    panels = [(one, False) for one in found] + [(one, True) for one in found if one.watts]
-    columns = min(2, len(panels))
-    rows = -(-len(panels) // columns)
-    longest = max(max(len(one.alone) for one in found), 4)
-    figure, axes = plt.subplots(rows, columns, figsize=(6.2 * columns, rows * (1.5 + 0.21 * longest)), squeeze=False)
-    for axis, (one, active) in zip(axes.flat, panels, strict=False):
+    shown = [(one, False) for one in found] + [(one, True) for one in found if one.watts]
+    heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(one.alone), 4)) for one, active in shown]
+    figure, axes = plt.subplots(len(shown), 1, figsize=(WIDE, sum(heights) + 0.5), squeeze=False, height_ratios=heights)
+    for axis, (one, active) in zip(axes.flat, shown, strict=True):
         _activity(axis, one) if active else _changes(axis, one)
-    for axis in axes.flat[len(panels) :]:
-        axis.set_visible(False)
-    gap = " " if columns > 1 else "\n"
-    title = f"Which effects matter for which question:{gap}change by leaving out one effect, against the tolerance"
+    title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
     heading(figure, title, _results(found))
     save(figure, path)
 
 
 def _changes(axis: Any, one: Found) -> None:
-    """Changes of every quantity by leaving out each effect alone; the row's colour tells whether it went."""
+    """Changes of every quantity by leaving out each effect alone.
+
+    Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
+    """
+    from models.drawing.figures import BAD, DARK, PALE, SMALL
+
     shown = sorted(one.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
     y = np.arange(len(shown))
     for i, name in enumerate(one.scene.quantities):
@@ -335,33 +334,38 @@ def _changes(axis: Any, one: Found) -> None:
     barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in one.choice.barred]
     if barred:
         place = np.full(len(barred), HIGHEST)
-        axis.plot(place, barred, "x", color="#b00020", ms=7, mew=1.6, label="would break an assumption")
-    axis.axvline(100 * one.scene.tolerance, color="#222222", ls="--", lw=1, label="tolerance")
+        axis.plot(place, barred, "x", color=BAD, ms=7, mew=1.6, label="would break an assumption")
+    axis.axvline(100 * one.scene.tolerance, color=DARK, ls="--", lw=1, label="tolerance")
+    axis.axvspan(100 * one.scene.tolerance, 1.5 * HIGHEST, color=PALE, alpha=0.25, lw=0, label="matters alone")
     axis.set(
         xscale="log",
         xlim=(LOWEST / 1.5, HIGHEST * 1.5),
         yticks=y,
-        yticklabels=[effect.effect.replace("_", " ") for effect in shown],
-        xlabel="change [%] (at the ends: beyond)",
+        yticklabels=[_told_of(one, effect) for effect in shown],
+        xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
-    for label, effect in zip(axis.get_yticklabels(), shown, strict=True):
-        label.set_color(LEFT if effect.effect in one.choice.left_out else STAYS)
     before, _, after = one.choice.calls
     axis.set_title(
-        f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %\n"
-        "green: left out; orange: stays, as it matters or costs nothing",
-        fontsize=9.5,
+        f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %, "
+        "without the effects named 'left out'"
     )
-    axis.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _told_of(one: Found, effect: Alone) -> str:
+    """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
+    return effect.effect.replace("_", " ") + (" (left out)" if effect.effect in one.choice.left_out else " (stays)")
 
 
 def _activity(axis: Any, one: Found) -> None:
+    from models.drawing.figures import BLUE
+
     finite = {name: value for name, value in one.watts.items() if np.isfinite(value)}
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
-    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
+    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     axis.set(
-        title=f"{one.scene.system}: energy activity,\nwhich knows neither the question nor pairs",
+        title=f"{one.scene.system}: energy activity, which knows neither the question nor pairs",
         xlabel="share of the mean power [%]",
     )
 

@@ -133,8 +133,8 @@ def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
     if last.fields:
         title = (
             f"{scene.title}\n"
-            rf"$\xi_x$ = {motion[0]:.3g}, $\xi_y$ = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
-            f"$F_x$ = {1e-3 * last.fx:.2f} kN, $F_y$ = {1e-3 * last.fy:.2f} kN, $M_z$ = {last.mz:.1f} N m "
+            f"ξx = {motion[0]:.3g}, ξy = {motion[1]:.3g}, spin = {motion[2]:.3g} 1/m: "
+            f"Fx = {1e-3 * last.fx:.2f} kN, Fy = {1e-3 * last.fy:.2f} kN, Mz = {last.mz:.1f} N m "
             f"by {NAMES[scene.method.name]}"
         )
         friction = rolls.contact.friction
@@ -149,7 +149,7 @@ def _figures(scene: ContactScene, forces: Result, folder: Path) -> None:
         sweep_figure(sweep, forces, _checks(scene, rolls), title, folder / "forces.png")
 
 
-SYMBOLS = ((r"$\xi_x$", ""), (r"$\xi_y$", ""), ("spin", " 1/m"))
+SYMBOLS = (("ξx", ""), ("ξy", ""), ("spin", " 1/m"))
 
 
 def _pressure(body: Contact) -> str:

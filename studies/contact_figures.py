@@ -6,12 +6,27 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from models.contact.fields import Fields
 from models.contact.inputs import Array
 from models.contact.theories import Rolled
 from models.core.result import Result
-from models.drawing.figures import heading, plt, save
+from models.drawing.figures import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILION,
+    WIDE,
+    heading,
+    legend_below,
+    plt,
+    save,
+)
 from models.systems.contact.scene import Sweep
 from models.systems.contact.work_precision import TARGETS, Point
 
@@ -29,7 +44,7 @@ def contact_figure(
     forces : the result whose last motion is shown.
     """
     length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
-    size = 10.5, float(np.clip(4.0 * width / length + 1.7, 3.6, 8.5))
+    size = WIDE, float(np.clip(3.4 * width / length + 2.4, 3.8, 8.0))
     figure, axes = plt.subplots(1, 2, figsize=size, sharex=True, sharey=True)
     _pressure(axes[0], patches, pressure)
     _tractions(axes[1], patches, friction, max(length, width) / ARROWS)
@@ -58,8 +73,8 @@ def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
         cells.set_clim(0.0, greatest)
         axis.add_collection(cells)
     axis.autoscale_view()
-    axis.figure.colorbar(cells, ax=axis, label="pressure [MPa]", shrink=0.8)
-    axis.set_title(f"{what}, largest {greatest:,.0f} MPa")
+    axis.figure.colorbar(cells, ax=axis, location="bottom", label="pressure [MPa]", shrink=0.8, aspect=30)
+    axis.set_title(f"{what},\nlargest {greatest:,.0f} MPa")
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
@@ -70,14 +85,14 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
         colours = np.where(f.slips[f.inside], SLIP, STICK)
         axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
         x, y, px, py = _arrows(f, spacing / MILLI)
-        arrows = axis.quiver(MILLI * x, MILLI * y, px, py, **scaled, width=0.003, color="#222222")
-    axis.quiverkey(arrows, 0.88, 0.035, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
+        arrows = axis.quiver(MILLI * x, MILLI * y, px, py, **scaled, width=0.004, color=DARK)
+    axis.quiverkey(arrows, 0.98, 1.03, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
     marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
     area = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
     slip = float(area[np.concatenate([f.slips[f.inside] for f in patches])].sum() / area.sum())
     labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
-    axis.figure.legend(marks, labels, loc="outside lower right", ncols=2)
-    axis.set_title("traction on the wheel")
+    axis.legend(marks, labels, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+    axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 
 def _arrows(f: Fields, spacing: float) -> Array:
@@ -96,7 +111,7 @@ def _arrows(f: Fields, spacing: float) -> Array:
 
 
 LABELS = {"xi_x": "longitudinal creepage [%]", "xi_y": "lateral creepage [%]", "spin": "spin [1/m]"}
-COLOURS = {"fx": "#0072b2", "fy": "#d55e00", "mz": "#009e73"}
+COLOURS = {"fx": BLUE, "fy": VERMILION, "mz": GREEN}
 
 
 def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title: str, path: Path) -> None:
@@ -104,15 +119,15 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
 
     forces : those of the scene, and their errors; checks : exact ones by the number of the motion.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.2))
     values, body = (1.0 if sweep.of == "spin" else 100.0) * sweep.values(), forces.detail.contact
     limit = 1e-3 * body.friction * body.pressing.load
     stated, none = "error_of_cells" in forces.data, 0.0 * values
     error = 1e-3 * (forces["error_of_cells"] + forces["error_of_theory"]) if stated else none
     turned = forces["moment_error_of_cells"] + forces["moment_error_of_theory"] if stated else none
     for axis, name, label, scale, off, most in (
-        (left, "fx", "$F_x$", 1e-3, error, limit),
-        (left, "fy", "$F_y$", 1e-3, error, limit),
+        (left, "fx", "Fx", 1e-3, error, limit),
+        (left, "fy", "Fy", 1e-3, error, limit),
         (right, "mz", None, 1.0, turned, np.inf),
     ):
         colour, force = COLOURS[name], scale * forces[name]
@@ -122,30 +137,30 @@ def sweep_figure(sweep: Sweep, forces: Result, checks: dict[int, Rolled], title:
         exact = [scale * getattr(check, name) for check in checks.values()]
         axis.plot(values[list(checks)], exact, "o", color=colour, markerfacecolor="white", markersize=5)
     for sign in (-1, 1):
-        left.axhline(sign * limit, color="black", linewidth=0.7, linestyle=":")
-    left.set(title=r"tangential force on the wheel; dotted: $\pm\mu N$", ylabel="force [kN]")
-    right.set(title="moment on the wheel about the normal", ylabel="$M_z$ [N m]")
+        left.axhline(sign * limit, color=DARK, linewidth=0.7, linestyle=":")
+    left.set(title="Force on the wheel; dotted: ±μN", ylabel="tangential force [kN]")
+    right.set(title="Moment on the wheel about the normal", ylabel="Mz [N m]")
     for axis in (left, right):
         axis.set_xlabel(LABELS[sweep.of])
         axis.set_xscale("log" if sweep.spacing == "logarithmic" and sweep.start > 0 else "linear")
     if stated:
-        left.fill_between([], [], color="#888888", alpha=0.3, linewidth=0, label="error of cells and theory")
+        left.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="error of cells and theory")
     if checks:
-        left.plot([], [], "o", color="#444444", markerfacecolor="white", markersize=5, label="exact theory")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        left.plot([], [], "o", color=DARK, markerfacecolor="white", markersize=5, label="exact theory")
+    legend_below(figure, left)
     heading(figure, title, {"forces": forces})
     save(figure, path)
 
 
 STYLES = {
-    "linear theory": ("#888888", "x"),
-    "FASTSIM 1982": ("#d55e00", "s"),
-    "FASTSIM, plain march": ("#e69f00", "v"),
-    "FASTSIM": ("#0072b2", "o"),
-    "FASTSIM, three flexibilities": ("#56b4e9", "^"),
-    "FASTSIM, parabolic": ("#009e73", "D"),
-    "theory of 1983": ("#cc79a7", "P"),
-    "exact theory": ("#222222", "*"),
+    "linear theory": (GREY, "x"),
+    "FASTSIM 1982": (VERMILION, "s"),
+    "FASTSIM, plain march": (ORANGE, "v"),
+    "FASTSIM": (BLUE, "o"),
+    "FASTSIM, three flexibilities": (SKY, "^"),
+    "FASTSIM, parabolic": (GREEN, "D"),
+    "theory of 1983": (PINK, "P"),
+    "exact theory": (DARK, "*"),
 }
 
 
@@ -154,25 +169,42 @@ TOP = 60.0
 
 
 def price_figure(price: Result, title: str) -> Figure:
-    """Error of every theory over its time and over its cells, both logarithmic; thin lines: 95 of 100 contacts."""
-    figure, axes = plt.subplots(1, 2, figsize=(11.5, 5.2), sharey=True)
+    """Error of every theory over its cells and over its time, all logarithmic; bars reach to 95 of 100 contacts.
+
+    FASTSIM's choices, which lie within one decade of time, have a panel apart from the theories beside it.
+    """
+    widths = (1.3, 1.0, 1.0)
+    figure, axes = plt.subplots(1, 3, figsize=(WIDE, 4.6), sharey=True, width_ratios=widths)
     points: list[Point] = price.detail
-    for name, (colour, marker) in STYLES.items():
+    for name in STYLES:
         line = [point for point in points if point.name == name]
-        error, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))
-        label = name if error[0] < TOP else f"{name}: {error[0]:.0f} %"
-        for axis, along in zip(axes, ([p.seconds for p in line], [p.cells**2 for p in line]), strict=True):
-            axis.plot(along, error, color=colour, marker=marker, linewidth=1.4, markersize=5.5, label=label)
-            axis.plot(along, most, color=colour, marker=marker, linewidth=0.6, markersize=3, alpha=0.6)
-    for axis, label in zip(axes, ("time of one evaluation from Python [s]", "cells in the contact area"), strict=True):
-        axis.set(xscale="log", yscale="log", xlabel=label)
+        if line:
+            _priced(axes[0], name, line, [point.cells**2 for point in line], bar=True)
+            micros = [1e6 * point.seconds for point in line]
+            _priced(axes[1 if name.startswith("FASTSIM") else 2], name, line, micros)
+    for axis, above, label in zip(
+        axes,
+        ("By cells; bar: to 95 of 100 contacts", "FASTSIM by time", "Other theories by time"),
+        ("cells in the contact area [-]", "time of an evaluation [µs]", "time of an evaluation [µs]"),
+        strict=True,
+    ):
+        axis.set(xscale="log", yscale="log", xlabel=label, title=above)
         for target in TARGETS:
-            axis.axhline(100 * target, color="black", linewidth=0.5, linestyle=":")
+            axis.axhline(100 * target, color=DARK, linewidth=0.6, linestyle=":")
     axes[0].set_yticks([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"])
-    axes[0].minorticks_off()
-    axes[0].set(ylim=(0.1, TOP), ylabel=r"error of the tangential force [% of $\mu N$]")
-    axes[0].set_title("thick: mean of all contacts; thin: 95 of 100 are better")
-    axes[1].set(title="dotted: 5, 2, 1 and 0.5 %", xlim=(30.0, None))
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    axes[0].yaxis.set_minor_locator(NullLocator())
+    axes[0].set(ylim=(0.1, TOP), xlim=(30.0, None), ylabel="mean error of the tangential force [% of μN]")
+    legend_below(figure, axes[0])
     heading(figure, title, {"price": price})
     return figure
+
+
+def _priced(axis: Any, name: str, line: list[Point], along: list[float], bar: bool = False) -> None:
+    """Mean error (%) of one theory, with a bar up to what 95 of 100 contacts keep to at its most cells."""
+    colour, marker = STYLES[name]
+    mean, most = (100 * np.array([getattr(point, key) for point in line]) for key in ("mean", "most"))
+    label = name if mean[0] < TOP else f"{name}: {mean[0]:.0f} %"
+    axis.plot(along, mean, color=colour, marker=marker, linewidth=1.3, markersize=4.5, label=label)
+    if bar:
+        axis.plot([along[-1]] * 2, [mean[-1], most[-1]], color=colour, linewidth=0.8)
+        axis.plot(along[-1], most[-1], "_", color=colour, markersize=5)

@@ -205,21 +205,21 @@ def _figure(
 ) -> None:
     """Percentiles of the pitch error over time, and a histogram of the drift-off times."""
     from models.drawing.drift import draw_fan
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import BLUE, DARK, WIDE, heading, plt, save
 
-    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(10, 3.8), width_ratios=(3, 2))
+    figure, (fan, histogram) = plt.subplots(1, 2, figsize=(WIDE, 3.8), width_ratios=(3, 2))
     draw_fan(fan, times[1:], percentiles(errors[:, 1:]))
     fan.axhline(
-        options.threshold, color="black", linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
+        options.threshold, color=DARK, linestyle="--", linewidth=0.8, label=f"drift-off, {options.threshold:g} rad"
     )
     fan.legend(loc="lower right")
     drifted = drift_off[np.isfinite(drift_off)]
-    histogram.hist(drifted, bins=40, color="C0", alpha=0.6)
+    histogram.hist(drifted, bins=40, color=BLUE, alpha=0.6)
     for level, style in zip(QUANTILES, (":", "-", ":"), strict=True):
         value = quantile(drift_off, level)[0]
         if np.isfinite(value):
-            histogram.axvline(value, color="black", linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
-    histogram.set_title(f"drift-off time, paths ({len(drift_off) - len(drifted)} never drift off)")
+            histogram.axvline(value, color=DARK, linestyle=style, label=f"{100 * level:g} %: {value:.1f} s")
+    histogram.set_title(f"Drift-offs: paths [-] ({len(drift_off) - len(drifted)} never)")
     if len(drifted):
         histogram.legend()
     plt.setp((fan, histogram), xlabel="time [s]")

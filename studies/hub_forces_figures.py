@@ -4,10 +4,24 @@ from pathlib import Path
 
 import numpy as np
 
-from models.drawing.figures import heading, plt, save
+from models.drawing.figures import (
+    BLUE,
+    DARK,
+    GREEN,
+    TRUTH,
+    VERMILION,
+    WIDE,
+    about_one,
+    heading,
+    legend_below,
+    plt,
+    save,
+)
 from models.systems.hub_forces.comparison import Comparison
 
-COLOURS = {"free": "#d55e00", "filter": "#0072b2", "prescribed": "#009e73"}
+COLOURS = {"free": VERMILION, "filter": BLUE, "prescribed": GREEN}
+TICKS = (1e-3, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 1e3, 1e6)
+"""Marked ratios of damage, as far as there are such."""
 LABELS = {"filter": "Kalman filter of roll and pitch", "prescribed": "roll and pitch prescribed"}
 
 
@@ -20,7 +34,7 @@ def _shown(comparison: Comparison) -> list[tuple[str, str, str]]:
 
 def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
     """Roll, pitch, heading and position of every run, beside the true ones where these are known."""
-    figure, axes = plt.subplots(2, 3, figsize=(11, 5.6), sharex=True)
+    figure, axes = plt.subplots(2, 3, figsize=(WIDE, 5.0), sharex=True)
     panels = [(name, name, 1e3, "mrad") for name in ("roll", "pitch", "heading")]
     panels += [("x, beside steady travel", "x", 1, "m"), ("y, to the left", "y", 1, "m"), ("z, up", "z", 1, "m")]
     for axis, (name, channel, factor, unit) in zip(axes.flat, panels, strict=True):
@@ -28,11 +42,11 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
             drawn = comparison.runs[run]
             axis.plot(drawn.times, factor * drawn[channel], color=colour, label=label)
         if true := comparison.truth:
-            axis.plot(true.times, factor * true[channel], "--", color="0.2", label="true", linewidth=0.9)
+            axis.plot(true.times, factor * true[channel], "--", color=TRUTH, label="true", linewidth=0.9)
         axis.set(title=name.capitalize(), ylabel=f"[{unit}]")
     for axis in axes[1]:
         axis.set_xlabel("time [s]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
+    legend_below(figure, axes[0, 0])
     frame = comparison.measurement.forces.frame
     heading(figure, f"{title}\nThe chassis on forces in the frame '{frame}'", comparison.results)
     save(figure, path)
@@ -40,19 +54,20 @@ def drift_figure(comparison: Comparison, title: str, path: Path) -> None:
 
 def damage_figure(comparison: Comparison, title: str, path: Path) -> None:
     """Damage of every section force, divided by the true one's, or without a truth by that of the filter's run."""
-    figure, axis = plt.subplots(figsize=(11, 4.6))
+    figure, axis = plt.subplots(figsize=(WIDE, 4.6))
     shown, values = _shown(comparison), list[float]()
     for k, (run, label, colour) in enumerate(shown):
         ratios = comparison.damages(comparison.runs[run]["section_force"])
         places = np.arange(len(ratios)) + (k - (len(shown) - 1) / 2) * 0.26
-        axis.plot(places, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=5)
+        axis.plot(places, [*ratios.values()], "os^"[k % 3], color=colour, label=label, markersize=4)
         values += ratios.values()
-    axis.axhline(1.0, color="0.3", linewidth=0.8)
-    axis.set_xticks(range(len(ratios)), [*ratios], rotation=60, ha="right", fontsize=8)
-    if max(values) > 3 * min(values):
-        axis.set_yscale("log")
-    axis.set_ylabel("damage / true damage [1]" if comparison.truth else "damage / that with the filter [1]")
-    axis.legend(fontsize=8)
+    axis.axhline(1.0, color=DARK, linewidth=0.8)
+    axis.set_xticks(range(len(ratios)), [*ratios], rotation=90)
+    low, high = 0.8 * min(0.9, *values), 1.25 * max(1.1, *values)
+    about_one(axis, "y", [tick for tick in TICKS if low <= tick <= high])
+    axis.set_ylim(low, high)
+    axis.set_ylabel("damage / true damage [-]" if comparison.truth else "damage / that with the filter [-]")
+    legend_below(figure, axis)
     frame = comparison.measurement.forces.frame
     text = f"{title}\nSection forces in the chassis' axes, slope 5: forces in the frame '{frame}'"
     heading(figure, text, comparison.results)

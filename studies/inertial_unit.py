@@ -210,9 +210,9 @@ def _percent(part: float) -> str:
 
 def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Results) -> Any:
     """Angle error and damage error over the length of the drive, a line per grade."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import DARK, WIDE, heading, legend_below, plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4))
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
         own = [row for row in rows if row["grade"] == grade]
@@ -221,23 +221,24 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
         axes[0].loglog(minutes, [row["angle measured"] for row in own], "o", color=f"C{i}", markersize=4)
         error = [100 * next(iter(row["damage error"].values()))[1] for row in own]
         axes[1].loglog(minutes, error, "o-", color=f"C{i}", markersize=4, label=f"{grade:g} deg/h")
-    axes[1].axhline(100 * options.allowed_damage_error, color="black", linestyle=":", label="allowed")
-    axes[0].set(title="angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")
-    axes[1].set(title=f"damage error that {SURE:.0%} of all units keep [%]", xlabel="length of the drive [min]")
-    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(options.grades) + 1)
+    axes[1].axhline(100 * options.allowed_damage_error, color=DARK, linestyle=":", label="allowed")
+    axes[0].set(title="Angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")
+    axes[1].set(title=f"Damage error that {SURE:.0%} of all units keep [%]", xlabel="length of the drive [min]")
+    legend_below(figure, axes[1], columns=len(options.grades) + 1)
     heading(figure, "What the grade of a gyro does to angle and damage", results)
     return figure
 
 
 def _figure_curve(curve: CubicSpline) -> Any:
     """Damage over a constant angle error."""
+    from models.drawing.drift import NAMES
     from models.drawing.figures import heading, plt
 
     figure, axis = plt.subplots(figsize=(7, 3.8))
     angles = np.linspace(curve.x[0], curve.x[-1], 401)
     for i, name in enumerate(CHANNELS):
-        axis.semilogy(np.degrees(angles), np.exp(curve(angles)[:, i]), label=name)
-    axis.set(title="damage by true damage", xlabel="constant error of the pitch [deg]")
+        axis.semilogy(np.degrees(angles), np.exp(curve(angles)[:, i]), label=NAMES[name])
+    axis.set(ylabel="damage / true damage [-]", xlabel="constant error of the pitch [deg]")
     axis.legend(ncols=2)
     heading(figure, "What a wrong pitch does to the damage of the section forces")
     return figure

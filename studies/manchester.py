@@ -20,9 +20,8 @@ SYSTEM = "wheel-rail"
 Progress = Callable[[str, float], None]
 FLANGE = 0.8
 """Contact angle (rad) from which on a patch is called one of the flange."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222")
 PANELS = {
-    "on_rail": "on the rail, from its top [mm]",
+    "on_rail": "on the rail,\nfrom its top [mm]",
     "on_wheel": "on the wheel [mm]",
     "angle": "contact angle [deg]",
     "normal": "normal force [kN]",
@@ -95,9 +94,9 @@ def _save(name: str, found: Result, folder: Path) -> None:
 
 def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> None:
     """A column for each wheel; the bars in the first row are the patches' widths."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import TURNS, WIDE, heading, legend_below, plt, save
 
-    drawn, axes = plt.subplots(len(PANELS), 2, figsize=(10.5, 12.5), sharex=True, sharey="row")
+    drawn, axes = plt.subplots(len(PANELS), 2, figsize=(WIDE, 9.6), sharex=True, sharey="row")
     for column, wheel in enumerate(WHEELS[::-1]):
         for axis, (quantity, label) in zip(axes[:, column], PANELS.items(), strict=True):
             for k, (name, found) in enumerate(results.items()):
@@ -111,17 +110,17 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
                     yerr=half.values.ravel() if quantity == "on_rail" else None,
                     fmt="os"[k % 2],
                     markersize=4,
-                    color=COLOURS[k % len(COLOURS)],
+                    color=TURNS[k % len(TURNS)],
                     linewidth=1.6,
-                    markerfacecolor=COLOURS[0] if k == 0 else "white",
+                    markerfacecolor=TURNS[0] if k == 0 else "white",
                     label=f"{name}: {case_text(case.yaw, case.friction)}",
                 )
             if column == 0:
                 axis.set_ylabel(label)
-        axes[0, column].set_title(f"{wheel} wheel")
+        axes[0, column].set_title(f"{wheel.capitalize()} wheel")
         axes[-1, column].set_xlabel("displacement of the wheelset to the right [mm]")
-    drawn.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    title = f"{scene.title}\nevery patch: bars in the first row are its width"
+    legend_below(drawn, axes[0, 0], columns=2)
+    title = f"{scene.title}\nEvery patch; bars in the first row are its width"
     heading(drawn, title, results)
     save(drawn, path)
 

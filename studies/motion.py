@@ -284,30 +284,51 @@ def _closing(options: Options) -> list[str]:
 
 
 def _figure(source: Source, results: Results, path: Path) -> None:
-    """Pitch, heave, error of the pitch or its rate, and the misfit of the readings, of one source."""
-    from models.drawing.figures import heading, plt, save
+    """Pitch and heave of one source, what each way errs by where the truth is known, and the misfit of the readings."""
+    from models.drawing.figures import GREY, WIDE, heading, legend_below, plt, save
 
-    times = source.period * np.arange(len(source.readings))
-    figure, axes = plt.subplots(2, 2, figsize=(11, 6.4), sharex=True)
-    panels = ((axes[0, 0], "pitch", "pitch, nose up [rad]"), (axes[0, 1], "heave", "heave, down [m]"))
-    for axis, name, label in panels:
-        if source.truth:
-            axis.plot(times, source.truth[name], color="black", linewidth=1.8, label="truth")
-        axis.set_title(label)
-    for i, (way, found) in enumerate(source.ways.items()):
-        values = _values(found)
-        for axis, name, _ in panels:
-            axis.plot(times, values[name], color=f"C{i}", linewidth=0.9, label=way)
-        lower = 1e3 * (values["pitch"] - source.truth["pitch"]) if source.truth else values["rate"]
-        axes[1, 0].plot(times, lower, color=f"C{i}", linewidth=0.9)
-    axes[1, 0].set_title("error of the pitch [mrad]" if source.truth else "pitch rate [rad/s]")
     assert source.quality is not None
-    axes[1, 1].plot(times, source.quality.misfit, color="C7", linewidth=0.4)
-    axes[1, 1].set_title(f"readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s^2]")
-    plt.setp(axes[1], xlabel="time [s]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8.5)
-    heading(figure, f"Pitch and heave from accelerometers, {source.name}", results)
+    times = source.period * np.arange(len(source.readings))
+    rows: list[Any] = [
+        ["pitch", "heave"],
+        *([["pitch error", "heave error"]] if source.truth else []),
+        ["misfit", "misfit"],
+    ]
+    figure, axes = plt.subplot_mosaic(rows, figsize=(WIDE, 2.0 * len(rows) + 0.8), sharex=True)
+    ways = {way: _values(found) for way, found in source.ways.items()}
+    for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
+        _motions(axes[name], times, {way: scale * found[name] for way, found in ways.items()}, label, source, name)
+        if source.truth:
+            errors = {way: scale * np.abs(found[name] - source.truth[name]) for way, found in ways.items()}
+            _errors(
+                axes[f"{name} error"], times, errors, f"Largest error of the {name} so far {label[label.index('[') :]}"
+            )
+    axes["misfit"].plot(times, source.quality.misfit, color=GREY, linewidth=0.4)
+    axes["misfit"].set_title(f"Readings that no rigid motion explains, {100 * source.quality.share:.2g} % [m/s²]")
+    axes["misfit"].set_xlabel("time [s]")
+    legend_below(figure, axes["pitch error" if source.truth else "pitch"], columns=3)
+    heading(figure, f"Pitch and heave from accelerometers, {source.name}: what each way errs by", results)
     save(figure, path)
+
+
+def _motions(axis: Any, times: np.ndarray, ways: dict[str, np.ndarray], title: str, source: Source, name: str) -> None:
+    """The truth, on which good ways would only lie; every way where it is not known."""
+    from models.drawing.figures import TRUTH
+
+    if source.truth:
+        axis.plot(times, (1e3 if name == "pitch" else 1.0) * source.truth[name], color=TRUTH)
+        axis.set_title(f"True {title[0].lower()}{title[1:]}")
+        return
+    for way, values in ways.items():
+        axis.plot(times, values, linewidth=0.9, label=way)
+    axis.set_title(title)
+
+
+def _errors(axis: Any, times: np.ndarray, errors: dict[str, np.ndarray], title: str) -> None:
+    """The largest error of each way up to every time, on a logarithmic scale: curves that can be told apart."""
+    for way, error in errors.items():
+        axis.semilogy(times[1:], np.maximum.accumulate(error)[1:], label=way)
+    axis.set_title(title)
 
 
 if __name__ == "__main__":

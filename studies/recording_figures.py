@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.finding import Finding
-from models.drawing.figures import plt, save
+from models.drawing.figures import BLUE, MEASURED, PALE, TRUTH, TURNS, VERMILION, WIDE, YELLOW, heading, plt, save
 from models.fatigue.counting import Counted
 from models.measured.checks.agreement import Fault, Group
 from models.measured.checks.evidence import Evidence
@@ -27,16 +27,16 @@ TITLE = 60
 """Letters of a place in a title."""
 POINTS = 1200
 """Columns of a curve: of each the least and the greatest value are drawn, so that no peak is lost."""
-LOUD, QUIET, MARK, PALE = "#d55e00", "#222222", "#f0e442", "#b5b5b5"
+LOUD, QUIET, MARK = VERMILION, TRUTH, YELLOW
 RUNS = {
-    "measured": ("measured", PALE),
-    "truth": ("truth", QUIET),
+    "measured": ("measured", MEASURED),
+    "truth": ("truth", TRUTH),
     FREE: ("free run", LOUD),
-    "kalman": ("held by the Kalman filter", "#0072b2"),
-    "prescribed": ("held to the measured angles", "#0072b2"),
+    "kalman": ("held by the Kalman filter", BLUE),
+    "prescribed": ("held to the measured angles", BLUE),
 }
 """Label and colour of each run, and of what it is drawn beside."""
-WHEELS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+WHEELS = TURNS[:6]
 KINDS = {"late": ("shift",), "factor": ("sign", "unit", "gain"), "swapped": ("swapped",)}
 """Checks that tell a kind of fault."""
 
@@ -62,7 +62,7 @@ def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str =
     if legend is not None:
         columns = 3 if "lower" in place else 2
         drawn.legend(*legend.get_legend_handles_labels(), loc=place, ncols=columns)
-    drawn.suptitle(title, x=0.01, ha="left", fontweight="bold")
+    heading(drawn, title)
     return save(drawn, path)
 
 
@@ -74,7 +74,7 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
     first, last = round(begin / own.period), round(end / own.period) + 1
     every = max((last - first) // MOST, 1)
     times = own.period * np.arange(first, last)[::every]
-    drawn, axes = plt.subplots(len(shown), 1, figsize=(8, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
+    drawn, axes = plt.subplots(len(shown), 1, figsize=(WIDE, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
     for axis, signal in zip(axes[:, 0], shown, strict=True):
         values = own.columns.read(signal.name, first, last - first)[::every]
         axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
@@ -95,9 +95,9 @@ def _means(evidence: Evidence, path: Path) -> Path:
     assert evidence.vehicle is not None
     hubs, loads, vertical = evidence.vehicle.hubs, evidence.vehicle.loads, evidence.vertical()
     means = np.array([evidence.mean(vertical[hub]) for hub in hubs])
-    drawn, axis = plt.subplots(figsize=(8, 3.2))
+    drawn, axis = plt.subplots(figsize=(WIDE, 3.4))
     at = np.arange(len(hubs))
-    axis.bar(at - 0.2, loads, 0.38, color="#bbbbbb", label="static load by the vehicle file")
+    axis.bar(at - 0.2, loads, 0.38, color=PALE, label="static load by the vehicle file")
     bars = axis.bar(at + 0.2, means, 0.38, color=LOUD, label="mean of the recording")
     axis.bar_label(bars, [f"{part:+.2%}" if abs(part) < 0.5 else f"x {part + 1:.3g}" for part in means / loads - 1])
     axis.set_xticks(at, [f"{hub}\n{vertical[hub].name}" for hub in hubs])
@@ -122,14 +122,14 @@ def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     told = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
     expected = factor * np.exp(-2j * np.pi * f * late)
     turned = -360 * f * late + (180.0 if factor < 0 else 0.0)
-    drawn, axes = plt.subplots(2, 1, figsize=(8, 4.4), sharex=True)
+    drawn, axes = plt.subplots(2, 1, figsize=(WIDE, 4.6), sharex=True)
     for axis, measured, said, level in (
         (axes[0], np.abs(ratio), np.abs(expected), 1.0),
         (axes[1], np.degrees(np.angle(ratio / expected)) + turned, turned, 0.0),
     ):
         axis.scatter(f, measured, s=4 + 40 * sure, color=QUIET, label="measured; larger: surer")
         axis.plot(f, said, color=LOUD, label=told)
-        axis.axhline(level, color="#999999", ls=":", label="as it should be")
+        axis.axhline(level, color=PALE, ls=":", label="as it should be")
     axes[0].set_ylabel("size [-]")
     axes[1].set_ylabel("phase [deg]")
     axes[0].set_ylim(0.0, 2 * max(abs(factor), 1.0))
@@ -143,7 +143,7 @@ def _exchange(evidence: Evidence, fault: Fault, path: Path) -> Path:
     own = evidence.agreement
     assert own is not None
     names = [s.name for s in own.outputs]
-    drawn, axis = plt.subplots(figsize=(8, 1.4 + 0.24 * len(names)))
+    drawn, axis = plt.subplots(figsize=(WIDE, 1.4 + 0.24 * len(names)))
     at = np.arange(len(names))
     axis.barh(at - 0.2, 100 * own.unexplained, 0.38, color=LOUD, label="as mapped")
     axis.barh(at + 0.2, 100 * own.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
@@ -158,7 +158,7 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
     from scipy.signal import welch
 
     own = evidence.recording
-    drawn, axis = plt.subplots(figsize=(8, 3.2))
+    drawn, axis = plt.subplots(figsize=(WIDE, 3.4))
     for signal in signals[:SHOWN]:
         values = own.samples(signal)
         f, density = welch(np.where(np.isfinite(values), values, np.nanmean(values)), 1 / own.period, nperseg=2048)
@@ -187,7 +187,7 @@ def thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
     """A figure of rows over time."""
-    drawn, panels = plt.subplots(rows, figsize=(9.5, height), squeeze=False, **more)
+    drawn, panels = plt.subplots(rows, figsize=(WIDE, height), squeeze=False, **more)
     for panel in panels[-1]:
         panel.set_xlabel("time [s]")
     return drawn, panels
@@ -202,7 +202,7 @@ def inputs_figure(exam: Examination, path: Path) -> Path:
         for i, hub in enumerate(exam.rig.hubs):
             for signal in (s for s in own.find("force", hub, axis) if not s.check):
                 panel.plot(*thinned(times, own.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7)
-        panel.set_title(f"force on the hub along {axis} [kN]")
+        panel.set_title(f"Force on the hub along {axis} [kN]")
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(exam.rig.hubs))
     return save(drawn, path)
 
@@ -254,13 +254,13 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
         left.set_title(f"{answer.name} [{unit}]")
         near = np.abs(times - times[int(np.argmax(np.abs(values - values.mean())))]) <= 1.0
         right.plot(times[near], scale * values[near], color=colour)
-        right.set_title("two seconds about its peak", color="#555555")
+        right.set_title(f"Two seconds about its peak [{unit}]", fontsize=8)
     return save(drawn, path)
 
 
 def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     """Level crossings and range pairs of some loads."""
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.6))
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     for colour, (answer, own) in zip(WHEELS, counted.items(), strict=False):
         left.plot(np.maximum(own.crossings, 0.5), 1e-3 * own.levels, drawstyle="steps-mid", color=colour)
         right.plot(np.maximum(own.pairs, 0.25), 1e-3 * own.ranges, color=colour, label=answer.name)
@@ -270,7 +270,7 @@ def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     ):
         panel.set_title(title)
         panel.set_xscale("log")
-        panel.set_xlabel("number")
+        panel.set_xlabel("number [-]")
         panel.set_ylabel(f"{what} [kN, kN m]")
     drawn.legend(loc="outside upper right", ncols=3)
     return save(drawn, path)
@@ -289,6 +289,6 @@ def overlay_figure(exam: Examination, run: Outcome, compared: Sequence[Compared]
             left.plot(*thinned(times, values), color=colour, lw=width, label=label)
             right.plot(times[near], values[near], color=colour, lw=width)
         left.set_title(f"{each.signal.name} [{each.answer.unit}]")
-        right.set_title("about the largest error", color="#555555")
+        right.set_title(f"About the largest error [{each.answer.unit}]", fontsize=8)
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return save(drawn, path)

@@ -179,20 +179,20 @@ def choice_figure(
     path: Path,
 ) -> None:
     """Changes by effect, left out alone and all together, against the tolerance; energy activity by element beside."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import DARK, WIDE, heading, plt, save
 
     names = [each.effect.name + ("  [left out]" if each.effect in choice.left_out else "") for each in alone]
-    height = 1.6 + 0.3 * max(len(names) + 1, ELEMENTS)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, height), width_ratios=(1.6, 1))
+    heights = 1.6 + 0.26 * (len(names) + 1), 0.7 + 0.2 * ELEMENTS
+    figure, (above, below) = plt.subplots(2, 1, figsize=(WIDE, sum(heights) + 0.4), height_ratios=heights)
     y = np.arange(len(names) + 1)[::-1]
     for i, name in enumerate(scene.quantities):
         shift = 0.16 * (i - (len(scene.quantities) - 1) / 2)
         for part, marker, size in (("confirmed", "o", 5), ("predicted", "x", 6)):
             changes = 100 * abs(np.array([getattr(row, part)[i] for row in (*alone, choice)]))
             shown = np.clip(np.nan_to_num(changes, posinf=HIGHEST), LOWEST, HIGHEST)
-            left.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
-    left.axvline(100 * (scene.tolerance or 0), color="#222222", ls="--", label="tolerance")
-    left.set(
+            above.plot(shown, y + shift, marker, color=f"C{i}", label=f"{name}, {part}", ms=size)
+    above.axvline(100 * (scene.tolerance or 0), color=DARK, ls="--", label="tolerance")
+    above.set(
         xscale="log",
         xlim=(LOWEST / 1.5, HIGHEST * 1.5),
         yticks=y,
@@ -200,18 +200,20 @@ def choice_figure(
         xlabel="change of the standard deviation [%], worst speed (at the ends: beyond)",
         title="What leaving out an effect changes",
     )
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)
-    _activity(right, watts)
+    above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    _activity(below, watts)
     heading(figure, scene.title, results)
     save(figure, path)
 
 
 def _activity(axis: Any, watts: dict[str, float]) -> None:
     """Shares of the finite ones; an inertia under white noise has none."""
+    from models.drawing.figures import BLUE
+
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
-    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color="#0072b2", alpha=0.7)
+    axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     without = [name for name in watts if name not in finite]
     note = f"\n{len(without)} inertias are unbounded under white noise" if without else ""
     axis.set(title="Energy activity: blind to the question", xlabel=f"share of the mean power [%]{note}")

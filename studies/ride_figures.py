@@ -7,8 +7,23 @@ from typing import NamedTuple
 import numpy as np
 
 from models.core.told import Results
+from models.drawing.figures import (
+    BLUE,
+    DARK,
+    GREY,
+    LABELS,
+    PINK,
+    SKY,
+    SMALL,
+    VERMILION,
+    WIDE,
+    heading,
+    legend_below,
+    panels,
+    plt,
+    save,
+)
 from models.drawing.figures import COLOURS as ENGINES
-from models.drawing.figures import LABELS, heading, plt, save
 from models.ride.frequency import one_sided
 from models.ride.statistical_linearisation import GRADES
 from models.ride.sweep import Sweep
@@ -21,7 +36,7 @@ from models.systems.ride.nonlinear import Nonlinear, Ride
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle
 
-COLOURS = ("#222222", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7")
+COLOURS = (DARK, BLUE, SKY, VERMILION, PINK)
 """One colour per correlation: the scene's own, then two of the axles and two of the tracks."""
 STYLES = ("-", "--", ":", "--", ":")
 
@@ -37,7 +52,7 @@ def along_figure(
     places: Sequence[float], at: Sweep, over: Sweep, vehicle: SpatialVehicle, speed: float, above: Heading, path: Path
 ) -> None:
     """Vertical acceleration of the body, along it at one speed and at its middle output over speed, by correlation."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
     name = _middle(vehicle)
     for i, case in enumerate(at.cases):
         left.plot(places, at.deviation[i, 0], STYLES[i], color=COLOURS[i], label=case)
@@ -45,11 +60,11 @@ def along_figure(
             right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
-    left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body at {speed:g} m/s")
+    left.set(xlabel="x forward [m]  (grey: axles)", title=f"Along the body at {speed:g} m/s")
     right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
     for axis in (left, right):
-        axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
-    left.legend(title="the axles' and tracks' roads")
+        axis.set(ylabel="deviation of vertical acceleration [m/s²]", ylim=(0, None))
+    legend_below(figure, left, columns=2)
     _save(figure, above, ": which correlations of the road matter where", path)
 
 
@@ -69,11 +84,11 @@ def outputs_figure(
     found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], above: Heading, path: Path
 ) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
-    panels = list(dict.fromkeys(kinds))
-    figure, axes = _panels(len(panels), 2, (6.0, 3.6))
-    for axis, (kind, si) in zip(axes, panels, strict=True):
+    groups = list(dict.fromkeys(kinds))
+    figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
+    for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
-        unit = "share of the static load" if kind == "tyre force" else unit
+        unit = "-, of the static load" if kind == "tyre force" else unit
         names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
         curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
@@ -81,7 +96,7 @@ def outputs_figure(
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
-        _name_beside(axis)
+        _name_below(axis)
     _save(figure, above, ": standard deviations over speed", path)
 
 
@@ -116,7 +131,7 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
     shown = [kind for kind in ("acceleration", "tyre force") if kind in moved]
     if not shown:
         return
-    figure, axes = plt.subplots(1, len(shown), figsize=(6.2 * len(shown), 4.2), squeeze=False)
+    figure, axes = plt.subplots(1, len(shown), figsize=(WIDE, 4.2), squeeze=False)
     units = {"acceleration": "(m/s²)²/Hz", "tyre force": "N²/Hz"}
     for axis, kind in zip(axes[0], shown, strict=True):
         curves = {output.name: densities[:, i] for i, output in enumerate(linear.outputs) if output.kind == kind}
@@ -125,27 +140,27 @@ def spectra_figure(linear: LinearVehicle, excitation: Excitation, speed: float, 
         axis.set(xlabel="frequency [Hz]", ylabel=f"one-sided density [{units[kind]}]", title=kind.capitalize())
         top = max(values.max() for values in curves.values())
         axis.set_ylim(1e-6 * top, 2 * top)
-        _name_beside(axis)
+        _name_below(axis)
     _save(figure, above, f": spectra at {speed:g} m/s", path)
 
 
 def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: Heading, path: Path) -> None:
     """Spectrum of the left track and coherency of both, measured and fitted; the isotropic road beside them."""
     wavenumber = np.geomspace(0.02, 100.0, 300)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
     if fitted is not None:
         own = fitted.spectra
-        left.loglog(own.wavenumber, own.left, color="0.6", linewidth=0.8, label="measured")
-        right.semilogx(own.wavenumber, own.coherency, color="0.6", linewidth=0.8, label="measured")
-        right.axhline(own.chance_coherency(), color="0.6", linestyle=":", label="what chance alone shows (95 %)")
+        left.loglog(own.wavenumber, own.left, color=GREY, linewidth=0.8, label="measured")
+        right.semilogx(own.wavenumber, own.coherency, color=GREY, linewidth=0.8, label="measured")
+        right.axhline(own.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
     left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
     right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
     if road.mean.cutoff is None:
         alike = isotropic_like(road, y)
         right.semilogx(wavenumber, alike.coherency(wavenumber, 2 * y), "k--", label="isotropic, same track spectrum")
     left.set(xlabel="wavenumber [rad/m]", ylabel="two-sided density [m³]", title="Spectrum of the left track")
-    right.set(xlabel="wavenumber [rad/m]", ylabel="coherency", ylim=(0, 1.05), title="Left and right track")
-    left.legend(), right.legend(fontsize=8)
+    right.set(xlabel="wavenumber [rad/m]", ylabel="coherency [-]", ylim=(0, 1.05), title="Left and right track")
+    legend_below(figure, left, right, columns=3)
     _save(figure, above, ": the road", path)
 
 
@@ -159,13 +174,15 @@ def detail_figure(
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
     heads = [f"{model}\n{1e3 * cost[model]:.2g} ms\n" + road.replace(", ", ",\n") for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
-    figure, axis = plt.subplots(figsize=(1.35 * len(heads) + 2.4, 0.36 * len(names) + 1.8))
+    figure, axis = plt.subplots(figsize=(WIDE, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
     for i, j in np.ndindex(values.shape):
         if np.isfinite(values[i, j]):
             dark = abs(values[i, j]) > 40
-            axis.text(j, i, f"{values[i, j]:+.0f}", ha="center", va="center", fontsize=8, color="w" if dark else "k")
-    axis.set_xticks(range(len(heads)), heads, fontsize=7.5)
+            axis.text(
+                j, i, f"{values[i, j]:+.0f}", ha="center", va="center", fontsize=SMALL, color="w" if dark else "k"
+            )
+    axis.set_xticks(range(len(heads)), heads, fontsize=SMALL)
     axis.set_yticks(range(len(names)), names)
     axis.grid(visible=False)
     figure.colorbar(picture, label="error [%]", extend="both")
@@ -185,7 +202,7 @@ def drive_figure(
     groups = list(dict.fromkeys(kinds[name] for name in shown))
     heights = [3.0] * len(groups) + [1.3]
     figure, axes = plt.subplots(
-        len(heights), 1, figsize=(9, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
+        len(heights), 1, figsize=(WIDE, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
         own = {name: found.names.index(name) for name in shown if kinds[name] == (kind, unit)}
@@ -198,7 +215,7 @@ def drive_figure(
             (line,) = axis.plot(found.time, exact, label=label)
             axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
-        _name_beside(axis)
+        _name_below(axis)
     axes[-1, 0].plot(found.time, found.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     _save(figure, above, "\nsolid: exact; dashed: each speed taken by itself", path)
@@ -215,7 +232,7 @@ def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
     left = answer.of("left_out")
     for i, (axis, output) in enumerate(zip(axes, outputs, strict=False)):
         unit, factor = _shown_unit(output.unit)
-        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color="0.6", label="slopes at rest (small motion)")
+        axis.plot(answer.speeds, factor * answer.small[:, i], "--", color=GREY, label="slopes at rest (small motion)")
         told = "statistical linearisation" + (", tyres on the road" if answer.lifts else "")
         deviation, poor = factor * answer.deviation[:, i], left[:, i] > GRADES[-1][0]
         axis.plot(answer.speeds, deviation, color=COLOURS[1], label=told)
@@ -228,7 +245,7 @@ def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
                 [factor * copies.deviation[i]],
                 [factor * spread],
                 fmt="s",
-                color="#d55e00",
+                color=VERMILION,
                 markersize=4,
                 capsize=3,
                 label="" if j else "Monte Carlo, 2 standard errors" + (", tyres lift" if answer.lifts else ""),
@@ -236,7 +253,7 @@ def nonlinear_figure(answer: Nonlinear, above: Heading, path: Path) -> None:
         axis.set(
             xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=output.name.capitalize()
         )
-    axes[0].legend(fontsize=7.5)
+    legend_below(figure, *axes, columns=2)
     _save(figure, above, "\nStandard deviations over speed", path)
 
 
@@ -258,27 +275,18 @@ def engine_spectra_figure(
         output, top = linear.outputs[i], expected[:, i].max()
         unit = f"one-sided density [({_written(output.unit)})²/Hz]"
         axis.set(xlabel="frequency [Hz]", ylabel=unit, title=output.name.capitalize(), ylim=(1e-5 * top, 5 * top))
-    axes[0].legend(fontsize=7.5)
+    legend_below(figure, axes[0], columns=3)
     _save(figure, above, f"\nSpectra at {speed:g} m/s", path)
-
-
-def _panels(count: int, wide: int, size: tuple[float, float]) -> tuple[plt.Figure, list[plt.Axes]]:
-    """A figure of this many panels, ``wide`` of them beside each other, of a size (inches) each."""
-    high = -(-count // wide)
-    figure, axes = plt.subplots(high, wide, figsize=(size[0] * wide, size[1] * high), squeeze=False)
-    for axis in axes.ravel()[count:]:
-        axis.remove()
-    return figure, list(axes.ravel()[:count])
 
 
 def _few(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
     """Two or three small panels beside each other."""
-    return _panels(count, 2 if count in (1, 2, 4) else 3, (4.6, 3.4))
+    return panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
 
 
-def _name_beside(axis: plt.Axes) -> None:
-    """The legend beside a panel."""
-    axis.legend(fontsize=7.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+def _name_below(axis: plt.Axes) -> None:
+    """The legend below a panel."""
+    axis.legend(fontsize=SMALL, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
 
 def _save(figure: plt.Figure, above: Heading, text: str, path: Path) -> None:

@@ -74,17 +74,17 @@ def same_times(one: Result, other: Result) -> bool:
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
-    from models.drawing.figures import COLOURS, LABELS, heading, plt, save
+    from models.drawing.figures import COLOURS, LABELS, WIDE, heading, legend_below, plt, save
 
     panels = [
-        ("z3", "heave of the chassis, down [m]", 1.0),
-        ("pitch", "pitch, nose up [rad]", 1.0),
-        ("f1", "front wheel force [kN]", 1e-3),
+        ("z3", "Heave of the chassis, down [m]", 1.0),
+        ("pitch", "Pitch, nose up [rad]", 1.0),
+        ("f1", "Front wheel force [kN]", 1e-3),
     ]
     if all("enforced_moment" in result.data for result in results.values()):
-        panels.append(("enforced_moment", "enforced moment [N m]", 1.0))
+        panels.append(("enforced_moment", "Enforced moment [N m]", 1.0))
     rows = len(panels) + (1 if len(results) > 1 else 0)
-    figure, axes = plt.subplots(rows, 1, figsize=(8.5, 1.9 * rows + 0.6), sharex=True)
+    figure, axes = plt.subplots(rows, 1, figsize=(WIDE, 1.7 * rows + 0.7), sharex=True)
     for axis, (channel, label, scale) in zip(axes, panels, strict=False):
         for i, (engine, result) in enumerate(results.items()):
             style = {"color": COLOURS[engine], "label": LABELS[engine], "linewidth": 2.4 - 0.8 * i, "alpha": 0.9}
@@ -93,7 +93,7 @@ def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:
     if len(results) > 1:
         _differences(axes[-1], results)
     axes[-1].set_xlabel("time [s]")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=len(results))
+    legend_below(figure, axes[0])
     heading(figure, scene.title, results)
     save(figure, path)
 
@@ -109,7 +109,7 @@ def _differences(axis: Any, results: dict[str, Result]) -> None:
             axis.semilogy(
                 result.times, np.maximum(gap, 1e-18), color=COLOURS[engine], label=f"{LABELS[engine]} - {LABELS[base]}"
             )
-    axis.set_title(f"largest difference of the {len(STATE_NAMES)} states [m, rad, m/s, rad/s]")
+    axis.set_title(f"Largest difference of the {len(STATE_NAMES)} states [m, rad, m/s, rad/s]")
     axis.legend(loc="lower right", ncols=2)
 
 

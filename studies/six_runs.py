@@ -123,19 +123,19 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
 
 
 def _figure_measurement(measured: Result) -> Any:
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import WIDE, heading, legend_below, plt
 
-    figure, axes = plt.subplots(2, 2, figsize=(10, 5), width_ratios=(2, 1))
+    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 4.6), width_ratios=(2, 1))
     middle = round(float(measured.times[-1]) / 2, 1)
     detail = (measured.times >= middle) & (measured.times <= middle + 1)
-    panels = ((("zeta1", "zeta2"), "road under the wheels, up [m]", -1.0), (("f1", "f2"), "wheel force [kN]", 1e-3))
+    panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))
     for (whole, part), (channels, label, scale) in zip(axes, panels, strict=True):
         for channel, name in zip(channels, ("front", "rear"), strict=True):
             whole.plot(measured.times, scale * measured[channel], label=name, linewidth=0.7)
             part.plot(measured.times[detail], scale * measured[channel][detail], label=name)
         whole.set_title(label)
-        part.set_title(f"detail, from {middle:g} s on")
-    axes[0, 0].legend(ncols=2, loc="upper right")
+        part.set_title(f"Detail, in the same unit: {label[-4:].strip()}")
+    legend_below(figure, axes[0, 0])
     plt.setp(axes[1], xlabel="time [s]")
     heading(figure, "Virtual measurement: road and wheel forces", {"measurement": measured})
     return figure
@@ -143,29 +143,29 @@ def _figure_measurement(measured: Result) -> Any:
 
 def _figure_drift(results: dict[str, Result], title: str) -> Any:
     """Heave error on a logarithmic scale, and pitch; the first result is the measurement."""
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import TRUTH, WIDE, heading, legend_below, plt
 
-    figure, (heave, pitch) = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, (heave, pitch) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     (name, measured), *runs = results.items()
-    pitch.plot(measured.times, measured["pitch"], label=name, color="black", linewidth=1.8, zorder=9)
+    pitch.plot(measured.times, measured["pitch"], label=name, color=TRUTH, linewidth=1.8, zorder=9)
     for i, (name, run) in enumerate(runs):
         heave.semilogy(run.times, np.abs(error(measured, run, "z3")) + 1e-12, color=f"C{i}", linewidth=0.8)
         pitch.plot(run.times, run["pitch"], label=name, color=f"C{i}")
-    heave.set(title="error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
-    pitch.set(title="pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
-    figure.legend(*pitch.get_legend_handles_labels(), loc="outside lower center", ncols=len(results), fontsize=8.5)
+    heave.set(title="Error of the chassis' heave [m]", ylim=(1e-9, 10), xlabel="time [s]")
+    pitch.set(title="Pitch, nose up [rad]", ylim=(-1, 1), xlabel="time [s]")
+    legend_below(figure, pitch, columns=6)
     heading(figure, title, results)
     return figure
 
 
 def _figure_moment(result: Result) -> Any:
-    from models.drawing.figures import heading, plt
+    from models.drawing.figures import WIDE, heading, plt
 
-    figure, (inertia, moment) = plt.subplots(1, 2, figsize=(10, 3.4))
+    figure, (inertia, moment) = plt.subplots(1, 2, figsize=(WIDE, 3.2))
     inertia.plot(result.times, result["inertia_term"] / 1e3, linewidth=0.5)
-    inertia.set(title="inertia term I beta'' [kN m]", xlabel="time [s]")
-    moment.plot(result.times, result["enforced_moment"], linewidth=0.5, color="C1")
-    moment.set(title="enforced moment [N m]", xlabel="time [s]")
+    inertia.set(title="Inertia term I β'' [kN m]", xlabel="time [s]")
+    moment.plot(result.times, result["enforced_moment"], linewidth=0.5)
+    moment.set(title="Enforced moment [N m]", xlabel="time [s]")
     title = "Pitch prescribed, perturbed model and noisy forces: what the guidance takes"
     heading(figure, title, {"guided, both": result})
     return figure

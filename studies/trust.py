@@ -251,13 +251,13 @@ def _figure(
     path: Path,
 ) -> None:
     """Error growth on a logarithmic scale: laws dashed, runs drawn through."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import BLUE, DARK, GREEN, GREY, VERMILION, WIDE, heading, plt, save
 
-    colours = {"noise": "#0072b2", "interpolation": "#d55e00", "inertia": "#009e73", "rounding": "#888888"}
-    figure, axis = plt.subplots(figsize=(8.0, 4.6))
-    axis.semilogy(spread["times"], spread["errors"][:20].T, color="#0072b2", alpha=0.15, linewidth=0.6)
+    colours = {"noise": BLUE, "interpolation": VERMILION, "inertia": GREEN, "rounding": GREY}
+    figure, axis = plt.subplots(figsize=(WIDE, 4.8))
+    axis.semilogy(spread["times"], spread["errors"][:20].T, color=BLUE, alpha=0.15, linewidth=0.6)
     middle = np.median(spread["errors"], axis=0)
-    axis.semilogy(spread["times"], middle, color="#0072b2", label="noise: median of the paths (20 of them thin)")
+    axis.semilogy(spread["times"], middle, color=BLUE, label="noise: median of the paths (20 of them thin)")
     for name, curve in runs.items():
         axis.semilogy(curve.times[::50], curve.size[::50], color=colours[name], linewidth=0.9, label=f"{name}: run")
     for name, curve in curves.items():
@@ -265,10 +265,10 @@ def _figure(
         axis.semilogy(
             curve.times[::50], small[::50], "--", color=colours[name], linewidth=1.5, label=f"{name}: predicted"
         )
-    axis.axhline(options.angle, color="black", linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
+    axis.axhline(options.angle, color=DARK, linewidth=0.8, label=f"not trusted above {options.angle:g} rad")
     axis.set(xlabel="time [s]", ylabel="pitch error [rad]", ylim=(1e-12, 10), xlim=(0, curves["noise"].times[-1]))
-    heading(figure, "Growth of the pitch error of a force-excited run by source, predicted and run", results)
-    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5)
+    figure.legend(loc="outside lower center", ncols=3)
+    heading(figure, "How long a force-excited run can be trusted: growth of its pitch error by source", results)
     save(figure, path)
 
 

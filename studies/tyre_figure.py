@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.told import Results
-from models.drawing.figures import heading, plt, save
+from models.drawing.figures import SMALL, WIDE, heading, plt, save
 from models.tyre.tyre_table import TyreTable
 
 SLIPS = np.linspace(0.0, 1.0, 1001)
@@ -18,7 +18,7 @@ def tyre_figure(
 ) -> None:
     """A row per table: mu_x and mu_y over slip, and both beside each other; at : slip angles (deg), load (N)."""
     angles, load = at
-    figure, axes = plt.subplots(len(tables), 3, figsize=(12, 3.4 * len(tables)), squeeze=False)
+    figure, axes = plt.subplots(len(tables), 3, figsize=(WIDE, 2.9 * len(tables) + 0.5), squeeze=False)
     for row, (name, table) in zip(axes, tables.items(), strict=True):
         x, y = table.friction(np.deg2rad(angles), SLIPS, load)
         top = 1.08 * max(x.max(), y.max())
@@ -27,20 +27,16 @@ def tyre_figure(
             row[0].plot(SLIPS, x[i], color=colour, label=f"{angle:g}")
             row[1].plot(SLIPS, y[i], color=colour)
             row[2].plot(x[i], y[i], color=colour)
-        row[0].set(xlabel="slip", ylabel="$\\mu_x$", ylim=(0, top), title=f"{name}: along the wheel")
-        row[1].set(xlabel="slip", ylabel="$\\mu_y$", ylim=(0, top), title="across the wheel")
+        row[0].set(xlabel="slip [-]", ylabel="μx [-]", ylim=(0, top), title=f"{name}: along the wheel")
+        row[1].set(xlabel="slip [-]", ylabel="μy [-]", ylim=(0, top), title="Across the wheel")
         row[2].set(
-            xlabel="$\\mu_x$",
-            ylabel="$\\mu_y$",
-            xlim=(0, top),
-            ylim=(0, top),
-            aspect="equal",
-            title="both, from slip 0 to 1",
+            xlabel="μx [-]", ylabel="μy [-]", xlim=(0, top), ylim=(0, top), aspect="equal", title="Both, slip 0 to 1"
         )
         row[2].legend(
             *row[0].get_legend_handles_labels(),
             title="slip angle [deg]",
-            fontsize=7.5,
+            fontsize=SMALL,
+            title_fontsize=SMALL,
             loc="center left",
             bbox_to_anchor=(1.0, 0.5),
         )

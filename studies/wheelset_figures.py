@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from models.core.result import Result
-from models.drawing.figures import COLOURS, LABELS, heading, plt, save
+from models.drawing.figures import BLUE, COLOURS, LABELS, SMALL, VERMILION, WIDE, heading, legend_below, plt, save
 from models.rail.equations import YAW, Y
 from models.rail.equations import Path as Motion
 from models.rail.limit_cycle import Orbit
@@ -29,14 +29,14 @@ def _note(axis: plt.Axes, text: str, place: tuple[float, float], shift: tuple[fl
 def _wheels(contacts: np.ndarray, *names: str) -> Iterator[tuple[str, str, list[np.ndarray]]]:
     """Name and colour of each wheel, and the sums (n,) over its patches of what they report under some names."""
     each = contacts.shape[1] // 2
-    yield "right wheel", "#0072b2", [contacts[name][:, :each].sum(axis=1) for name in names]
-    yield "left wheel", "#d55e00", [contacts[name][:, each:].sum(axis=1) for name in names]
+    yield "right wheel", BLUE, [contacts[name][:, :each].sum(axis=1) for name in names]
+    yield "left wheel", VERMILION, [contacts[name][:, each:].sum(axis=1) for name in names]
 
 
 def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, title: str, path: Path) -> None:
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.2))
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(WIDE, 3.8))
     for engine, one in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
         left.plot(one.speeds, one.values.real.max(axis=1), MARKS[engine], **style)
@@ -49,19 +49,19 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
         left.axvline(first.critical, color="0.6", linestyle=":")
         _note(left, f"{first.critical:.4g} m/s", (first.critical, 0.0), (-4, 8))
     middle.axhline(klingel(wheelset), color="0.6", linestyle=":")
-    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12))
+    _note(middle, "Klingel's, without suspension", (first.speeds[-1], klingel(wheelset)), (0, -12), fontsize=SMALL)
     for i in np.unique(np.linspace(0, len(first.speeds) - 1, 6).astype(int)):
         at = first.hunting[i]
         if np.isfinite(at):
             place = at.real, at.imag / (2.0 * np.pi)
-            _note(right, f"{first.speeds[i]:g} m/s", place, (-6, 0), va="center", fontsize=8)
-    left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Growth of the least stable motion")
+            _note(right, f"{first.speeds[i]:g} m/s", place, (-6, 0), va="center", fontsize=SMALL)
+    left.set(xlabel="speed [m/s]", ylabel="largest real part [1/s]", title="Least stable motion")
     middle.set(xlabel="speed [m/s]", ylabel="wavelength [m]", title="Wavelength of hunting")
-    right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting over the speed")
-    right.margins(x=0.2)
+    right.set(xlabel="real part [1/s]", ylabel="frequency [Hz]", title="Root locus of hunting")
+    right.margins(x=0.5)
     middle.margins(y=0.2)
-    left.legend()
-    heading(figure, f"{title}\nlinear creep, all motions of the wheelset", eigenvalues)
+    legend_below(figure, left)
+    heading(figure, f"{title}\nLinear creep, all motions of the wheelset", eigenvalues)
     save(figure, path)
 
 
@@ -71,24 +71,22 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
         engine: {speed: result.detail for speed, result in own.items()} for engine, own in results.items()
     }
     name, first = next(iter(paths.items()))
-    figure, axes = plt.subplots(
-        2, len(first), figsize=(6.2 * len(first), 5.6), squeeze=False, sharex="col", height_ratios=(2, 1)
-    )
-    for (top, below), (speed, own) in zip(axes.T, first.items(), strict=True):
+    rows = (2, 1) if len(paths) > 1 else (2,)
+    size = WIDE, 1.1 + 1.3 * sum(rows)
+    figure, axes = plt.subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
+    for column, (speed, own) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
             states, colour = motions[speed].states, COLOURS[engine]
             every = slice(40 * (1 + i), None, 150) if i else slice(None)
             mark = MARKS[engine] if i else "-"
-            top.plot(own.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
+            column[0].plot(own.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
             if i:
                 gap = np.maximum(np.abs(states - own.states).max(axis=1), 1e-17)
-                label = f"{LABELS[engine]} from {LABELS[name]}"
-                below.semilogy(own.times, gap, color=colour, linewidth=0.7, label=label)
-        top.set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
-        below.set(xlabel="time [s]", ylabel="largest difference\nof a state [SI]")
-    axes[0, 0].legend(loc="upper right", ncols=3)
-    if len(paths) > 1:
-        axes[1, 0].legend(loc="lower right", ncols=2)
+                column[1].semilogy(own.times, gap, color=colour, linewidth=0.7)
+                column[1].set(ylabel="[m, rad, m/s, rad/s]", title=f"Largest difference from {LABELS[name]}")
+        column[0].set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
+        column[-1].set_xlabel("time [s]")
+    legend_below(figure, axes[0, 0])
     told = {f"{engine}, {at}": run for engine, own in results.items() for at, run in at_speeds(own).items()}
     heading(figure, f"{title}: the same path in every implementation", told)
     save(figure, path)
@@ -97,19 +95,19 @@ def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path
 def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> None:
     """Creep forces on each wheel and their power in the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
-    figure, axes = plt.subplots(3, len(paths), figsize=(6.2 * len(paths), 7.0), squeeze=False, sharex="col")
+    figure, axes = plt.subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
     for k, (speed, own) in enumerate(paths.items()):
         last = own.times >= own.times[-1] - SHOWN
         for side, colour, sums in _wheels(own.contacts[last], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
                 axis.plot(own.times[last], values, color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
-        axes[1, k].set(ylabel="across [N]")
+        axes[1, k].set(ylabel="across the track [N]")
         axes[2, k].set(ylabel="power [W]", xlabel="time [s]")
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
-    axes[0, 0].legend(loc="upper right", ncols=2)
+    legend_below(figure, axes[0, 0])
     largest = max(float(own.contacts["power"].max()) for own in paths.values())
-    told = f"creep forces on the wheels and their power, at any time {largest:.3g} W or less"
+    told = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
     heading(figure, f"{title}\n{told}", at_speeds(results))
     save(figure, path)
 
@@ -117,31 +115,30 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
 def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) -> None:
     """Amplitude and frequency of the cycles over the speed: those that attract filled, those that repel open."""
     orbits: Sequence[Orbit] = branch.detail
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4.4))
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(WIDE, 3.8))
     speeds, amplitudes, frequencies = (
         np.array([getattr(orbit, name) for orbit in orbits]) for name in ("speed", "amplitude", "frequency")
     )
     stable, clearance = np.array([orbit.stable for orbit in orbits]), 1e3 * wheelset.flange_clearance
     for axis, values in ((left, 1e3 * amplitudes), (middle, 1e3 * amplitudes), (right, frequencies)):
         axis.plot(speeds, values, color="0.7", zorder=1)
-        for chosen, face, label in ((stable, "#0072b2", "attracts"), (~stable, "white", "repels")):
+        for chosen, face, label in ((stable, BLUE, "attracts"), (~stable, "white", "repels")):
             label = f"cycle that {label}" if chosen.any() else ""
-            style: Any = {"s": 22, "facecolor": face, "edgecolor": "#0072b2", "zorder": 2}
+            style: Any = {"s": 18, "facecolor": face, "edgecolor": BLUE, "zorder": 2}
             axis.scatter(speeds[chosen], values[chosen], label=label or None, **style)
         axis.set_xlabel("speed [m/s]")
     for axis in (left, middle):
         axis.axhline(clearance, color="0.6", linestyle=":")
-        axis.set(ylabel="amplitude of the lateral displacement [mm]", ylim=(0, None))
+        axis.set(ylabel="lateral amplitude [mm]", ylim=(0, None))
     begins = speeds[amplitudes <= 1.02e-3 * clearance] if (amplitudes <= 1e-3 * clearance).any() else speeds[:1]
     margin = 0.2 * np.ptp(begins) + 0.05
     middle.set(xlim=(begins.min() - margin, begins.max() + margin), ylim=(0, 1.1 * clearance), title="Where it begins")
-    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=8)
+    _note(left, "flanges touch", (speeds.max(), clearance), (0, -11), fontsize=SMALL)
     ends = np.array([speeds.min(), speeds.max()])
     right.plot(ends, ends / klingel(wheelset), color="0.6", linestyle=":", label="speed by Klingel's wavelength")
     left.set_title("Amplitude")
     right.set(ylabel="frequency [Hz]", title="Frequency")
-    left.legend(loc="lower right")
-    right.legend()
+    legend_below(figure, left, right, columns=3)
     heading(figure, title, {"branch": branch})
     save(figure, path)
 
@@ -149,7 +146,7 @@ def branch_figure(branch: Result, wheelset: Wheelset, title: str, path: Path) ->
 def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     """The cycle in the plane of lateral displacement and yaw in every implementation, and its creep forces."""
     cycles: dict[str, Orbit] = {engine: result.detail for engine, result in results.items()}
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.2))
     for engine, orbit in cycles.items():
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
@@ -165,6 +162,6 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
     )
     right.set(xlabel="time [s]", ylabel="creep force [kN]", title="Creep forces in one period")
     left.legend()
-    right.legend(fontsize=8, loc="center", bbox_to_anchor=(0.5, -0.24), ncols=2)
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
     heading(figure, title, results)
     save(figure, path)

@@ -8,6 +8,23 @@ import pytest
 import models  # noqa: F401  before any test imports numpy: it sets the threads of linear algebra
 
 
+@pytest.fixture(autouse=True, scope="session")
+def figure_rules():
+    """Hold every figure that a test saves to the rules of figures."""
+    from figure_rules import faults
+    from matplotlib.figure import Figure
+
+    save = Figure.savefig
+
+    def checked(figure, *args, **options):
+        assert not (found := faults(figure)), "\n".join(found)
+        return save(figure, *args, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", checked)
+        yield
+
+
 @pytest.fixture
 def empty_folder(tmp_path, monkeypatch):
     """A new folder, which is the current one during the test."""

@@ -6,50 +6,57 @@ from typing import Any
 import numpy as np
 
 from models.core.told import Results
-from models.drawing.figures import heading, plt
+from models.drawing.figures import (
+    BAD,
+    BLUE,
+    DOUBTFUL,
+    GOOD,
+    GREY,
+    SMALL,
+    VERMILION,
+    WIDE,
+    about_one,
+    heading,
+    legend_below,
+    plt,
+)
 from models.drift.score import BAND, CHANNELS, TUMBLED, Limits
 
 Row = dict[str, Any]
 
-ROADS = {"road": ("on the road", "#0072b2"), "grade": ("on the grade", "#d55e00")}
-WORDS = {"accepted": "#00795a", "stabilise": "#a86400", "rejected": "#b00020"}
+ROADS = {"road": ("on the road", BLUE), "grade": ("on the grade", VERMILION)}
+WORDS = {"accepted": ("✓", GOOD), "stabilise": ("~", DOUBTFUL), "rejected": ("✗", BAD)}
+"""Sign and colour of a verdict."""
 MARKS = dict(zip(CHANNELS, ("o", "s", "^", "D"), strict=True))
 NAMES = {"f3x": "front, along", "f3z": "front, upright", "f4x": "rear, along", "f4z": "rear, upright"}
 DAMAGE, PITCH, SHARE = (3e-3, 3e2), (1e-4, 10.0), (1e-4, 1.0)
 """What the axes show; a mark at an edge lies beyond it."""
-TICKS = (0.01, 0.1, 0.5, 0.8, 0.9, 1.0, 1.1, 1.25, 2.0, 10.0, 100.0)
-SHARP = 0.05
-"""Damage ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, logarithmic far from it."""
+TICKS = (0.01, 0.5, 0.9, 1.1, 2.0, 100.0)
 
 
 def draw_fan(axis: Any, times: np.ndarray, bands: np.ndarray) -> None:
     """Bands of a pitch error (rad), its 5, 25, 50, 75 and 95 % quantiles (5, times), over times (s)."""
     low, quarter, middle, three, high = bands
-    axis.fill_between(times, low, high, alpha=0.2, color="C0", linewidth=0, label="5 to 95 %")
-    axis.fill_between(times, quarter, three, alpha=0.4, color="C0", linewidth=0, label="25 to 75 %")
-    axis.semilogy(times, middle, color="C0", label="median")
-    axis.set_title("magnitude of the pitch error [rad]")
+    axis.fill_between(times, low, high, alpha=0.2, color=BLUE, linewidth=0, label="5 to 95 %")
+    axis.fill_between(times, quarter, three, alpha=0.4, color=BLUE, linewidth=0, label="25 to 75 %")
+    axis.semilogy(times, middle, color=BLUE, label="median")
+    axis.set_title("Magnitude of the pitch error [rad]")
 
 
 def decision(rows: list[Row], limits: Limits, grade: float | None, results: Results | None = None) -> Any:
-    """One line per method: damage, pitch error, artificial moment, cost and the two verdicts."""
+    """One line per method: damage, pitch error, artificial moment, the two verdicts and cost."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    widths = (3.4, 1.9, 2.1, 3.6)
-    figure, axes = plt.subplots(1, 4, figsize=(14.5, 1.7 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
+    widths = (2.5, 1.25, 1.25, 1.5)
+    figure, axes = plt.subplots(1, 4, figsize=(WIDE, 2.6 + 0.36 * len(methods)), sharey=True, width_ratios=widths)
     for row in rows:
         _marks(axes, row, methods.index(row["method"]))
     right = (1 - limits.damage_error, 1 + limits.damage_error)
-    _panel(axes[0], DAMAGE, "pseudo-damage of the section forces,\nin the chassis' frame, by the true one", right)
-    _panel(axes[1], PITCH, "largest pitch error [rad]\n(dotted: tumbled)", (PITCH[0], limits.pitch_error))
-    _panel(axes[2], SHARE, f"artificial moment by I pitch'',\nrms to {BAND:g} Hz", (SHARE[0], limits.artificial_share))
-    axes[0].set_xscale(
-        "function",
-        functions=(lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u))),
-    )
+    _panel(axes[0], DAMAGE, "pseudo-damage of the section forces\nin the chassis' axes / true one [-]", right)
+    _panel(axes[1], PITCH, "largest pitch error\n[rad] (dotted:\ntumbled)", (PITCH[0], limits.pitch_error))
+    _panel(axes[2], SHARE, f"added moment /\nI pitch'' [-],\nrms to {BAND:g} Hz", (SHARE[0], limits.artificial_share))
+    about_one(axes[0], "x", TICKS)
     axes[0].set_xlim(*DAMAGE)
-    axes[0].set_xticks(TICKS, [f"{tick:g}" for tick in TICKS], fontsize=8)
-    axes[0].minorticks_off()
-    axes[1].axvline(TUMBLED, color="#b00020", linewidth=0.8, linestyle=":")
+    axes[1].axvline(TUMBLED, color=BAD, linewidth=0.8, linestyle=":")
     axes[0].set_yticks(range(len(methods)), methods)
     axes[0].set_ylim(len(methods) - 0.5, -0.5)
     _verdicts(axes[3], rows, methods)
@@ -69,45 +76,47 @@ def _marks(axes: Any, row: Row, line: int) -> None:
     for channel, mark in MARKS.items():
         if row[f"damage {channel}"] is not None:
             place = np.clip(row[f"damage {channel}"], *DAMAGE)
-            axes[0].plot(place, y, mark, color=colour, markersize=4.5, clip_on=False, alpha=0.8)
+            axes[0].plot(place, y, mark, color=colour, markersize=4, clip_on=False, alpha=0.8)
     if row["damage f3x"] is None:
         told = f"tumbled; its vertical f3 says {row['vertical damage f3']:.2f}"
-        axes[0].text(1.0, y, told, color=colour, fontsize=7.5, ha="center", va="center")
+        axes[0].text(1.0, y, told, color=colour, fontsize=SMALL, ha="center", va="center")
     for axis, name, span in ((axes[1], "pitch error max [rad]", PITCH), (axes[2], "moment share to 15 Hz", SHARE)):
-        axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=5, clip_on=False)
+        axis.plot(np.clip(row[name], *span), y, "o", color=colour, markersize=4, clip_on=False)
 
 
 def _panel(axis: Any, span: tuple[float, float], title: str, good: tuple[float, float]) -> None:
-    axis.set(xscale="log", xlim=span, title=title)
-    axis.axvspan(*good, color=WORDS["accepted"], alpha=0.16, linewidth=0)
+    axis.set(xscale="log", xlim=span, xlabel=title)
+    axis.axvspan(*good, color=GOOD, alpha=0.16, linewidth=0)
     axis.grid(axis="y", alpha=0.25)
 
 
 def _verdicts(axis: Any, rows: list[Row], methods: list[str]) -> None:
-    """Words: with the truth and without it, per road, and the price."""
+    """Signs: with the truth and without it, per road, and the price."""
     axis.set_xlim(0, 10)
     axis.axis("off")
     columns = [(row["road"], key) for row in rows if row["method"] == "free" for key in ("verdict", "without truth")]
-    places = dict(zip(columns, (0.1, 2.4, 4.9, 7.2), strict=False))
+    places = dict(zip(columns, (0.8, 2.6, 4.4, 6.2), strict=False))
     for (road, key), x in places.items():
         name = "by damage" if key == "verdict" else "without truth"
-        axis.text(x, -0.75, f"{ROADS[road][0]},\n{name}", fontsize=8, va="bottom", color=ROADS[road][1])
-    axis.text(9.5, -0.75, "cost,\nx free", fontsize=8, va="bottom")
+        where = "road" if road == "road" else "grade"
+        style = {"fontsize": SMALL, "va": "bottom", "ha": "center", "rotation": 90, "color": ROADS[road][1]}
+        axis.text(x, -0.75, f"{where}, {name}", **style)
+    axis.text(8.9, -0.75, "seconds / free", fontsize=SMALL, va="bottom", ha="center", rotation=90)
     free = next(row["seconds"] for row in rows if row["method"] == "free")
     for row in rows:
         line = methods.index(row["method"])
         for key in ("verdict", "without truth"):
-            bold = "bold" if row[key] == "accepted" else "normal"
-            x, colour = places[row["road"], key], WORDS[row[key]]
-            axis.text(x, line, row[key], color=colour, va="center", fontsize=8.5, fontweight=bold)
+            sign, colour = WORDS[row[key]]
+            x = places[row["road"], key]
+            axis.text(x, line, sign, color=colour, va="center", ha="center", fontsize=10, fontweight="bold")
         if row["road"] == rows[0]["road"]:
-            axis.text(9.5, line, f"{row['seconds'] / free:.1f}", va="center", fontsize=8.5)
+            axis.text(9.9, line, f"{row['seconds'] / free:.1f}", va="center", ha="right", fontsize=8)
 
 
 def _legend(figure: Any, grade: float | None) -> None:
     """Marks and roads, below."""
     marks = [
-        plt.Line2D([], [], marker=mark, linestyle="", color="#555555", markersize=5, label=NAMES[channel])
+        plt.Line2D([], [], marker=mark, linestyle="", color=GREY, markersize=5, label=NAMES[channel])
         for channel, mark in MARKS.items()
     ]
     words = {"road": "on the road as it is", "grade": f"on the same road with a grade of {grade or 0:g} rad"}
@@ -116,8 +125,12 @@ def _legend(figure: Any, grade: float | None) -> None:
         for road, word in words.items()
         if road == "road" or grade is not None
     ]
-    good = plt.Rectangle((0, 0), 1, 1, color="#00795a", alpha=0.16, label="within the limits")
-    figure.legend(handles=[*marks, *roads, good], loc="outside lower center", ncols=7, fontsize=8.5)
+    good = plt.Rectangle((0, 0), 1, 1, color=GOOD, alpha=0.16, label="within the limits")
+    signs = [
+        plt.Line2D([], [], marker="s", linestyle="", color=colour, markersize=5, label=f"{sign} {word}")
+        for word, (sign, colour) in WORDS.items()
+    ]
+    figure.legend(handles=[*marks, *roads, good, *signs], loc="outside lower center", ncols=4)
 
 
 def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: float | None) -> Any:
@@ -125,36 +138,34 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
 
     sweep : per road what ``Bench.sweep`` gives; level : the bench of the road without the grade
     """
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2))
+    figure, axes = plt.subplots(1, 2, figsize=(WIDE, 4.6))
     for road, curve in sweep.items():
         name, colour = ROADS[road]
-        axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring, {name}")
-        axes[0].loglog(curve[:, 0], curve[:, 2], "o", color=colour, markersize=4, label=f"high-pass, {name}")
+        axes[0].loglog(curve[:, 0], curve[:, 1], "-", color=colour, label=f"spring {name}")
+        axes[0].loglog(curve[:, 0], curve[:, 2], "o", color=colour, markersize=4, label=f"high-pass {name}")
         held = curve[:, 1] < TUMBLED
-        axes[1].loglog(curve[held, 0], curve[held, 3], "o-", color=colour, markersize=4, label=name)
+        axes[1].loglog(curve[held, 0], curve[held, 3], "o-", color=colour, markersize=4)
         tumbled = curve[~held, 0]
-        axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles, {name}")
+        axes[1].plot(tumbled, np.full(len(tumbled), DAMAGE[1]), "x", color=colour, label=f"tumbles {name}")
     low = limits.pitch_error / 2
-    axes[0].axhspan(low, limits.pitch_error, color="#00795a", alpha=0.16, linewidth=0, label="allowed")
-    axes[1].axhspan(
-        1 - limits.damage_error, 1 + limits.damage_error, color="#00795a", alpha=0.3, linewidth=0, label="allowed"
-    )
-    axes[0].set(ylim=(low, 3.0), title="largest pitch error [rad]")
-    axes[1].set(ylim=(None, 1.5 * DAMAGE[1]), title="damage ratio of the worst section force")
+    axes[0].axhspan(low, limits.pitch_error, color=GOOD, alpha=0.16, linewidth=0, label="allowed")
+    axes[1].axhspan(1 - limits.damage_error, 1 + limits.damage_error, color=GOOD, alpha=0.3, linewidth=0)
+    axes[0].set(ylim=(low, 3.0), title="Largest pitch error [rad]")
+    axes[1].set(ylim=(None, 1.5 * DAMAGE[1]), title="Damage of the worst section force / true [-]")
     for axis in axes:
-        axis.axvline(level.holding, color="#555555", linewidth=0.8, linestyle="--", label="predicted to hold from here")
+        axis.axvline(level.holding, color=GREY, linewidth=0.8, linestyle="--", label="predicted to hold from here")
         axis.set_xlabel("stiffness of the spring to the ground [N m/rad]")
         turning = (
             lambda k: np.sqrt(np.maximum(k, 0.0) / level.resisting) / (2 * math.pi),
             lambda f: level.resisting * (2 * math.pi * f) ** 2,
         )
         above = axis.secondary_xaxis("top", functions=turning)
-        above.set_xlabel("cut-off of the high-pass that is the same thing [Hz]", fontsize=8.5)
-        axis.legend(fontsize=8)
+        above.set_xlabel("cut-off of the equivalent high-pass [Hz]")
     why = (
         "what the stiffness does"
         if grade is None
         else f"no stiffness is right, least of all on a grade of {grade:g} rad"
     )
+    legend_below(figure, *axes, columns=3)
     heading(figure, f"Keeping the pitch near zero: {why}")
     return figure

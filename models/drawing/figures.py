@@ -7,6 +7,7 @@ in labels and eight marks to every decade are half of what drawing a figure of m
 """
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -20,7 +21,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.scale import LogScale, register_scale
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullLocator
 
 from models.core.told import Results, remarks
 from models.core.whole_files import whole_file
@@ -65,7 +66,7 @@ plt.rcParams.update(
         "savefig.dpi": 150,
         "font.size": 8.5,
         "axes.titlesize": TITLE,
-        "axes.prop_cycle": matplotlib.cycler(color=TURNS),
+        "axes.prop_cycle": plt.cycler(color=TURNS),
         "figure.titlesize": 10.5,
         "figure.labelsize": 8.5,
         "legend.fontsize": 8,
@@ -101,7 +102,7 @@ def heading(figure: Figure, title: str, results: Results | None = None) -> None:
     size, wide = plt.rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
-        broken = wrapped("\n".join(told), 1.1 * wide, REMARK)
+        broken = wrapped("\n".join(told), 1.2 * wide, REMARK)
         lines = "\n".join((broken, *[" "] * _lines_of_legends(figure)))
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color=BAD)
 
@@ -119,9 +120,13 @@ def panels(count: int, across: int, height: float, wide: float = WIDE, **more: A
     return figure, list(axes.flat[:count])
 
 
-def legend_below(figure: Figure, axis: Axes, columns: int = 4, **more: Any) -> None:
-    """The legend of an axis below all panels."""
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=columns, **more)
+def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
+    """One legend of panels below all of them; what has the same name in several stands there once."""
+    handles: dict[str, Any] = {}
+    for axis in axes:
+        lines, names = axis.get_legend_handles_labels()
+        handles |= dict(zip(names, lines, strict=True))
+    figure.legend([*handles.values()], [*handles], loc="outside lower center", ncols=columns)
 
 
 def _lines_of_legends(figure: Figure) -> int:
@@ -140,6 +145,18 @@ def save(figure: Figure, path: Path) -> Path:
         figure.savefig(part, metadata=metadata)
     plt.close(figure)
     return path
+
+
+SHARP = 0.05
+"""Ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, where a tenth is told, logarithmic far from it."""
+
+
+def about_one(axis: Axes, which: str, ticks: Sequence[float]) -> None:
+    """Make an axis (x or y) show ratios, so that both 5 % and many decades are seen; ticks : the marked ratios."""
+    scale = (lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u)))
+    getattr(axis, f"set_{which}scale")("function", functions=scale)
+    getattr(axis, f"set_{which}ticks")(ticks, [f"{tick:g}" for tick in ticks])
+    getattr(axis, f"{which}axis").set_minor_locator(NullLocator())
 
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -358,18 +358,20 @@ def _told(one: Difference) -> str:
 
 def _figure(one: Path, two: Path, found: list[Difference], results: Results, path: Path) -> None:
     """Both results and, below, their difference, of the three quantities that differ most."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import BLUE, DARK, TITLE, VERMILION, WIDE, heading, legend_below, plt, save, wrapped
 
     shown = found[:3]
-    figure, axes = plt.subplots(2, len(shown), figsize=(4.2 * len(shown) + 0.6, 5.4), sharex="col", squeeze=False)
+    share = 0.95 * WIDE / len(shown) - 0.3
+    figure, axes = plt.subplots(2, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
     for (top, below), each in zip(axes.T, shown, strict=True):
-        top.plot(each.grid, each.one, color="#222222", linewidth=2.0, label=str(one))
-        top.plot(each.grid, each.two, color="#d55e00", linewidth=1.0, label=str(two))
-        top.set_title(f"{each.name} [{each.unit or '-'}]")
-        below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color="#0072b2")
-        below.plot(each.at, each.gap[each.row], "o", color="#0072b2", markersize=5)
-        error = "\nrms within the stated error" if each.within else ""
-        below.set(title=f"difference, largest {each.largest:.3g} at the mark{error}", xlabel=each.over)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        top.plot(each.grid, each.one, color=DARK, linewidth=2.0, label=str(one))
+        top.plot(each.grid, each.two, color=VERMILION, linewidth=1.0, label=str(two))
+        top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE))
+        below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)
+        below.plot(each.at, each.gap[each.row], "o", color=BLUE, markersize=5)
+        error = ", rms within the stated error" if each.within else ""
+        told = f"difference [{each.unit or '-'}], largest {each.largest:.3g} at the mark{error}"
+        below.set(title=wrapped(told, share, TITLE), xlabel=each.over)
+    legend_below(figure, axes[0, 0], columns=1)
     heading(figure, f"Largest differences of {len(found)} quantities", results)
     save(figure, path)

@@ -12,13 +12,14 @@ import os
 import re
 import shutil
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from models.core import told
 from models.core.assumptions import broken_of
@@ -229,7 +230,18 @@ def _swept(job: Points, records: list[Record]) -> Swept:
     columns = {name: [record["numbers"].get(name) for record in records] for name in quantities}
     failures = [record["failed"] for record in records]
     results: list[told.Results] = [told.speaking(record["results"]) for record in records]
-    return Swept(job.scene, job.key, job.values, columns, failures, results)
+    return Swept(job.scene, job.key, job.values, columns, failures, results, _unit(job))
+
+
+def _unit(job: Points) -> str:
+    """Unit of a key of the scene, as its table states it, "-" of what has none; "SI" where no table says."""
+    owner: Any = load_scene(job.scene, list(job.changes))
+    *tables, name = job.key.split(".")
+    for table in tables:
+        owner = owner.get(table) if isinstance(owner, Mapping) else getattr(owner, table, None)
+    known = type(owner).model_fields.get(name) if isinstance(owner, BaseModel) else None
+    extra = known.json_schema_extra if known is not None else None
+    return str(extra["unit"]) or "-" if isinstance(extra, dict) and "unit" in extra else "SI"
 
 
 def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record]:

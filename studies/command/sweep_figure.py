@@ -1,6 +1,5 @@
 """Figures of a sweep: every number that changes over the key, with marks where a result must be doubted."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +10,29 @@ import numpy as np
 from models.core.assumptions import broken_of
 from models.core.discretisation import WARNED, worst_of
 from models.core.told import Results
-from models.drawing.figures import COLOURS, LABELS, heading, plt, save
+from models.drawing.figures import (
+    BAD,
+    BLUE,
+    COLOURS,
+    LABELS,
+    ORANGE,
+    WIDE,
+    heading,
+    legend_below,
+    panels,
+    save,
+    wrapped,
+)
 
-ACROSS, DOWN, PAGES = 3, 4, 4
+ACROSS, DOWN, PAGES = 2, 5, 5
 """Panels of a page, and the most pages; all numbers are in ``sweep.csv``."""
 DECADES = 30.0
 """Ratio of the largest to the least value from which on an axis is logarithmic."""
-FAILED = {"marker": "x", "color": "#cc0000", "markersize": 8, "markeredgewidth": 2, "label": "failed"}
-BROKEN = {"marker": "o", "color": "#b00020", "markersize": 9, "markeredgewidth": 1.5, "label": "assumption broken"}
+FAILED = {"marker": "x", "color": BAD, "markersize": 8, "markeredgewidth": 2, "label": "failed"}
+BROKEN = {"marker": "o", "color": BAD, "markersize": 9, "markeredgewidth": 1.5, "label": "assumption broken"}
 WARNING = {
     "marker": "^",
-    "color": "#e69f00",
+    "color": ORANGE,
     "markersize": 8,
     "markeredgewidth": 1.5,
     "label": f"error above {100.0 * WARNED:g} %",
@@ -36,7 +47,8 @@ Columns = dict[str, list[Any]]
 class Swept:
     """What the points of a sweep of ``scene`` over ``key`` gave.
 
-    failures : what failed at each point, by engine; results : of each point, without channels, by their names.
+    failures : what failed at each point, by engine; results : of each point, without channels, by their names; unit :
+    of the key's values.
     """
 
     scene: str
@@ -45,6 +57,7 @@ class Swept:
     columns: Columns
     failures: list[dict[str, str]]
     results: Sequence[Results]
+    unit: str = "SI"
 
     def broken(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
@@ -64,24 +77,24 @@ def _of(results: Results, engine: str) -> Results:
 
 def draw(swept: Swept, folder: Path) -> list[str]:
     """Write ``sweep.png``, ``sweep-2.png``, ... and return their names."""
-    panels = _panels(swept.columns)
+    changing = _changing(swept.columns)
     size, names = ACROSS * DOWN, list[str]()
-    shown = list(panels.items())[: size * PAGES] or [("no number changes", {})]
+    shown = list(changing.items())[: size * PAGES] or [("no number changes", {})]
     for first in range(0, len(shown), size):
         name = f"sweep-{first // size + 1}.png" if first else "sweep.png"
-        _page(swept, shown[first : first + size], folder / name, f"the {len(panels)} quantities that change")
+        _page(swept, shown[first : first + size], folder / name, f"the {len(changing)} quantities that change")
         names.append(name)
     return names
 
 
-def _panels(columns: Columns) -> dict[str, dict[str, list[Any]]]:
+def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     """Quantities that change -> curve of each implementation, "" where there is but one."""
-    panels: dict[str, dict[str, list[Any]]] = {}
+    found: dict[str, dict[str, list[Any]]] = {}
     for name, column in columns.items():
         first, _, rest = name.partition(", ")
         engine, what = (first, rest) if rest and first in LABELS else ("", name)
-        panels.setdefault(what, {})[engine] = column
-    return {what: own for what, own in panels.items() if any(moves(column) for column in own.values())}
+        found.setdefault(what, {})[engine] = column
+    return {what: own for what, own in found.items() if any(moves(column) for column in own.values())}
 
 
 def there(column: list[Any]) -> list[Any]:
@@ -94,24 +107,19 @@ def moves(column: list[Any]) -> bool:
     return len(set(there(column))) > 1
 
 
-def _page(swept: Swept, panels: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
-    down = -(-len(panels) // ACROSS)
-    figure, axes = plt.subplots(down, min(ACROSS, len(panels)), figsize=(12, 2.6 * down + 0.9), squeeze=False)
+def _page(swept: Swept, shown: list[tuple[str, dict[str, list[Any]]]], path: Path, note: str) -> None:
+    figure, axes = panels(len(shown), min(ACROSS, len(shown)), 2.3)
     at, ticks = _places(swept.values)
-    for axis, (what, curves) in zip(axes.flat, panels, strict=False):
+    for axis, (what, curves) in zip(axes, shown, strict=True):
         _panel(axis, at, what, curves, swept, "o" if ticks else "o-")
         if ticks:
             axis.set_xticks(at, ticks)
         elif _spread(at):
             axis.set_xscale("log")
-        axis.set_xlabel(swept.key)
-    for axis in axes.flat[len(panels) :]:
-        axis.set_visible(False)
-    handles: dict[str, Any] = {}
-    for axis in axes.flat:
-        found, labels = axis.get_legend_handles_labels()
-        handles |= dict(zip(labels, found, strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=max(1, len(handles)))
+        else:
+            axis.locator_params(axis="x", nbins=6)
+        axis.set_xlabel(swept.key if ticks else f"{swept.key} [{swept.unit}]")
+    legend_below(figure, *axes)
     heading(figure, f"{swept.scene.rpartition('/')[2]} over {swept.key}: {note}")
     save(figure, path)
 
@@ -130,7 +138,7 @@ def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], s
             at[order],
             np.array(column, float)[order],
             style,
-            color=COLOURS.get(engine, "#0072b2"),
+            color=COLOURS.get(engine, BLUE),
             markersize=3.5,
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,
@@ -144,7 +152,7 @@ def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], s
     if lost:
         foot = {"transform": axis.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
         axis.plot(at[lost], np.full(len(lost), 0.04), **FAILED, **foot)
-    axis.set_title(_title(what), fontsize=9)
+    axis.set_title(wrapped(_with_unit(what), 0.47 * WIDE, 9), fontsize=9)
 
 
 def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: str) -> None:
@@ -155,14 +163,9 @@ def _marks(axis: Any, at: np.ndarray, values: np.ndarray, swept: Swept, engine: 
             axis.plot(at[shown], values[shown], linestyle="none", markerfacecolor="none", zorder=4, **look)
 
 
-def _title(what: str) -> str:
-    """The quantity on at most two lines, its unit last."""
-    text, unit = re.fullmatch(r"(.*?)( \[[^\[\]]*\])?", what, re.DOTALL).groups()  # type: ignore[union-attr]
-    if len(what) <= 46:
-        return what
-    cut = text.rfind(", ", 0, 46)
-    cut = cut + 1 if cut > 0 else 46
-    return f"{text[:cut]}\n{text[cut : cut + 46].strip()}{unit or ''}"
+def _with_unit(what: str) -> str:
+    """A quantity with its unit; counts have none, and what else tells none is in SI."""
+    return what if "[" in what else f"{what} [{'-' if what.startswith('counts') else 'SI'}]"
 
 
 def _spread(values: np.ndarray) -> bool:

@@ -294,7 +294,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         axis.set(title=place, xlabel="speed [m/s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].set_ylim(bottom=0.0)
-    legend_below(figure, axes[0], 2)
+    legend_below(figure, axes[0], columns=2)
     heading(figure, "Which roads belong together matters most at the centre of the body")
     return [(SAID, figure)]
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.drawing.figures import plt
+from models.drawing.figures import BLUE, COLOURS, PALE, SMALL, VERMILION, WIDE, heading, plt
 
 LAWS = (
     "no contact",
@@ -19,16 +19,16 @@ LAWS = (
 )
 NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
-PARTS = (("own", "engine", "0.75"), ("kernel", "kernel", "C0"), ("over", "bridge", "C3"))
+PARTS = (("own", "engine", PALE), ("kernel", "kernel", BLUE), ("over", "bridge", VERMILION))
 METHODS = {"mujoco": "Euler", "exudyn": "ExplicitEuler"}
-COLOURS = {"mujoco": "C0", "exudyn": "C1"}
 WHEELS = 4
 LINES = {1: ":", WHEELS: "-", 8: "--"}
 
 
 def figure(points: list[dict[str, Any]]) -> Figure:
     """Cost per step over the law; shares of engine, kernel and bridge over the law and over the number of wheels."""
-    drawing, (left, middle, right) = plt.subplots(1, 3, figsize=(15.5, 5.6), width_ratios=(1.25, 1.0, 0.8))
+    drawing, places = plt.subplot_mosaic([["laws", "laws"], ["by law", "by wheels"]], figsize=(WIDE, 8.6))
+    left, middle, right = (places[name] for name in ("laws", "by law", "by wheels"))
     some = [p for p in points if METHODS[p["engine"]] == p["method"]]
     best = [p for p in some if p["bridge"] in ("empty", _main(p["engine"]))]
     _laws(left, some)
@@ -36,15 +36,10 @@ def figure(points: list[dict[str, Any]]) -> Figure:
     _shares(
         right, [(f"{NAMES[p['engine']]}, {p['wheels']} wheel{'s' * (p['wheels'] > 1)}", p) for p in best if p["main"]]
     )
-    middle.set_title(f"shares by law, {WHEELS} wheels")
-    right.set_title("shares by wheels, FASTSIM, 21 cells")
-    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize="small")
-    drawing.suptitle(
-        "A contact kernel inside an engine: what a step costs and what it is made of",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
+    middle.set_title(f"Shares by law, {WHEELS} wheels")
+    right.set_title("Shares by wheels, FASTSIM, 21 cells")
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3)
+    heading(drawing, "A contact kernel inside an engine: what a step costs and what it is made of")
     return drawing
 
 
@@ -73,9 +68,9 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
                 label=f"{NAMES[engine]}, {BRIDGES.get(bridge, bridge)}, {WHEELS} wheels",
             )
     axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
-    axis.set(ylabel="time per step [us]", title="one call per step")
+    axis.set(ylabel="time per step [µs]", title="One call per step")
     axis.grid(True, axis="y", alpha=0.3)
-    axis.legend(fontsize="x-small")
+    axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
@@ -87,8 +82,8 @@ def _shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
         axis.barh(labels, share, left=before, color=colour, label=name)
         for i, (at, value) in enumerate(zip(before, share, strict=True)):
             if value >= 6.0:
-                axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize="small")
+                axis.text(at + value / 2.0, i, f"{value:.0f}", ha="center", va="center", fontsize=SMALL)
         before += share
     axis.invert_yaxis()
-    axis.tick_params(axis="y", labelsize="small")
+    axis.tick_params(axis="y", labelsize=SMALL)
     axis.set_xlabel("share of the step [%]")
