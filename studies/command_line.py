@@ -1,4 +1,4 @@
-"""The command ``twinrig``: list, show, run, price, validate."""
+"""The command ``twinrig``: list, show, run, price, compare, export, validate."""
 
 import io
 import json
@@ -252,6 +252,23 @@ def compare(
     differences(one, two)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
     _finish(lambda progress: report(one, two, folder), folder, as_json)
+
+
+@app.command()
+def export(
+    scene: SceneName,
+    engine: Annotated[str, typer.Option(help="mujoco, for an MJCF file, or exudyn, for a script in Python.")],
+    out: Annotated[Path | None, typer.Option(help="The file to write; SCENE_ENGINE.xml or .py here if none.")] = None,
+    changes: Changes = None,
+) -> None:
+    """Write the vehicle of a scene as a file of an engine that opens without twinrig.
+
+    It has what the engine has as its own: bodies, joints, weights, springs and dampers. Forces that are functions of
+    twinrig, such as tyres, stay behind; the file and the terminal name each of them.
+    """
+    from studies.command.export import export as write
+
+    print("\n".join(write(load_scene(scene, changes), engine, out)))
 
 
 @app.command()
