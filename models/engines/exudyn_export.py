@@ -165,8 +165,9 @@ def _class(kind: str, item: dict[str, Any]) -> str:
 def _literal(value: Any) -> str:
     """A value as the script has it; matrices as arrays, Exudyn's own lists by their constructors."""
     if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
-        inner = ", ".join(_literal(np.asarray(value[i]).tolist()) for i in range(len(value)))
-        return f"exu.{type(value).__name__}([{inner}])" if len(value) else "[]"
+        entries: Any = value  # Exudyn's type hints do not know that these are lists
+        inner = ", ".join(_literal(np.asarray(entries[i]).tolist()) for i in range(len(entries)))
+        return f"exu.{type(value).__name__}([{inner}])" if len(entries) else "[]"
     if isinstance(value, exu.MatrixContainer):
         return _literal(np.array(value.Convert2DenseMatrix()))
     if isinstance(value, np.ndarray):

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.vehicles.spatial import Body, SpatialVehicle
+from models.vehicles.spatial import Body, SpatialVehicle, Vector
 
 MARGIN = 1e-13
 """Share by which A + B is kept above C, so that rounding does not undo it."""
@@ -84,6 +84,7 @@ def _lower(name: str, tensors: dict[str, np.ndarray]) -> str:
     )
 
 
-def _rows(tensor: np.ndarray) -> tuple[tuple[float, float, float], ...]:
+def _rows(tensor: np.ndarray) -> tuple[Vector, Vector, Vector]:
     """A tensor (3, 3) as rows of plain numbers."""
-    return tuple(tuple(row) for row in tensor.tolist())  # type: ignore[misc]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = tensor.tolist()
+    return (xx, xy, xz), (yx, yy, yz), (zx, zy, zz)
