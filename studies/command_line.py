@@ -1,4 +1,4 @@
-"""The command ``twinrig``: list, show, run, price, validate."""
+"""The command ``twinrig``: list, show, run, price, compare, export, validate."""
 
 import io
 import json
@@ -241,17 +241,51 @@ def price(
 @app.command()
 def compare(
     one: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
-    two: Annotated[Path, typer.Argument(help="Another one of the same study.")],
+    two: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
     out: Out = None,
+    shift: Annotated[
+        float | None,
+        typer.Option(help="Of a measurement: s that its clock shows at the run's start, if it is not to be sought."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare two results quantity by quantity: largest and rms difference, and where."""
+    """Compare two results quantity by quantity, or lay a measurement over a run.
+
+    Two results: largest and rms difference of each quantity, and where. A measurement: its channels are those of the
+    run by their names, with units in brackets, as f1 [kN]; units are converted, the time shift is found, and each
+    channel has its rms error, also by the standard deviation of the measurement, and its peak error.
+    """
+    from studies.command import against_measurement as measured
     from studies.command.comparison import compare as differences
     from studies.command.comparison import report
 
+    if measured.against(one, two):
+        for run in measured.runs_of(one).values():
+            measured.overlay(run, two, shift)  # before a folder is made
+        folder = _folder("compare", None, "", out, None)
+        return _finish(lambda progress: measured.report(one, two, folder, shift), folder, as_json)
+    if shift is not None:
+        raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
     differences(one, two)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
     _finish(lambda progress: report(one, two, folder), folder, as_json)
+
+
+@app.command()
+def export(
+    scene: SceneName,
+    engine: Annotated[str, typer.Option(help="mujoco, for an MJCF file, or exudyn, for a script in Python.")],
+    out: Annotated[Path | None, typer.Option(help="The file to write; SCENE_ENGINE.xml or .py here if none.")] = None,
+    changes: Changes = None,
+) -> None:
+    """Write the vehicle of a scene as a file of an engine that opens without twinrig.
+
+    It has what the engine has as its own: bodies, joints, weights, springs and dampers. Forces that are functions of
+    twinrig, such as tyres, stay behind; the file and the terminal name each of them.
+    """
+    from studies.command.export import export as write
+
+    print("\n".join(write(load_scene(scene, changes), engine, out)))
 
 
 @app.command()

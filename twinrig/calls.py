@@ -147,16 +147,29 @@ def read(path: str | Path) -> "Result":
     return Result(load_result(Path(path)).data)
 
 
-def compare(one: "Result | str | Path", two: "Result | str | Path") -> "Report":
-    """Lay two results of one kind beside each other: differences of all quantities, those that differ most first.
+def compare(one: "Result | str | Path", two: "Result | str | Path", shift: float | None = None) -> "Report":
+    """Lay two results of one kind beside each other, or a measurement over a result.
 
-    Each is a result or the file of a saved one. The detail is a list of ``Difference``: ``two`` less ``one``, with the
-    place where it is largest and whether it lies within the errors that both state. Raises InputError for results that
-    have nothing in common.
+    Each is a result or the file of a saved one; ``two`` may be the file of a measurement, whose channels have the names
+    of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of ``Difference``, those
+    that differ most first: ``two`` less ``one``, with the place where it is largest and whether it lies within the
+    errors that both state. That of a measurement is an ``Overlay``: the time shift, and the error of every channel.
+
+    shift : s, what the measurement's clock shows at the run's time 0; sought where None. Raises InputError for what has
+    nothing in common.
     """
+    from models.measured.file_kinds import is_measurement
     from studies.command.comparison import compare_runs, lines
     from twinrig.report import Report
 
+    if isinstance(two, str | Path) and Path(two).suffix != ".nc" and is_measurement(Path(two)):
+        from studies.command.against_measurement import overlay
+
+        laid = overlay(_result(one), two, shift)
+        values = {"shift": laid.shift.seconds, "channels": {each.name: each.values() for each in laid.matches}}
+        return Report((f"{two} over {_name(one, 'the run')}", *laid.lines()), values, laid)
+    if shift is not None:
+        raise InputError("compare", "shift", shift, "belongs to a comparison of a run with a measurement")
     names = (_name(one, "the first"), _name(two, "the second"))
     differences, notes = compare_runs(_result(one), _result(two), names)
     values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in differences}

@@ -49,9 +49,9 @@ def blank(name: str, numbers: Array, integrator: str, gravity: Any) -> Any:
     return spec
 
 
-def add_joint(body: Any, kind: str, axis: tuple[float, float, float], **springs: float) -> None:
-    """A joint, "slide" or "hinge", along or about an axis."""
-    body.add_joint(type=getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}"), axis=axis, **springs)
+def add_joint(body: Any, kind: str, axis: tuple[float, float, float], **more: Any) -> None:
+    """A joint, "slide" or "hinge", along or about an axis; ``more`` : of MuJoCo's, such as stiffness or a name."""
+    body.add_joint(type=getattr(mujoco.mjtJoint, f"mjJNT_{kind.upper()}"), axis=axis, **more)
 
 
 def compiled(spec: Any) -> mujoco.MjModel:

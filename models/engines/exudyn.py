@@ -18,7 +18,7 @@ from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
 from models.engines.protocol import balanced, guard, landings_followed
-from models.vehicles.description import PitchSpring, Point, Strut, matrices
+from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
 exu.config.printToConsole = False
 items: Any = typed_items
@@ -68,6 +68,7 @@ def _exact(assembly: Assembly) -> Build:
     for strut in (strut for strut in assembly.vehicle.struts if not strut.pushes_only):
         mbs.AddObject(
             items.CartesianSpringDamper(
+                name=f"strut {strut.name!r}",
                 markerNumbers=[end(strut.lower), end(strut.upper)],
                 stiffness=[0, strut.stiffness, 0],
                 damping=[0, strut.damping, 0],
@@ -152,6 +153,19 @@ def _linear(assembly: Assembly) -> Build:
     return built
 
 
+def native(assembly: Assembly) -> Build:
+    """Bodies, weights, springs and dampers without any input, in a system that is not assembled yet."""
+    return _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+
+
+def columns(built: Build, vehicle: Vehicle) -> list[int]:
+    """Place of each of the four coordinates within Exudyn's vector, once the system is assembled."""
+    if vehicle.geometry == "linear":
+        return [0, 1, 2, 3]
+    start = {name: built.mbs.GetNodeODE2Index(node) for name, node in built.nodes.items()}
+    return [start[body] + (1 if kind == "z" else 2) for body, kind in vehicle.coordinates()]
+
+
 def _drive(built: Build, assembly: Assembly, clock: Clock) -> None:
     """Put the input onto the wheels (and the chassis, for forces along its own axis)."""
     if clock.held:
@@ -219,7 +233,7 @@ class ExudynModel:
 
     def __init__(self, assembly: Assembly, settings: Settings) -> None:
         self.assembly, self.settings = assembly, settings
-        self.built = _exact(assembly) if assembly.vehicle.geometry == "exact" else _linear(assembly)
+        self.built = native(assembly)
         if assembly.input is not None:
             self.clock = Clock(assembly.input, settings)
             _drive(self.built, assembly, self.clock)
@@ -243,15 +257,8 @@ class ExudynModel:
             for constraint in self.constraints
         ]
         mbs.Assemble()
-        self._columns = self._find_columns()
+        self._columns = columns(self.built, assembly.vehicle)
         self._set_state(assembly.initial)
-
-    def _find_columns(self) -> list[int]:
-        """Place of each of the four coordinates within Exudyn's vector."""
-        if self.assembly.vehicle.geometry == "linear":
-            return [0, 1, 2, 3]
-        start = {name: self.built.mbs.GetNodeODE2Index(node) for name, node in self.built.nodes.items()}
-        return [start[body] + (1 if kind == "z" else 2) for body, kind in self.assembly.vehicle.coordinates()]
 
     def _set_state(self, state: np.ndarray) -> None:
         data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial

@@ -92,10 +92,13 @@ class Build:
         self.mbs.AddObject(items.CartesianSpringDamper(markerNumbers=[first, second], **law))
         self.callbacks += "springForceUserFunction" in law
 
-    def connect(self, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
+    def connect(self, name: str, first: Any, second: Any, law: Callable[[Any, Any], list[float]]) -> None:
         """Two points and the force (N, space's axes) on the first by the second's position and rate beside it."""
         self.spring(
-            first, second, springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate)
+            first,
+            second,
+            name=name,
+            springForceUserFunction=lambda mbs, t, item, apart, rate, k, d, offset: law(apart, rate),
         )
 
 

@@ -57,22 +57,35 @@ def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
     return only
 
 
-def compiled_model(driven: Driven) -> mujoco.MjModel:
-    """Bodies, joints, springs and the callback's numbers, without the callback."""
-    numbers, parts = driven.numbers, driven.parts
-    merged = {name: rider for name, rider in carriers(driven.vehicle).items() if name not in ends(parts)}
-    spec = spec_of(driven.vehicle, 1e-3, merged)
-    add_parts(spec, driven.vehicle, parts)
+def specified(driven: Driven) -> mujoco.MjSpec:
+    """Bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills."""
+    spec = spec_of(driven.vehicle, 1e-3, _merged(driven))
+    add_parts(spec, driven.vehicle, driven.parts)
     spec.option.gravity = driven.gravity
-    spec.add_numeric(name="vehicle", size=numbers.size, data=[0.0])
+    spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
+    return spec
+
+
+def _merged(driven: Driven) -> dict[str, str]:
+    """Bodies that are one with the only one that rides on each, and bear no end of a spring."""
+    return {name: rider for name, rider in carriers(driven.vehicle).items() if name not in ends(driven.parts)}
+
+
+def compiled(spec: mujoco.MjSpec, driven: Driven) -> mujoco.MjModel:
+    """The model of ``specified`` with all its numbers, without the callback."""
     model = spec.compile()
-    model.numeric_data[:] = numbers
-    places = Numbers(driven.vehicle, model, merged)
+    model.numeric_data[:] = driven.numbers
+    places = Numbers(driven.vehicle, model, _merged(driven))
     if not np.array_equal(places.columns, np.arange(driven.size)):
         raise ValueError("the bodies are not in the order of a walk through their tree")
     weigh(model, places, driven.vehicle.bodies)
-    set_laws(model, parts)
+    set_laws(model, driven.parts)
     return model
+
+
+def compiled_model(driven: Driven) -> mujoco.MjModel:
+    """Bodies, joints, springs and the callback's numbers, without the callback."""
+    return compiled(specified(driven), driven)
 
 
 def share(driven: Driven) -> tuple[tuple[str, ...], int]:

@@ -74,15 +74,16 @@ def _spring(built: Build, spring: SpringDamper) -> None:
     rest = np.subtract(spring.point_two, spring.point_one)
     curved = spring.travel_force or spring.rate_force or spring.friction
     if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
-        return built.connect(one, two, _law(spring, axis, rest, held))
+        return built.connect(f"spring {spring.name!r}", one, two, _law(spring, axis, rest, held))
     sunk = held / spring.stiffness if spring.stiffness else 0.0
     if upright:
         diagonal = axis**2
         law = {"stiffness": spring.stiffness * diagonal, "damping": spring.damping * diagonal}
-        return built.spring(one, two, **law, offset=rest - sunk * axis)
+        return built.spring(one, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
     sign = -1 if built.vehicle.turns(spring.one) else 1  # the axis is one of the first marker's body
     built.mbs.AddObject(
         items.LinearSpringDamper(
+            name=f"spring {spring.name!r}",
             markerNumbers=[one, two][::sign],
             axisMarker0=sign * built.own(ends[::sign][0], axis),
             stiffness=spring.stiffness,
@@ -130,13 +131,16 @@ def _bar(built: Build, bar: AntiRollBar) -> None:
         rates = [read.GetMarkerOutput(marker, KINDS.Velocity)[2] for marker in (right, left)] if c else [0.0, 0.0]
         return moment(heights[0] - heights[1], rates[0] - rates[1])
 
-    built.connect(left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
+    name = f"anti-roll bar {bar.name!r}"
+    built.connect(name, left, right, lambda apart, rate: [0.0, 0.0, moment(apart[2], rate[2]) / track])
     if (bar.body, "rx") in built.places:
         node, index = built.places[bar.body, "rx"]
         still = built.coordinate(built.mbs.AddNode(items.NodePointGround()), 0)
         rolling = built.coordinate(node, index)
         built.mbs.AddObject(
-            items.CoordinateSpringDamper(markerNumbers=[still, rolling], springForceUserFunction=on_body)
+            items.CoordinateSpringDamper(
+                name=f"{name}, on {bar.body!r}", markerNumbers=[still, rolling], springForceUserFunction=on_body
+            )
         )
         built.callbacks += 1
 
@@ -146,11 +150,13 @@ def _turning_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
     marker, held = built.marker(tyre.body, tyre.point), built.held.tyres[tyre.name]
     sunk = held / tyre.stiffness if tyre.stiffness else 0.0
     law = {"stiffness": [0, 0, tyre.stiffness], "damping": [0, 0, tyre.damping], "offset": [0, 0, sunk]}
-    built.spring(built.marker(None, tyre.point), marker, **law)
+    built.spring(built.marker(None, tyre.point), marker, **law, name=f"tyre {tyre.name!r}")
     force = road.forces(np.outer(by_road, (0.0, 0.0, 1.0)))
     built.mbs.AddLoad(
         items.LoadForceVector(
-            markerNumber=marker, loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)]
+            name=f"road under the tyre {tyre.name!r}, flat here",
+            markerNumber=marker,
+            loadVectorUserFunction=lambda mbs, t, load: force.rows[round(t * road.per_time)],
         )
     )
     built.callbacks += 1
@@ -178,6 +184,7 @@ def _steady_tyres(built: Build, tyres: list[Tyre], by_road: np.ndarray, road: Ro
     force = road.forces(by_road @ rows)
     built.mbs.AddObject(
         items.ObjectGenericODE2(
+            name=f"tyres {', '.join(repr(tyre.name) for tyre in tyres)}",
             nodeNumbers=nodes,
             massMatrix=np.zeros((rows.shape[1],) * 2),
             stiffnessMatrix=rows.T * stiffness @ rows,
@@ -200,7 +207,8 @@ def _pushing_tyre(built: Build, tyre: Tyre, by_road: np.ndarray, road: RoadTable
         return [0.0, 0.0, -max(min(elastic + c * (rate - speed[2]), 2.0 * elastic), 0.0)]
 
     on_road = built.marker(None, (tyre.point[0], tyre.point[1], 0.0))
-    built.spring(on_road, built.marker(tyre.body, tyre.point), springForceUserFunction=law)
+    name = f"tyre {tyre.name!r}, which only pushes"
+    built.spring(on_road, built.marker(tyre.body, tyre.point), name=name, springForceUserFunction=law)
 
 
 def _tyres(built: Build, road: RoadTable) -> None:
@@ -223,7 +231,9 @@ def _side_force(built: Build, force: SideForce, speed: float) -> None:
     def law(apart: Any, rate: Any) -> list[float]:
         return [0.0, force.stiffness * (rate[1] / speed - force.roll_steer * roll() - yaw()), 0.0]
 
-    built.connect(built.marker(None, force.point), built.marker(force.body, force.point), law)
+    built.connect(
+        f"side force {force.name!r}", built.marker(None, force.point), built.marker(force.body, force.point), law
+    )
 
 
 def _trees(vehicle: SpatialVehicle) -> list[list[Body]]:

@@ -70,6 +70,19 @@ def build(
     speed : m/s, for side forces and drag; InputError where they miss it.
     road : heights (m) under the tyres, then their rates (m/s), at every half step: (2 steps + 1, 2 w); None: flat.
     """
+    check_whole(engine, vehicle)
+    linear = linearise(vehicle, speed)
+    if settings is not None:
+        _check(engine, linear, settings, road)
+    elif road is not None:
+        raise Refused(engine, "a road is read by half steps: it needs settings with a step")
+    kind = getattr(import_module(f"models.engines.spatial_{engine}"), f"Spatial{engine.capitalize()}")
+    model: SpatialModel = kind(vehicle, settings, speed, road)
+    return model
+
+
+def check_whole(engine: str, vehicle: SpatialVehicle) -> None:
+    """Refuse a vehicle that "exudyn" and "mujoco" cannot build: a reduced one, and axes that turn with a body."""
     if vehicle.limits:
         raise Refused(
             engine,
@@ -82,14 +95,6 @@ def build(
             f"the axis of {spring.name!r} is fixed in {spring.frame!r}: in ride the engines know axes that are fixed "
             "in the space; use --engine reference, whose closed form has the others, or leave out frame",
         )
-    linear = linearise(vehicle, speed)
-    if settings is not None:
-        _check(engine, linear, settings, road)
-    elif road is not None:
-        raise Refused(engine, "a road is read by half steps: it needs settings with a step")
-    kind = getattr(import_module(f"models.engines.spatial_{engine}"), f"Spatial{engine.capitalize()}")
-    model: SpatialModel = kind(vehicle, settings, speed, road)
-    return model
 
 
 def _check(engine: str, linear: LinearVehicle, settings: Settings, road: np.ndarray | None) -> None:

@@ -26,15 +26,21 @@ JOINTS = (
     ("hinge", (0.0, 1.0, 0.0)),
 )
 """Kind and axis, from the track to the wheelset."""
+COORDINATES = ("y", "z", "yaw", "roll", "spin")
+"""Of the joints."""
+NAME = "wheelset"
+"""Of the body."""
 
 
-def model(numbers: Array, body: Body) -> mujoco.MjModel:
-    """The wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in the model."""
+def specified(numbers: Array, body: Body) -> Any:
+    """Specification of the wheelset of ``Equations.body``; ``numbers``, the callback's table, lie in it."""
     spec = blank("rails", numbers, "RK4", leaning(GRAVITY, body))
     inertia = body.across, body.along, body.across
-    wheelset = spec.worldbody.add_body(mass=body.mass, inertia=inertia, explicitinertial=True)
-    for joint in JOINTS:
-        add_joint(wheelset, *joint)
+    wheelset = spec.worldbody.add_body(
+        name=NAME, mass=body.mass, ipos=[0.0, 0.0, 0.0], inertia=inertia, explicitinertial=True
+    )
+    for name, joint in zip(COORDINATES, JOINTS, strict=True):
+        add_joint(wheelset, *joint, name=name)
     for name, arm in (("right", body.arm), ("left", -body.arm)):
         wheelset.add_site(name=name, pos=[0.0, arm, 0.0])
         spec.worldbody.add_site(name=f"{name} frame", pos=[0.0, arm, body.sunk])
@@ -43,7 +49,12 @@ def model(numbers: Array, body: Body) -> mujoco.MjModel:
                 strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=name, refsite=f"{name} frame")
                 strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
                 strut.biasprm[:3] = load, -body.stiffness[i], -body.damping[i]
-    return compiled(spec)
+    return spec
+
+
+def model(numbers: Array, body: Body) -> mujoco.MjModel:
+    """The model of ``specified``."""
+    return compiled(specified(numbers, body))
 
 
 def rail_law() -> Any:

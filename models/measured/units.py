@@ -66,11 +66,31 @@ def conversion(unit: str, quantity: Quantity, file: object, place: str) -> float
             f"{_kind(parsed)}, and the channel is mapped as {quantity}: write "
             f"{_like(quantity)}, or map it as what it is{_meant(unit, quantity)}",
         )
-    turned = bool(TURNS & set(re.split(r"[^a-z_]+", str(parsed))))
+    turned = _turned(parsed)
     if turned != (quantity in ("angle", "angular rate")):
         what = "is a unit of angle" if turned else "does not say whether of a turn, a degree or a radian"
         raise InputError(file, place, unit, f"{what}, and the channel is mapped as {quantity}: write {_like(quantity)}")
     return float(_registry().Quantity(1.0, parsed).to(_si(quantity)).magnitude)
+
+
+def factor_between(unit: str, wanted: str, file: object, place: str) -> float:
+    """Factor of a unit to another one: value in ``wanted`` = value * factor.
+
+    Raises InputError at ``file`` and ``place`` where the unit is not known or of another quantity; an angle is no pure
+    number.
+    """
+    goal = _parsed(wanted, "force")
+    accelerates = goal is not None and goal.is_compatible_with(_si("acceleration"))
+    given = _parsed(unit, "acceleration" if accelerates else "force")
+    if given is None or goal is None or not given.is_compatible_with(goal) or _turned(given) != _turned(goal):
+        told = "no such unit is known" if given is None else "is the unit of another quantity"
+        raise InputError(file, place, unit, f"{told}: the channel is in {wanted or '-'}")
+    return float(_registry().Quantity(1.0, given).to(goal).magnitude)
+
+
+def _turned(unit: Any) -> bool:
+    """Whether there is an angle in a unit of pint's."""
+    return bool(TURNS & set(re.split(r"[^a-z_]+", str(unit))))
 
 
 def quantities(unit: str) -> tuple[Quantity, ...]:

@@ -1,0 +1,115 @@
+"""The native part of a vehicle as a file of its engine: MJCF for MuJoCo, a script for Exudyn.
+
+What is written is what the builders of the models make, not a second description: bodies, joints, weights, and the
+springs and dampers that are elements of the engine. Every other force acts in twinrig by compiled functions and stays
+behind; the file and the terminal name each of them.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from models.engines.free_vehicle import Driven
+from models.vehicles.spatial import SpatialVehicle
+
+if TYPE_CHECKING:
+    import mujoco
+
+SUFFIXES = {"mujoco": ".xml", "exudyn": ".py"}
+"""Ends of the names of files, by the engines that have them."""
+SEEN = 1e-6
+"""kg: lighter bodies are carriers of joints and of spin, and no part that people know."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """text : of the file; has : counts of what it holds, in words; left_out : what it does not hold, in words."""
+
+    text: str
+    has: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a file is of. title : of the scene; source : the scene's file; axes : a sentence on directions and zero."""
+
+    title: str
+    source: str
+    axes: str
+
+    def comment(self, has: Sequence[str], left_out: Sequence[str]) -> str:
+        """What stands at the head of a file."""
+        from importlib.metadata import version
+
+        lines = [
+            f"{self.title}",
+            f"From the scene {self.source} by twinrig {version('twinrig')}. SI units. {self.axes}",
+            f"Has {', '.join(has)}.",
+            *(["Leaves out, for these act by functions of twinrig:"] if left_out else ["Leaves nothing out."]),
+            *(f"  {text}" for text in left_out),
+        ]
+        return "\n".join(lines)
+
+
+def of_mujoco(
+    spec: "mujoco.MjSpec", model: "mujoco.MjModel", names: Mapping[str, str], subject: Subject, left_out: Sequence[str]
+) -> Exported:
+    """A model that was compiled from a specification; names : see ``mujoco_export.mjcf``."""
+    from models.engines.mujoco_export import counts, mjcf
+
+    has, missing = tuple(counts(model)), tuple(left_out)
+    return Exported(mjcf(spec, model, names, subject.title, subject.comment(has, missing)), has, missing)
+
+
+def of_exudyn(mbs: Any, coordinates: dict[str, int], subject: Subject, left_out: Sequence[str]) -> Exported:
+    """An assembled system; coordinates : their places in Exudyn's vectors by their names."""
+    from models.engines.exudyn_export import counts, script
+
+    has, missing = tuple(counts(mbs)), tuple(left_out)
+    return Exported(script(mbs, coordinates, subject.comment(has, missing)), has, missing)
+
+
+def of_free(engine: str, driven: Driven, subject: Subject, left_out: Sequence[str]) -> Exported:
+    """A free vehicle without what its kernel does."""
+    if engine == "exudyn":
+        from models.engines.free_vehicle_exudyn import FreeExudyn
+
+        coordinates = {name: i for i, name in enumerate(coordinate_names(driven.vehicle))}
+        return of_exudyn(FreeExudyn(driven).mbs, coordinates, subject, left_out)
+    from models.engines.free_vehicle_mujoco import compiled, specified
+    from models.engines.mujoco_export import add_shapes
+    from models.engines.mujoco_inertia import realisable
+
+    vehicle, lowered = realisable(driven.vehicle)
+    driven = replace(driven, vehicle=vehicle)
+    spec = specified(driven)
+    add_shapes(spec, shown(vehicle, {body.name for body in spec.bodies}))
+    return of_mujoco(spec, compiled(spec, driven), names_of(vehicle), subject, [*left_out, *lowered])
+
+
+def names_of(vehicle: SpatialVehicle) -> dict[str, str]:
+    """Names of bodies and joints in a file by those in a specification of ``mujoco_tree``."""
+    numbers = {body.name: str(i) for i, body in enumerate(vehicle.bodies)}
+    bodies = {number: name if name != "world" else "world of the vehicle" for name, number in numbers.items()}
+    return bodies | {f"{numbers[name]} {freedom}": f"{name} {freedom}" for name, freedom in vehicle.coordinates()}
+
+
+def shown(vehicle: SpatialVehicle, built: Iterable[str]) -> dict[str, float]:
+    """Masses (kg) of the bodies that are shown, by their names in a specification of ``mujoco_tree``."""
+    return {str(i): body.mass for i, body in enumerate(vehicle.bodies) if str(i) in set(built) and body.mass > SEEN}
+
+
+def coordinate_names(vehicle: SpatialVehicle) -> list[str]:
+    """Names of the coordinates in the order of the state."""
+    return [f"{body} {freedom}" for body, freedom in vehicle.coordinates()]
+
+
+def parts_left_out(vehicle: SpatialVehicle, native: Iterable[str] = ()) -> list[str]:
+    """Springs, bars and tyres of a vehicle that are not among the native ones, in words."""
+    kept = set(native)
+    return [
+        *(f"spring {spring.name!r}" for spring in vehicle.springs if spring.name not in kept),
+        *(f"anti-roll bar {bar.name!r}" for bar in vehicle.bars if bar.name not in kept),
+        *(f"tyre {tyre.name!r}" for tyre in vehicle.tyres if tyre.name not in kept),
+    ]

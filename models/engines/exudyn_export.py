@@ -1,0 +1,181 @@
+"""An assembled Exudyn system as a script in Python that builds it again with Exudyn and numpy alone.
+
+The script is read off the system: its nodes, its objects and loads, and the markers that these need, each with the
+values that are not Exudyn's defaults. Functions in Python do not leave the process: an item whose law is a function is
+left out, and an item that a function adds to stays without it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from models.engines.exudyn_system import items
+
+ADDING = ("ObjectKinematicTree", "ObjectGenericODE2")
+"""Items whose user function adds to what they have of their own."""
+ADDED = ": what the road adds, which is flat here"
+"""Behind the name of such an item."""
+FUNCTION, DERIVED = "UserFunction", ("HT", "HTs")
+"""Ends of the names of functions, and of what Exudyn works out of other values."""
+REFERENCES = {"nodeNumber": "node", "markerNumber": "marker", "bodyNumber": "object", "objectNumber": "object"}
+"""Keys, one number or several, that refer to other items."""
+HEAD = '''"""{comment}"""
+
+import exudyn as exu
+import exudyn.itemInterface as items
+import numpy as np
+
+COORDINATES = {coordinates}
+"""Place of every coordinate of the vehicle in the vectors of Exudyn."""
+
+
+def build():
+    """The assembled system."""
+    mbs = exu.SystemContainer().AddSystem()
+{lines}
+    mbs.Assemble()
+    return mbs
+
+
+def accelerations(mbs, q, v):
+    """Accelerations at coordinates and their rates, all in the order of Exudyn."""
+    mbs.systemData.SetODE2Coordinates(q, exu.ConfigurationType.Initial)
+    mbs.systemData.SetODE2Coordinates_t(v, exu.ConfigurationType.Initial)
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    solver = exu.MainSolverImplicitSecondOrder()
+    solver.InitializeSolver(mbs, settings)
+    solver.ComputeMassMatrix(mbs)
+    solver.ComputeODE2RHS(mbs)
+    size = solver.GetODE2size()
+    mass, force = solver.GetSystemMassMatrix()[:size, :size], solver.GetSystemResidual()[:size]
+    solver.FinalizeSolver(mbs, settings)
+    return np.linalg.solve(mass, force)
+
+
+if __name__ == "__main__":
+    system = build()
+    rest = np.zeros(len(system.systemData.GetODE2Coordinates()))
+    found = accelerations(system, rest, rest)
+    for name, place in COORDINATES.items():
+        print(f"{{name}}: acceleration at rest {{found[place]:.6g}}")
+'''
+
+
+def script(mbs: Any, coordinates: dict[str, int], comment: str) -> str:
+    """Text of a script that builds an assembled system.
+
+    coordinates : place of every coordinate in Exudyn's vectors, by its name; comment : for people, at its head.
+    """
+    lines = _Writer(mbs).system()
+    text = comment.replace("\\", "/").replace('"""', "'''")
+    return HEAD.format(comment=text, coordinates=coordinates, lines="\n".join(lines))
+
+
+def counts(mbs: Any) -> Sequence[str]:
+    """What the script of a system builds, in words."""
+    writer = _Writer(mbs)
+    writer.system()
+    return [f"{count} {kind}s" for kind, count in writer.counts.items() if count]
+
+
+def functions(mbs: Any) -> tuple[str, ...]:
+    """What does not leave with a script, by the names of items: those whose law is a function, and what one adds."""
+    writer, data = _Writer(mbs), mbs.systemData
+    places = [("object", i) for i in range(data.NumberOfObjects())] + [("load", i) for i in range(data.NumberOfLoads())]
+    acting = ((kind, item) for kind, item in ((kind, writer.item(kind, i)) for kind, i in places) if _acts(item))
+    return tuple(f"{item['name']}{ADDED if _class(kind, item) in ADDING else ''}" for kind, item in acting)
+
+
+def _acts(item: dict[str, Any]) -> bool:
+    """Whether an item calls a function for its forces."""
+    return any(key.endswith(FUNCTION) and value for key, value in item.items() if not key.startswith("V"))
+
+
+@dataclass
+class _Writer:
+    """Lines that build a system again; an item is written before the first that needs it, and once."""
+
+    mbs: Any
+    lines: list[str] = field(default_factory=list)
+    written: set[str] = field(default_factory=set)
+    counts: dict[str, int] = field(default_factory=lambda: {"node": 0, "object": 0, "marker": 0, "load": 0})
+
+    def system(self) -> list[str]:
+        """All lines: nodes first, so that coordinates keep their order."""
+        data = self.mbs.systemData
+        for kind, count in (
+            ("node", data.NumberOfNodes()),
+            ("object", data.NumberOfObjects()),
+            ("load", data.NumberOfLoads()),
+        ):
+            for number in range(count):
+                if not self._by_function(kind, number):
+                    self.need(kind, number)
+        return self.lines
+
+    def item(self, kind: str, number: int) -> dict[str, Any]:
+        """Exudyn's dictionary of an item."""
+        item: dict[str, Any] = getattr(self.mbs, f"Get{kind.capitalize()}")(number)
+        return item
+
+    def _by_function(self, kind: str, number: int) -> bool:
+        """Whether a function is an item's law."""
+        item = self.item(kind, number)
+        return _acts(item) and _class(kind, item) not in ADDING
+
+    def need(self, kind: str, number: int) -> str:
+        """The variable of an item, which is written now if it was not."""
+        variable = f"{kind}{number}"
+        if variable not in self.written:
+            self.written.add(variable)
+            item = self.item(kind, number)
+            arguments = dict(self._arguments(kind, item))
+            if arguments.get("name") == repr(variable):  # which Exudyn gives what has none
+                del arguments["name"]
+            made = f"items.{_class(kind, item)}({', '.join(f'{key}={text}' for key, text in arguments.items())})"
+            self.lines.append(f"    {variable} = mbs.Add{kind.capitalize()}({made})")
+            self.counts[kind] += 1
+        return variable
+
+    def _arguments(self, kind: str, item: dict[str, Any]) -> Iterator[tuple[str, str]]:
+        """Names and texts of the values that differ from Exudyn's defaults."""
+        usual = dict(getattr(items, _class(kind, item))())
+        for key, value in item.items():
+            referred = REFERENCES.get(key.removesuffix("s"))
+            if key not in usual or key.startswith("V") or key.endswith((FUNCTION, *DERIVED)):
+                continue
+            if referred and key in REFERENCES:
+                if int(value) >= 0:
+                    yield key, self.need(referred, int(value))
+            elif referred:
+                yield key, f"[{', '.join(self.need(referred, int(each)) for each in value)}]"
+            elif (text := _literal(value)) not in (_literal(usual[key]), "[]"):
+                yield key, text
+
+
+def _class(kind: str, item: dict[str, Any]) -> str:
+    """Name of an item's class in exudyn.itemInterface."""
+    return f"{kind.capitalize()}{item[f'{kind}Type']}"
+
+
+def _literal(value: Any) -> str:
+    """A value as the script has it; matrices as arrays, Exudyn's own lists by their constructors."""
+    if isinstance(value, exu.Vector3DList | exu.Matrix3DList):
+        entries: Any = value  # Exudyn's type hints do not know that these are lists
+        inner = ", ".join(_literal(np.asarray(entries[i]).tolist()) for i in range(len(entries)))
+        return f"exu.{type(value).__name__}([{inner}])" if len(entries) else "[]"
+    if isinstance(value, exu.MatrixContainer):
+        return _literal(np.array(value.Convert2DenseMatrix()))
+    if isinstance(value, np.ndarray):
+        return f"np.array({value.tolist()!r})" if value.ndim > 1 and value.size else repr(value.ravel().tolist())
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_literal, value))}]"
+    if hasattr(value, "name") and hasattr(type(value), "__members__"):
+        return f"exu.{type(value).__name__}.{value.name}"
+    if value is None or isinstance(value, bool | int | float | str):
+        return repr(value)
+    raise TypeError(f"{type(value).__name__} has no text in a script")

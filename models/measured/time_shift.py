@@ -1,0 +1,126 @@
+"""By how much a measurement is later than a run: where both are most alike, by cross-correlation, then refined."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+LEAST = 0.5
+"""Share of the shorter of both that must overlap: farther shifts match by chance."""
+MOST = 2**18
+"""Samples of the grid on which shifts are searched."""
+STILL = 1e-9
+"""Variance of a channel, by its mean square, below which it is constant and tells no shift."""
+FINE = 1e-4
+"""Of a step of the grid: how closely the shift is refined."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One channel of a run and of a measurement: times (n,) and values (n,) of the one, times (m,) and values (m,) of
+    the other, NaN where nothing was measured; s, and the same unit."""
+
+    run_times: np.ndarray
+    run: np.ndarray
+    times: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Shift:
+    """seconds : what the measurement's clock shows at the run's time 0; correlation : of both then, the mean over the
+    channels that move, 1 at best, NaN where none moves and the shift is 0."""
+
+    seconds: float
+    correlation: float
+
+
+def time_shift(pairs: Sequence[Pair]) -> Shift:
+    """The shift at which channels correlate best, means and scales aside, to a fraction of a sample."""
+    moving = [pair for pair in pairs if _moves(pair.run) and _moves(pair.values)]
+    if not moving:
+        return Shift(0.0, np.nan)
+    step = _step(moving)
+    coarse = _searched(moving, step)
+    return _refined(moving, coarse, step)
+
+
+def _moves(values: np.ndarray) -> bool:
+    finite = values[np.isfinite(values)]
+    return bool(len(finite) > 2 and np.var(finite) > STILL * np.mean(finite**2))
+
+
+def _step(pairs: Sequence[Pair]) -> float:
+    """Step (s) of the search: that of the finer clock, unless the grid would be too long."""
+    clocks = [times for pair in pairs for times in (pair.run_times, pair.times)]
+    finest = min(float(np.median(np.diff(times))) for times in clocks)
+    longest = max(float(times[-1] - times[0]) for times in clocks)
+    return max(finest, longest / MOST)
+
+
+def _searched(pairs: Sequence[Pair], step: float) -> float:
+    """The shift (s), a whole number of steps beside the two starts, at which the mean correlation is largest."""
+    first = min(float(pair.run_times[0]) for pair in pairs)
+    begin = min(float(pair.times[0]) for pair in pairs)
+    scores = [_correlations(*_on_grid(pair, first, begin, step)) for pair in pairs]
+    length = min(map(len, scores))
+    before = len(_grid(pairs[0].run_times, first, step)) - 1
+    return begin - first + step * (int(np.argmax(sum(score[:length] for score in scores))) - before)
+
+
+def _grid(times: np.ndarray, first: float, step: float) -> np.ndarray:
+    return first + step * np.arange(int((times[-1] - first) / step) + 1)
+
+
+def _on_grid(pair: Pair, first: float, begin: float, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Run (n,), measurement (m,) and whether it was measured (m,), on even times from two starts (s)."""
+    grid, ours, measured = _grid(pair.times, begin, step), _grid(pair.run_times, first, step), np.isfinite(pair.values)
+    there = np.interp(grid, pair.times, measured.astype(float), left=0.0, right=0.0) > 1.0 - 1e-6
+    values = np.interp(grid, pair.times[measured], pair.values[measured])
+    return np.interp(ours, pair.run_times, pair.run), np.where(there, values, 0.0), there
+
+
+def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Correlation (n + m - 1,) at every lag of the measurement, from 1 - n on; -1 where too little overlaps."""
+    from scipy.signal import correlate
+
+    def over(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return correlate(a, b, mode="full", method="fft")
+
+    x, mask = (run - run.mean()) / run.std(), there.astype(float)
+    y = np.where(there, measured - measured[there].mean(), 0.0) / measured[there].std()
+    ones, count = np.ones(len(x)), over(mask, np.ones(len(x)))
+    sums, means = over(mask, x), over(y, ones)
+    safe = np.maximum(count, 1.0)
+    spread = (over(mask, x**2) - sums**2 / safe) * (over(y**2, ones) - means**2 / safe)
+    enough = (count >= LEAST * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
+    found = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
+    return np.where(enough, found, -1.0)
+
+
+def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:
+    """The shift within a step of a coarse one at which the mean correlation is largest, the run read by splines."""
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import minimize_scalar
+
+    curves = [(pair, CubicSpline(pair.run_times, pair.run)) for pair in pairs]
+
+    def apart(seconds: float) -> float:
+        return -float(np.mean([_alike(pair, curve, seconds) for pair, curve in curves]))
+
+    best = minimize_scalar(
+        apart, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": FINE * step}
+    )
+    seconds = float(best.x) if best.fun <= apart(coarse) else coarse
+    return Shift(seconds, -apart(seconds))
+
+
+def _alike(pair: Pair, curve: Callable[[np.ndarray], np.ndarray], seconds: float) -> float:
+    """Correlation of a channel at a shift (s)."""
+    times = pair.times - seconds
+    inside = np.isfinite(pair.values) & (times >= pair.run_times[0]) & (times <= pair.run_times[-1])
+    if np.count_nonzero(inside) < 3:
+        return -1.0
+    pairs = np.array([pair.values[inside], curve(times[inside])])
+    spread = pairs.std(axis=1)
+    return float(np.corrcoef(pairs)[0, 1]) if spread.min() > 0.0 else -1.0

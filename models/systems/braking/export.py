@@ -1,0 +1,16 @@
+"""The vehicle of a braking scene as a file of its engine: bodies and joints of one on its suspension."""
+
+from models.core.errors import InputError
+from models.engines.export import Exported, Subject
+from models.systems.braking.of_scene import sprung_of
+from models.systems.braking.scene import BrakingScene
+from models.systems.handling.export import AXES, of_handling
+
+
+def exported(scene: BrakingScene, engine: str) -> Exported:
+    """The vehicle on its suspension; InputError for one in the plane, which no engine has."""
+    if scene.vehicle.file is None:
+        allowed = "is in the plane, by equations of twinrig's: give vehicle.file, a vehicle on its suspension"
+        raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
+    more = ["spin of the wheels, brakes and controller"]
+    return of_handling(engine, sprung_of(scene).handling, Subject(scene.title, scene.file, AXES), more)

@@ -1,0 +1,20 @@
+"""The vehicle of a scene of handling as a file of its engine: bodies and joints."""
+
+from models.engines.export import Exported, Subject, of_free, parts_left_out
+from models.multibody.numbers import Handling
+from models.systems.handling.run import driven_by
+from models.systems.handling.scene import HandlingScene
+
+AXES = "x forward, y left, z up; the carrier has x, y and yaw, the sway z, roll and pitch; zero is the design."
+
+
+def exported(scene: HandlingScene, engine: str) -> Exported:
+    """The vehicle of the first manoeuvre in "mujoco" or "exudyn" without springs, tyres and driver."""
+    handling = scene.handling(next(iter(scene.manoeuvres)))
+    return of_handling(engine, handling, Subject(scene.title, scene.file, AXES), ["the driver's steer and torques"])
+
+
+def of_handling(engine: str, handling: Handling, subject: Subject, more: list[str]) -> Exported:
+    """A vehicle on a carrier; ``more`` says what else it leaves out."""
+    left_out = [*parts_left_out(handling.vehicle), *more]
+    return of_free(engine, driven_by(handling), subject, left_out)

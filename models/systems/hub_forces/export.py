@@ -1,0 +1,31 @@
+"""The vehicle of a scene of hub forces as a file of its engine: bodies, joints, and the springs that the engine has."""
+
+import numpy as np
+
+from models.engines.export import Exported, Subject, of_free
+from models.engines.free_vehicle import Driven
+from models.engines.native_parts import divide
+from models.systems.hub_forces.scene import HubScene
+from models.vehicles.cut_vehicle import CutVehicle
+
+AXES = "x forward, y left, z up; the chassis has position, heading, pitch (nose down) and roll; zero is the design."
+
+
+def exported(scene: HubScene, engine: str) -> Exported:
+    """The cut vehicle in "mujoco" or "exudyn" without hub forces and stabiliser."""
+    vehicle = scene.cut_vehicle()
+    held = [] if scene.stabilise.method == "none" else [f"stabiliser of roll and pitch ({scene.stabilise.method})"]
+    return of_cut(engine, vehicle, Subject(scene.title, scene.file, AXES), held)
+
+
+def of_cut(engine: str, vehicle: CutVehicle, subject: Subject, more: list[str]) -> Exported:
+    """A cut vehicle; ``more`` says what else it leaves out."""
+    division = divide(vehicle, engine)
+    weight = np.array([0.0, 0.0, -vehicle.tree.gravity])
+    driven = Driven(vehicle.tree, weight, np.zeros(1), None, None, division.native)
+    left_out = [
+        *(f"{name!r}, in part or as a whole: {why}" for name, why in division.reasons.items()),
+        *(f"force and moment at the hub {hub!r}" for hub in vehicle.hubs),
+        *more,
+    ]
+    return of_free(engine, driven, subject, left_out)

@@ -1,0 +1,15 @@
+"""The vehicle of a recording as a file of its engine."""
+
+from models.core.errors import InputError
+from models.engines.export import Exported, Subject
+from models.systems.hub_forces.export import AXES, of_cut
+from models.systems.measured.scene import MeasuredScene
+
+
+def exported(scene: MeasuredScene, engine: str) -> Exported:
+    """The cut vehicle; InputError for the pitch plane, which scenes of its own have."""
+    vehicle = scene.rig().vehicle
+    if vehicle is None:
+        allowed = "is driven in the pitch plane: export a scene of that system with the same parameters"
+        raise InputError(scene.file, "vehicle.parameters", scene.vehicle.parameters, allowed)
+    return of_cut(engine, vehicle, Subject(scene.title, scene.file, AXES), ["stabiliser of roll and pitch"])

@@ -1,0 +1,57 @@
+"""The pitch-plane vehicle as a file of its engine: bodies, struts, tyres and pitch springs, without what drives it."""
+
+from models.engines.assembly import Assembly, Settings
+from models.engines.export import Exported, Subject, of_exudyn, of_mujoco
+from models.systems.pitch_plane.scene import Scene, assemble, settings_of
+
+AXES = {
+    "mujoco": "x forward, y right, z down, so that gravity is positive; pitch is positive with the nose up.",
+    "exudyn": "x backward, y down; pitch is positive with the nose up.",
+}
+INPUTS = {
+    "free": (),
+    "road": ("road under the tyres, flat here",),
+    "force": ("forces at the wheels, in the inertial frame",),
+    "force-body": ("forces at the wheels, along the chassis' own axis",),
+    "pitch": ("forces at the wheels", "prescribed pitch, free here"),
+    "heave-pitch": ("forces at the wheels", "prescribed heave and pitch of the chassis, free here"),
+}
+"""What drives the vehicle, by the mode of its assembly."""
+
+
+def exported(scene: Scene, engine: str) -> Exported:
+    """The vehicle in "mujoco" or "exudyn"."""
+    assembly, subject = assemble(scene), Subject(scene.title, scene.file, AXES[engine])
+    left_out = _left_out(assembly)
+    if engine == "exudyn":
+        return _in_exudyn(assembly, subject, left_out)
+    return _in_mujoco(assembly, settings_of(scene, engine), subject, left_out)
+
+
+def _left_out(assembly: Assembly) -> list[str]:
+    """Inputs, and what goes slack within a step."""
+    vehicle = assembly.vehicle
+    return [
+        *INPUTS[assembly.mode],
+        *(["moment that holds the pitch"] if assembly.moment is not None else []),
+        *(f"tyre {tyre.name!r}, which only pushes" for tyre in vehicle.tyres if tyre.pushes_only),
+        *(f"pitch spring of {each.body!r}, with its dead band" for each in vehicle.pitch_springs if each.dead_band),
+    ]
+
+
+def _in_mujoco(assembly: Assembly, settings: Settings, subject: Subject, left_out: list[str]) -> Exported:
+    from models.engines.mujoco import specification
+    from models.engines.mujoco_export import add_shapes
+
+    spec = specification(assembly.vehicle, settings)
+    add_shapes(spec, {body.name: body.mass for body in assembly.vehicle.bodies})
+    return of_mujoco(spec, spec.compile(), {}, subject, left_out)
+
+
+def _in_exudyn(assembly: Assembly, subject: Subject, left_out: list[str]) -> Exported:
+    from models.engines.exudyn import columns, native
+
+    built, vehicle = native(assembly), assembly.vehicle
+    built.mbs.Assemble()
+    names = [" ".join(place) for place in vehicle.coordinates()]
+    return of_exudyn(built.mbs, dict(zip(names, columns(built, vehicle), strict=True)), subject, left_out)

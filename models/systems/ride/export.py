@@ -1,0 +1,63 @@
+"""The vehicle of a scene of ride as a file of its engine."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.engines.export import (
+    Exported,
+    Subject,
+    coordinate_names,
+    names_of,
+    of_exudyn,
+    of_mujoco,
+    parts_left_out,
+    shown,
+)
+from models.engines.spatial_protocol import check_whole
+from models.systems.ride.of_scene import vehicle_of
+from models.systems.ride.scene import RideScene
+from models.vehicles.spatial import SpatialVehicle
+
+AXES = "x forward, y left, z up from the ground; the frame moves with the vehicle; zero is the design position."
+
+
+def exported(scene: RideScene, engine: str) -> Exported:
+    """The vehicle in "mujoco", bodies and joints, or in "exudyn", with linear springs and tyres; Refused for reduced
+    vehicles."""
+    vehicle = vehicle_of(scene)
+    check_whole(engine, vehicle)
+    by_speed = [
+        *(f"side force {force.name!r}" for force in vehicle.side_forces),
+        *(f"drag of {drag.body!r}" for drag in vehicle.drags),
+    ]
+    still = replace(vehicle, side_forces=(), drags=(), outputs=())
+    subject = Subject(scene.title, scene.file, AXES)
+    return (_in_exudyn if engine == "exudyn" else _in_mujoco)(still, subject, by_speed)
+
+
+def _in_exudyn(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
+    from models.engines.exudyn_export import functions
+    from models.engines.spatial_exudyn_build import RoadTable, assemble
+
+    built = assemble(vehicle, None, RoadTable(np.zeros((1, 2 * len(vehicle.tyres))), 0.0))
+    mbs = built.mbs
+    mbs.Assemble()
+    places = [built.places[place] for place in vehicle.coordinates()]
+    columns = [mbs.GetNodeODE2Index(node) + index for node, index in places]
+    names = dict(zip(coordinate_names(vehicle), columns, strict=True))
+    return of_exudyn(mbs, names, subject, [*functions(mbs), *by_speed])
+
+
+def _in_mujoco(vehicle: SpatialVehicle, subject: Subject, by_speed: list[str]) -> Exported:
+    from models.engines.mujoco_export import add_shapes
+    from models.engines.mujoco_inertia import realisable
+    from models.engines.mujoco_tree import Numbers, spec_of, weigh
+
+    left_out = [*parts_left_out(vehicle), *by_speed]
+    vehicle, lowered = realisable(vehicle)
+    spec = spec_of(vehicle, 1e-3)
+    add_shapes(spec, shown(vehicle, {body.name for body in spec.bodies}))
+    model = spec.compile()
+    weigh(model, Numbers(vehicle, model), vehicle.bodies)
+    return of_mujoco(spec, model, names_of(vehicle), subject, [*left_out, *lowered])

@@ -1,0 +1,231 @@
+"""A measurement laid over a run: channels by name and unit, the time shift, the error of each channel, a figure."""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.core.discretisation import errors_of
+from models.core.errors import InputError, suggestion
+from models.core.result import Result, load
+from models.core.whole_files import whole_file
+from models.measured.channel import Channel, Source
+from models.measured.file_kinds import is_measurement
+from models.measured.formats import open_source
+from models.measured.time_shift import Pair, Shift, time_shift
+from models.measured.timing import timing
+from models.measured.units import factor_between
+from studies.command.comparison import Quantity, channels_of
+
+OVER = "time [s]"
+DOUBTED = 0.5
+"""Correlation below which a time shift is in doubt."""
+SHOWN = 4
+"""Channels in the figure, those of the largest relative error."""
+HEADS = ("channel", "unit", "rms error", "relative", "peak error", "at [s]", "stated error")
+
+
+@dataclass(frozen=True)
+class Match:
+    """A channel of both: values (n,) at times (n,) of the run (s), in the run's unit.
+
+    stated : error that the run states for it, NaN where it states none.
+    """
+
+    name: str
+    unit: str
+    times: np.ndarray
+    run: np.ndarray
+    measured: np.ndarray
+    stated: float
+
+    @property
+    def error(self) -> np.ndarray:
+        """(n,): run less measurement."""
+        return self.run - self.measured
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the error."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def relative(self) -> float:
+        """The same by the standard deviation of the measurement; infinite where that does not move."""
+        size = float(np.std(self.measured))
+        return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
+
+    @property
+    def row(self) -> int:
+        """Where the error is largest."""
+        return int(np.abs(self.error).argmax())
+
+    @property
+    def peak(self) -> float:
+        """The error of the largest magnitude, with its sign."""
+        return float(self.error[self.row])
+
+    @property
+    def at(self) -> float:
+        """Time (s) of the run at which that is."""
+        return float(self.times[self.row])
+
+    def values(self) -> dict[str, float | None]:
+        """Plain values; None for what is no number."""
+        plain = {"rms": self.rms, "relative": self.relative, "peak": self.peak, "at": self.at, "stated": self.stated}
+        return {key: value if np.isfinite(value) else None for key, value in plain.items()}
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """A measurement over one run: its shift, the channels of both, and notes on what could not be compared."""
+
+    shift: Shift
+    matches: list[Match]
+    notes: list[str]
+
+    def lines(self) -> list[str]:
+        """Lines for the screen."""
+        head = f"  {HEADS[0]:<28} {HEADS[2]:>11} {'unit':<8} {HEADS[3]:>9} {HEADS[4]:>11}  at"
+        rows = [
+            f"  {each.name:<28} {each.rms:>11.4g} {each.unit or '-':<8} {each.relative:>9.2%} {each.peak:>11.4g}  "
+            f"{each.at:.6g} s{_within(each)}"
+            for each in self.matches
+        ]
+        return [f"  {self.told()}", head, *rows, *(f"  {note}" for note in self.notes)]
+
+    def told(self) -> str:
+        """A sentence on the shift."""
+        shift, alike = self.shift.seconds, self.shift.correlation
+        if np.isnan(alike):
+            return f"time shift {shift:.6g} s: as given, or nothing moves by which one could be told"
+        doubt = "" if alike >= DOUBTED else "; in doubt, as both are hardly alike: name it with --shift"
+        return f"time shift {shift:.6g} s, by which the measurement is later (correlation {alike:.4f}){doubt}"
+
+
+def _within(match: Match) -> str:
+    return f"; rms within the run's own error of {match.stated:.2g}" if match.rms <= match.stated else ""
+
+
+def against(one: Path, two: Path) -> bool:
+    """Whether a comparison is of a run with a measurement: a saved result or a folder, and a file of measurements."""
+    return (one.is_dir() or one.suffix == ".nc") and not two.is_dir() and two.suffix != ".nc" and is_measurement(two)
+
+
+def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
+    """Lay a measurement over a run, largest relative error first.
+
+    Headers are ``name [unit]``, names those of the run's channels; units are converted. shift : s, what the
+    measurement's clock shows at the run's time 0; sought where None. Raises InputError for a file without any channel
+    of the run, and for a unit that does not fit.
+    """
+    timed = ((name, each) for name, each in channels_of(run.data) if each.over == OVER and len(each.grid) > 3)
+    ours = {name: each for name, each in timed if np.isfinite(each.values).all()}
+    if not ours:
+        raise InputError("compare", "", None, "the run has no channels over time: a measurement cannot lie over it")
+    source = open_source(file)
+    named = [channel for channel in source.channels if channel.name in ours]
+    if not named:
+        theirs = [channel.name for channel in source.channels]
+        name = next((each for each in theirs if suggestion(each, tuple(ours))), theirs[0] if theirs else None)
+        raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
+    pairs = {channel.name: _pair(source, channel, ours[channel.name]) for channel in named}
+    found = time_shift(list(pairs.values())) if shift is None else Shift(shift, np.nan)
+    matches = [_match(name, pair, ours[name].unit, found.seconds, run) for name, pair in pairs.items()]
+    kept = [match for match in matches if match is not None]
+    if not kept:
+        raise InputError(file, "time", found.seconds, "at this time shift (s) no sample lies within the run")
+    return Overlay(found, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours)])
+
+
+def _notes(source: Source, ours: Mapping[str, Quantity]) -> Iterator[str]:
+    """Channels of the file that the run does not have, each with the nearest name."""
+    for channel in source.channels:
+        if channel.name not in ours:
+            yield f"not compared: {channel.name!r} is no channel of the run{suggestion(channel.name, tuple(ours))}"
+
+
+def _pair(source: Source, channel: Channel, ours: Quantity) -> Pair:
+    """A channel of both, in the unit of the run."""
+    if not channel.unit and ours.unit not in ("", "-"):
+        allowed = f"has no unit: write {channel.name} [{ours.unit}] in the header, or its unit there"
+        raise InputError(source.path, channel.name, None, allowed)
+    factor = factor_between(channel.unit, ours.unit, source.path, channel.name)
+    blocks = list(source.blocks([channel.name]))
+    times, values = (np.concatenate(parts) for parts in zip(*((b.times, b.values[:, 0]) for b in blocks), strict=True))
+    clock = timing(times, str(source.path), (channel.name,))
+    return Pair(ours.grid, ours.values, clock.times, factor * (values if clock.order is None else values[clock.order]))
+
+
+def _match(name: str, pair: Pair, unit: str, shift: float, run: Result) -> Match | None:
+    """A channel of both at the times of the measurement that lie within the run; None where there are none."""
+    from scipy.interpolate import CubicSpline
+
+    times = pair.times - shift
+    slack = 1e-9 * (pair.run_times[-1] - pair.run_times[0])
+    inside = np.isfinite(pair.values) & (times >= pair.run_times[0] - slack) & (times <= pair.run_times[-1] + slack)
+    if not inside.any():
+        return None
+    read = CubicSpline(pair.run_times, pair.run)(times[inside])
+    stated = errors_of(run).get(name.partition(", ")[0])
+    return Match(name, unit, times[inside], read, pair.values[inside], np.nan if stated is None else stated.error)
+
+
+def runs_of(place: Path) -> dict[str, Result]:
+    """The saved results of a file or a folder, by their names; InputError where there are none."""
+    if not place.exists():
+        raise InputError(place, "", None, "no such file or folder")
+    files = [place] if place.is_file() else sorted(place.rglob("*.nc"))
+    if not files:
+        raise InputError(place, "", None, "holds no saved result (.nc): name the folder of a run")
+    return {file.stem: load(file) for file in files}
+
+
+def report(one: Path, two: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
+    """Lay a measurement over the run or the runs of a folder, save ``compare.csv`` and figures, say it in lines."""
+    overlays = {name: overlay(run, two, shift) for name, run in runs_of(one).items()}
+    with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("run", *HEADS))
+        for name, each in overlays.items():
+            for m in each.matches:
+                writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
+    for name, each in overlays.items():
+        draw(each, f"{two.name} over {name}", folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"))
+    table = [line for name, each in overlays.items() for line in _told(name, each, len(overlays))]
+    return {
+        "scene": f"{two} over {one}",
+        "folder": str(folder),
+        "failed": {},
+        "shift": {name: each.shift.seconds for name, each in overlays.items()},
+        "errors of channels": {name: {m.name: m.values() for m in each.matches} for name, each in overlays.items()},
+        "table": table,
+        "results": {},
+    }
+
+
+def _told(name: str, each: Overlay, count: int) -> Sequence[str]:
+    return [*([f"  {name}"] if count > 1 else []), *each.lines()]
+
+
+def draw(each: Overlay, title: str, path: Path) -> None:
+    """Both, and below the error, of the channels of the largest relative error."""
+    from models.drawing.figures import heading, plt, save
+
+    shown = each.matches[:SHOWN]
+    figure, axes = plt.subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
+    for (top, below), match in zip(axes.T, shown, strict=True):
+        unit = match.unit or "-"
+        top.plot(match.times, match.measured, color="#222222", linewidth=1.8, label="measured")
+        top.plot(match.times, match.run, color="#d55e00", linewidth=1.0, label="run")
+        top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
+        below.plot(match.times, match.error, color="#0072b2")
+        below.plot(match.at, match.peak, "o", color="#0072b2", markersize=5)
+        below.set(title=f"rms error {match.rms:.3g} {unit}, {match.relative:.1%}", xlabel="time of the run [s]")
+        below.set_ylabel(f"run less measurement [{unit}]")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    heading(figure, f"{title}: {each.told().partition(';')[0]}", {})
+    save(figure, path)

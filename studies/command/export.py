@@ -1,0 +1,51 @@
+"""The native part of a scene's vehicle, written as a file of an engine: ``twinrig export``."""
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from models.core.errors import InputError
+from models.core.systems import SYSTEMS
+from models.core.whole_files import write_whole
+from models.engines.export import SUFFIXES, Exported
+
+
+def exported(scene: Any, engine: str) -> Exported:
+    """The file's text and what it leaves out; InputError for an engine or a scene that nothing can be left of."""
+    if engine not in SUFFIXES:
+        raise InputError("--engine", "", engine, "no engine that has files of its own", tuple(SUFFIXES))
+    if scene.system not in _systems():
+        allowed = "has no vehicle that an engine builds"
+        raise InputError(scene.file, "system", scene.system, allowed, _systems())
+    answer: Exported = import_module(f"{SYSTEMS[scene.system].package}.export").exported(scene, engine)
+    return answer
+
+
+def _systems() -> tuple[str, ...]:
+    """Systems whose vehicles can be exported: those with a module ``export``."""
+    return tuple(name for name, system in SYSTEMS.items() if find_spec(f"{system.package}.export"))
+
+
+def target(scene: Any, engine: str, out: Path | None) -> Path:
+    """The file to write; InputError where it is there already, has another end, or lies in no folder."""
+    suffix = SUFFIXES.get(engine, "")
+    path = out or Path(f"{Path(scene.file).stem}_{engine}{suffix}")
+    if path.suffix != suffix:
+        raise InputError("--out", "", str(path), f"must end in {suffix} for {engine}")
+    if path.exists():
+        raise InputError("--out", "", str(path), "is there already, and nothing is overwritten: name another file")
+    if not path.parent.is_dir():
+        raise InputError("--out", "", str(path), "lies in a folder that does not exist")
+    return path
+
+
+def export(scene: Any, engine: str, out: Path | None) -> list[str]:
+    """Write the file; lines that say what it has and what it leaves out."""
+    answer = exported(scene, engine)
+    path = target(scene, engine, out)
+    write_whole(path, answer.text)
+    left_out = [f"    {text}" for text in answer.left_out]
+    head = "  left out, for these act by functions of twinrig:" if left_out else "  leaves nothing out"
+    opened = f"python -m mujoco.viewer --mjcf={path}" if engine == "mujoco" else f"python {path}"
+    return [f"{scene.title}: {path}", f"  has {', '.join(answer.has)}", head, *left_out, f"  open it: {opened}"]
