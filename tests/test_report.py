@@ -19,7 +19,7 @@ from validation.common.changes import read as read_earlier
 from validation.common.rows import STATUSES, Observed, Row, behaves, not_run
 from validation.report import page as report
 from validation.report import shares
-from validation.report.numbers import margin, number, numeric_columns, powers, share
+from validation.report.numbers import error, margin, number, numeric_columns, powers, share
 from validation.run import save as _save
 from validation.run import say
 
@@ -112,7 +112,7 @@ def test_verdict_comes_first_and_then_what_is_not_covered(page):
 
 
 def test_each_system_has_a_stated_share_of_the_quick_minute(page):
-    table = page[page.index('<section id="shares">') : page.index('<section id="independence">')]
+    table = page[page.index('<section id="shares"') : page.index('<section id="independence"')]
     lines = [re.findall(r"<td[^>]*>([^<]*)</td>", line) for line in table.split("<tr>")]
     known = lines[[line[:1] for line in lines].index(["pitch-plane"])]
     assert [*known[:3], *known[4:6]] == ["pitch-plane", "3", "4", "400.0", "13 (over)"], "two cases of 200 s each"
@@ -121,9 +121,9 @@ def test_each_system_has_a_stated_share_of_the_quick_minute(page):
 
 def test_gaps_name_systems_without_rows_and_rows_not_run(page):
     gaps = page[page.index('id="gaps"') : page.index('id="system-')]
-    assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, measured, cost:" in gaps
+    assert "No rows yet for contact, ride, rolling-vehicle, anti-lock, measured, cost<" in gaps
     assert "roads.measured" in gaps and "no folder named" in gaps
-    assert "effects" not in gaps.split("No rows yet for")[1].split(":")[0], "it has a row, although a failed one"
+    assert "effects" not in gaps.split("No rows yet for")[1].split("<")[0], "it has a row, although a failed one"
 
 
 def test_failed_rows_stand_at_the_top_with_their_reason(page):
@@ -231,14 +231,16 @@ def test_every_parameter_has_its_unit_and_source(page):
         (0.0, "0"),
         (41, "41"),
         (3.14159, "3.142"),
-        (-2.5, "−2.5"),
+        (-2.5, "-2.5"),
         (0.001, "0.001"),
         (99999.0, "99999"),
         (12345.6, "12346"),
-        (2.5e-16, "250&thinsp;·&thinsp;10<sup>−18</sup>"),
-        (1e-12, "1&thinsp;·&thinsp;10<sup>−12</sup>"),
-        (9.99999e-7, "1&thinsp;·&thinsp;10<sup>−6</sup>"),
-        (2e5, "200&thinsp;·&thinsp;10<sup>3</sup>"),
+        (2.5e-16, "2.5e-16"),
+        (8.8817841970012523e-16, "8.882e-16"),
+        (-3.125e-7, "-3.125e-7"),
+        (1e-12, "1e-12"),
+        (9.99999e-7, "1e-6"),
+        (2e5, "2e5"),
         (100.0, "100"),
         (float("nan"), "not a number"),
         (None, "–"),
@@ -250,6 +252,13 @@ def test_numbers_read_as_an_engineer_writes_them(value, text):
     assert number(value) == text
 
 
+@pytest.mark.parametrize(
+    ("value", "text"), [(8.88e-16, "8.9e-16"), (1e-12, "1e-12"), (0.012345, "0.01235"), (0.0, "0"), (None, "–")]
+)
+def test_errors_beyond_plain_numbers_are_told_by_their_size(value, text):
+    assert error(value) == text
+
+
 def test_margin_needs_numbers_and_a_tolerance():
     assert margin(rows()[0].as_dict()) == pytest.approx(0.07 / 0.15)
     assert margin(rows()[3].as_dict()) is None
@@ -258,8 +267,8 @@ def test_margin_needs_numbers_and_a_tolerance():
 
 def test_shares_and_powers():
     assert [share(x) for x in (0.0, 0.5, 1e-9, None, float("nan"))] == ["0 %", "50 %", "&lt; 0.01 %", "–", "–"]
-    assert "3&thinsp;·&thinsp;10<sup>9</sup> times" in share(3e9)
-    assert "2&thinsp;·&thinsp;10<sup>−6</sup>" in powers("within 2e-06 of it") and powers("1.7e+02") == "170"
+    assert share(3e9) == "3e9 times"
+    assert powers("within 2e-06 of it") == "within 2e-6 of it" and powers("1.7e+02") == "170"
     assert powers("exudyn-1e5x") == "exudyn-1e5x", "a name is no number"
 
 
@@ -307,7 +316,7 @@ def test_the_first_screen_tells_version_commit_date_machine_and_data(tmp_path):
         "data": "3 files",
     }
     (tmp_path / "results.json").write_text(json.dumps(found))
-    top = report.write(tmp_path).read_text(encoding="utf-8").partition('<div class="tiles">')[0]
+    top = report.write(tmp_path).read_text(encoding="utf-8").partition('id="search"')[0]
     told = dict(re.findall(r"<dt>(\w+)</dt><dd>([^<]*)</dd>", top))
     assert told == {
         "version": "1.2",
@@ -342,8 +351,11 @@ def test_what_nothing_independent_notices_stands_under_what_is_not_covered_by_na
     monkeypatch.setattr(report, "blind_spots", partial(blind_spots, tmp_path / "table.csv"))
     page = report.write(folder).read_text(encoding="utf-8")
     gaps = page[page.index('id="gaps"') : page.index('id="system-')]
-    independent, unaudited = gaps.split("noticed by nothing independent")[1].split("not audited")
+    folds = dict(
+        re.findall(r"<summary>\d+ shared functions? (?:is|are) ([^<]*)</summary>(.*?)</details>", gaps, re.DOTALL)
+    )
+    independent, unaudited = folds["noticed by nothing independent"], folds["not audited"]
     assert "models.tyre.bristles:tyre_forces" in independent and "models.tyre.bristles:_mix" not in gaps
     assert "models.tyre.bristles:_creepages" in unaudited
-    section = page[page.index('<section id="blind-spots">') : page.index('<section id="assumptions">')]
+    section = page[page.index('<section id="blind-spots"') : page.index('<section id="assumptions"')]
     assert "commit abc1234" in section and "test_a.py::test_b" in section and "2 of 3" in section

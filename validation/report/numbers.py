@@ -1,4 +1,4 @@
-"""How the report writes numbers and text: four significant digits, engineering notation, margins as shares."""
+"""How the report writes numbers and text: four significant digits, powers of ten as ``e-16``, margins as shares."""
 
 import math
 import re
@@ -13,40 +13,37 @@ PLAIN = (1e-3, 1e5)
 
 
 def number(value: Any, digits: int = 4) -> Markup:
-    """A number with ``digits`` significant ones, powers of ten in threes; text stays text, None a dash."""
+    """A number with so many significant digits, as ``0.0123`` or ``8.9e-16``; text stays text, None a dash."""
     if value is None or value == "":
         return Markup("–")
     if isinstance(value, bool) or not isinstance(value, int | float):
         return escape(value)
     if not math.isfinite(value):
         return Markup("not a number") if math.isnan(value) else Markup("infinite" if value > 0 else "-infinite")
-    if value == 0 or (isinstance(value, int) and abs(value) < 10**7):
-        return Markup(_minus(f"{value:d}" if isinstance(value, int) else "0"))
-    if PLAIN[0] <= abs(value) < PLAIN[1]:
-        return Markup(_minus(_significant(value, digits)))
-    power = _power(value, digits)
-    return Markup(_scientific(_significant(value / 10.0**power, digits), power))
+    if isinstance(value, int) and abs(value) < 10**7:
+        return Markup(value)
+    if value == 0 or PLAIN[0] <= abs(value) < PLAIN[1]:
+        return Markup(_significant(value, digits))
+    return Markup(_scientific(value, digits))
 
 
-def _scientific(mantissa: str, power: int) -> str:
-    return f"{_minus(mantissa)}&thinsp;·&thinsp;10<sup>{_minus(str(power))}</sup>"
+def error(value: Any) -> Markup:
+    """An error or a tolerance: two significant digits say its size, four where it is written without a power of ten."""
+    plain = isinstance(value, int | float) and PLAIN[0] <= abs(value) < PLAIN[1]
+    return number(value, 4 if plain else 2)
 
 
-def _power(value: float, digits: int) -> int:
-    """The multiple of three below the magnitude of the rounded value."""
-    exponent = int(f"{value:.{digits - 1}e}".split("e")[1])
-    return 3 * (exponent // 3)
+def _scientific(value: float, digits: int) -> str:
+    """``8.9e-16``: a power of ten without leading zeros."""
+    mantissa, power = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(power)}"
 
 
 def _significant(value: float, digits: int) -> str:
     """Fixed notation with so many significant digits, without trailing zeros."""
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if value else 0
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
 
 
 def margin(row: dict[str, Any]) -> float | None:
@@ -84,12 +81,11 @@ NUMERIC = re.compile(
 
 
 def powers(cell: Any) -> Markup:
-    """Text with numbers such as 2e-06 written with a power of ten, which does not break across lines."""
+    """Text with numbers such as 2e-06 written ``2e-6``, and those up to a thousand without a power of ten."""
 
-    def written(found: re.Match[str]) -> str:
-        if int(found[2]) in range(4):
-            return _minus(f"{float(found[0]):g}")
-        return f'<span class="nowrap">{_scientific(found[1], int(found[2]))}</span>'
+    def written(match: re.Match[str]) -> str:
+        power = int(match[2])
+        return f"{float(match[0]):g}" if power in range(4) else f"{match[1]}e{power}"
 
     return Markup(POWER.sub(written, str(escape(cell))))
 

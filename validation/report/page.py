@@ -19,7 +19,7 @@ from models.core.errors import InputError
 from models.core.whole_files import write_whole
 from validation.common.rows import STATUSES, Independence, Saved, System, of_saved
 from validation.report.blind_spots import blind_spots
-from validation.report.numbers import duration, margin, marked, number, numeric_columns, powers, share
+from validation.report.numbers import duration, error, margin, marked, number, numeric_columns, powers, share
 from validation.report.shares import case_of, shares
 from validation.report.shown import shown
 
@@ -191,7 +191,7 @@ def page(results: Saved, data: Path, each: Callable[..., Iterable[Any]] = map) -
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (number, share, duration, powers, marked, numeric_columns)
+    filters = (number, error, share, duration, powers, marked, numeric_columns)
     environment.filters |= {filter.__name__: filter for filter in filters}
     environment.globals |= {"margin": margin, "case_of": case_of}
     names = list(dict.fromkeys(map(case_of, results["rows"])))
