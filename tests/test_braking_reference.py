@@ -1,16 +1,19 @@
 """The independent reference of braking on the suspension: its laws, its accelerations, its stops, and its limits."""
 
+import math
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import bernoulli
 
 from models.brake import plain
 from models.brake.plain.suspension import Suspension
 from models.brake.plain.wheel import Force, WheelStep, along_nodes, wheel_step
 from models.brake.plane_vehicle import truck
+from models.brake.wheel_step import passed
 from models.core.errors import Refused, RunFailed
 from models.systems.braking.plan import check
 from models.systems.braking.run import run as drive
@@ -26,6 +29,15 @@ from validation.cases import braking_reference as case
 def test_a_law_is_the_same_by_compiled_and_by_plain_code(name):
     both, bound, _ = case.LAWS[name]
     assert laws.largest(*both(60, seed=5)) < bound
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-3, 9.999e-3, 1.0001e-2, 0.3, 3.0])
+def test_the_integral_of_a_slip_that_decays_is_exact_on_both_sides_of_its_series(size):
+    for decay in (size, -size):
+        # z / (1 - exp(-z)) - 1 by Bernoulli's numbers, whose series converges for |z| < 2 pi
+        exact = sum(float(b) * decay ** (k - 1) / math.factorial(k) for k, b in enumerate(bernoulli(40)) if k > 1) + 0.5
+        way = -math.expm1(-decay) / decay
+        assert passed(way, 1.0, decay, 1.0) == pytest.approx(exact * way, rel=1e-13)
 
 
 def test_the_states_of_the_wheel_reach_every_branch():

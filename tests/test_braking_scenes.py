@@ -10,7 +10,7 @@ import pytest
 
 from models.brake.controller import Command
 from models.brake.port.ask import ControllerFailed
-from models.core.errors import InputError, Refused
+from models.core.errors import InputError
 from models.core.systems import load
 from models.systems.braking.adhesion import Adhesion, NoAdhesion, utilisation
 from models.systems.braking.of_scene import braked
@@ -144,9 +144,11 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
     assert others == pytest.approx(expected, rel=0.02) and own > 1.3 * others
 
 
-def test_an_engine_that_would_leave_the_lag_of_tyres_out_is_refused():
-    with pytest.raises(Refused, match="lag of tyres"):
-        drive(scene(relaxation={"front": 0.5, "rear": 0.5}), "mujoco")
+def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
+    lags = {"relaxation": {"front": 0.02, "rear": 0.5}, "road": {"stretches": [{"left": "dry"}]}}
+    with pytest.raises(InputError, match=r"run\.substeps = 1: must be at least 2: .* rocks up"):
+        ready(scene(run={"sample": 0.01, "substeps": 1}, **lags), "straight")
+    ready(scene(run={"sample": 0.01, "substeps": 2}, **lags), "straight")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():

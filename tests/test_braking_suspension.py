@@ -104,7 +104,6 @@ def test_a_scene_is_marched_by_an_engine_with_its_steady_turn_and_reports_the_bo
 def test_what_a_vehicle_file_has_no_place_for_is_refused():
     for place, tables in (
         ("load_transfer", {"load_transfer": {}}),
-        ("relaxation", {"relaxation": {"front": 1.0, "rear": 1.0}}),
         ("vehicle.spin_inertia", {"vehicle": {"file": "r19_free"}}),
         ("vehicle.override", {"vehicle": {"file": "r19_free", "spin_inertia": 1.0, "override": {"mass": 1.0}}}),
         ("vehicle.spin_inertia", {"vehicle": {"spin_inertia": 1.0}}),

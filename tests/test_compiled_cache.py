@@ -131,5 +131,5 @@ def test_a_kernel_that_is_given_another_one_is_as_old_as_that():
     from models.brake.sprung_step import compiled as stepping
     from models.engines.mujoco_native import accelerate, march
 
-    files = compiled._files(stepping(accelerate, march, "in_a_test").py_func)
+    files = compiled._files(stepping("in_a_test", accelerate=accelerate, march=march).py_func)
     assert {file.name for file in files} >= {"sprung_step.py", "plane_step.py", "mujoco_native.py"}

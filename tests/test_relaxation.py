@@ -9,12 +9,15 @@ import pytest
 
 from models.brake.controller import AllApplied
 from models.brake.plane_vehicle import PAPER, truck
-from models.brake.relaxation import Lag, lag_on, taken_up
+from models.brake.relaxation import DAMPING, Lag, lag_on, longest_step, taken_up
 from models.brake.surfaces import EVEN, OnRoad
 from models.systems.braking.procedures import ready
+from models.systems.braking.run import carried
 from models.systems.braking.scene import build
 from models.tyre.magic_formula import surface
 from models.tyre.tyre_table import stacked
+from validation.braking import plain_sprung as whole
+from validation.cases import braking_relaxation as case
 
 
 def test_the_law_is_exact_whatever_the_step():
@@ -27,7 +30,7 @@ def test_the_law_is_exact_whatever_the_step():
     assert taken_up(a, u, v, 9.0, length) == pytest.approx(v / u, rel=1e-14)
 
 
-def stop(length=None, steer=0.03, substeps=4, duration=20.0):
+def stop(length=None, steer=0.03, substeps=4, duration=20.0, engine="reference"):
     scene = build(
         {
             "title": "t",
@@ -42,7 +45,7 @@ def stop(length=None, steer=0.03, substeps=4, duration=20.0):
     vehicle, start = ready(scene, "j")
     if length is not None:
         vehicle = replace(vehicle, relaxation=np.full(4, length))
-    return vehicle.run(AllApplied(4), start, duration)
+    return carried(vehicle, engine).run(AllApplied(4), start, duration)
 
 
 def test_a_j_turn_with_lag_tends_to_the_one_without_and_mirrors():
@@ -76,5 +79,35 @@ def test_it_damps_at_rest():
 
 
 def test_a_run_without_it_imports_nothing_of_it():
-    code = "import sys, models.systems.braking.run; sys.exit('models.brake.relaxation' in sys.modules)"
+    parts = "models.systems.braking.run, models.engines.braking_sprung, models.engines.braking_sprung_plain"
+    code = f"import sys, {parts}; sys.exit(any('relaxation' in name for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("lively", [9.81, 25.0])
+def test_a_vehicle_at_rest_rocks_up_in_longer_steps_than_the_longest_and_in_no_shorter_ones(lively):
+    slope, length = 20.0, 0.3
+    rate, damped = slope * lively / length, 2.0 * DAMPING * slope * lively / np.sqrt(slope * 9.81 * length)
+    for factor, grows in ((0.99, False), (1.01, True)):
+        step = factor * longest_step(slope, lively, length)
+        # y' = y + h v, then v' = v - h (w^2 y' + c v): way and speed across
+        across = np.array([[1.0, step], [-step * rate, 1.0 - step * damped - step**2 * rate]])
+        assert (np.abs(np.linalg.eigvals(across)).max() > 1.0) == grows
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+def test_a_chassis_in_the_plane_that_an_engine_carries_lags_as_by_its_own_steps(engine):
+    alone, in_engine = (stop(0.5, duration=0.5, engine=name).states[-1, 0] for name in ("reference", engine))
+    without = stop(duration=0.5).states[-1, 0]
+    assert in_engine == pytest.approx(alone, abs=1e-5) and abs(without[1] - alone[1]) > 1e-3
+
+
+def test_slip_angles_on_a_suspension_rise_by_the_way_and_tend_to_those_without_lag():
+    assert case.rise_apart("exudyn") < 2e-6 and case.short_ratio("exudyn") == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_stop_on_a_suspension_is_that_of_plain_code():
+    found = whole.run(whole.car(), "exudyn", 0.05, lags=True)
+    plain = whole.plain_run("car", 0.05, lags=True)
+    assert whole.paths_apart(found, plain) < 1e-10
+    assert whole.paths_apart(found, whole.run(whole.car(), "exudyn", 0.05)) > 1e-3

@@ -72,9 +72,7 @@ def settle(motion, steer, regular, starts, vehicle, frame):
         if starts:
             wheels.start[i] = u
         wheels.rate[i] = ahead + v * rates[2 + k]
-        if not math.isnan(frame.surfaces.lag[i]):
-            v = frame.surfaces.lag[i] * max(u if wheels.start[i] >= 0.0 else -u, regular)
-        slide(i, u, v, regular, angles, wheels)
+        slide(i, u, v, regular, frame.surfaces.lag, angles, wheels)
     inertia(units, rates, plane, frame.mass, frame.right, frame.out, frame.out_before)
     for a in range(prescribed(plane), coordinates(plane)):
         for b in range(prescribed(plane)):
@@ -83,9 +81,12 @@ def settle(motion, steer, regular, starts, vehicle, frame):
 
 
 @inlined
-def slide(i, u, v, regular, angles, wheels):
-    """Take the slip angle of wheel i by the speeds (m/s) u of its centre along it and v of its tyre across it."""
+def slide(i, u, v, regular, lag, angles, wheels):
+    """Take the slip angle of wheel i by the speeds (m/s) u of its centre along it and v of its tyre across it, or in
+    place of v by what lags behind it: lag (W,) of ``Surfaces``."""
     forwards = u if wheels.start[i] >= 0.0 else -u
+    if not math.isnan(lag[i]):
+        v = lag[i] * max(forwards, regular)
     angle = math.atan2(abs(v), max(forwards, regular))
     wheels.along[i], wheels.aside[i], wheels.angle[i] = max(forwards, 0.0), v, angle
     wheels.cell[i], wheels.share[i] = place(angles, angle)

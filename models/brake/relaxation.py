@@ -6,8 +6,8 @@ With a = tan of the slip angle that the tyre has taken up, and u, v the speeds o
 
 which holds at rest too: there the tyre is a spring. It is solved exactly over half a step with the speeds before the
 step and over the other half with those after it; the step between takes the forces at a in its middle: order two, and
-stable at rest for steps below 2 / w0, w0 = sqrt(slope g / sigma). Below ``SLOW`` a damper across the wheel fades in,
-without which a vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
+stable at rest for steps below ``longest_step``. Below ``SLOW`` a damper across the wheel fades in, without which a
+vehicle would rock on these springs. Source: J. E. Bernard, C. L. Clover, Tire modeling for low-speed
 and high-speed calculations, SAE 950311 (recalled, not checked). Along the wheel slip does not lag.
 """
 
@@ -19,10 +19,11 @@ import numpy as np
 from models.brake.advance import AT_REST, FINE, NOT_FOUND, ended
 from models.brake.plane_chain import Point, velocity
 from models.brake.plane_step import step_on
+from models.brake.plane_vehicle import GRAVITY
 from models.brake.samples import compiled
 from models.brake.surfaces import surfaces_of, under_wheels
 from models.brake.wheel_step import SLOWEST, phi_1
-from models.machine.compiled import njit
+from models.machine.compiled import inlined, njit
 
 SLOW = 1.0
 """Speed (m/s) along the wheel below which the damper fades in."""
@@ -43,24 +44,42 @@ def taken_up(a, u, v, time, length):
     return a + (v - abs(u) * a) * phi_1(-abs(u) * time / length) * time / length
 
 
-@njit(cache=True, error_model="numpy")
-def lag_on(state, time, steer, vehicle, lag, lagging):
-    """Move a ``Lag`` on by a time (s), and fill ``lagging`` (W,) with its angles and the damper's part.
+@inlined
+def take_up(i, u, v, time, slope, lag, lagging):
+    """Move the angle of wheel i of a ``Lag`` on by a time (s) at speeds u, v (m/s), and fill its place in ``lagging``
+    (W,) with that and the damper's part; slope : see ``OnRoad``.
 
     What is NaN begins as if the speeds had been there for ever.
     """
+    length = lag.length[i]
+    if math.isnan(lag.angle[i]):
+        lag.angle[i] = v / max(abs(u), SLOWEST)
+    lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
+    fade = max(1.0 - abs(u) / SLOW, 0.0)
+    rate = math.sqrt(max(slope, SLOWEST) * GRAVITY * length)
+    lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
+
+
+def longest_step(slope: float, lively: float, length: float) -> float:
+    """Step (s) above which a vehicle at rest rocks up on tyres of a relaxation length (m).
+
+    slope : largest cornering coefficient (1/rad); lively : rate (m/s^2) at which side forces of slope 1 at 1 m/s damp
+    its liveliest motion, g of a point mass. With w^2 = slope lively / length and c = 2 DAMPING w sqrt(lively / g), the
+    step is v' = v - h (w^2 y + c v), y' = y + h v', whose roots lie within 1 where (h w)^2 + 2 h c < 4.
+    """
+    w, spread = math.sqrt(max(slope, SLOWEST) * lively / length), 2.0 * DAMPING * math.sqrt(lively / GRAVITY)
+    return (math.sqrt(spread**2 + 4.0) - spread) / w
+
+
+@njit(cache=True, error_model="numpy")
+def lag_on(state, time, steer, vehicle, lag, lagging):
+    """Move a ``Lag`` on by a time (s), and fill ``lagging`` (W,): see ``take_up``."""
     plane = vehicle.plane
     for i in range(lag.angle.size):
         k = plane.unit[i]
         vx, vy = velocity(Point(k, plane.place[i, 0], plane.place[i, 1]), state[0], state[1], plane.reach)
         c, s = math.cos(state[0, 2 + k] + steer[i]), math.sin(state[0, 2 + k] + steer[i])
-        u, v, length = c * vx + s * vy, c * vy - s * vx, lag.length[i]
-        if math.isnan(lag.angle[i]):
-            lag.angle[i] = v / max(abs(u), SLOWEST)
-        lag.angle[i] = taken_up(lag.angle[i], u, v, time, length)
-        fade = max(1.0 - abs(u) / SLOW, 0.0)
-        rate = math.sqrt(max(vehicle.slope, SLOWEST) * 9.81 * length)
-        lagging[i] = lag.angle[i] + fade * fade * v * 2.0 * DAMPING / rate
+        take_up(i, c * vx + s * vy, c * vy - s * vx, time, vehicle.slope, lag, lagging)
 
 
 @njit(cache=True, error_model="numpy")

@@ -21,7 +21,7 @@ from models.brake.plane_step import comes_to_rest, slide, tyre
 from models.brake.sprung import PITCH, ROLL
 from models.brake.surfaces import Surfaces, under_wheels
 from models.brake.wheel_step import StepInput, Wheel
-from models.machine.compiled import lean, named, njit
+from models.machine.compiled import inlined, lean, named, njit
 from models.machine.stack import array, at, beyond, doubles, row, start
 from models.multibody.forces import (
     AXLE,
@@ -140,11 +140,11 @@ def fill(block, n, numbers):
 
 
 @lean
-def meet(contacts, regular, angles, wheels):
-    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; angles
-    of the tyres' tables."""
+def meet(contacts, regular, lag, angles, wheels):
+    """Take slip angles and loads of the ``Wheels`` from their ``Contacts``; regular (m/s) : see ``plane_step``; lag
+    (W,) of ``Surfaces``; angles of the tyres' tables."""
     for i in range(contacts.load.size):
-        slide(i, contacts.along[i], contacts.across[i], regular, angles, wheels)
+        slide(i, contacts.along[i], contacts.across[i], regular, lag, angles, wheels)
         wheels.load[i] = contacts.load[i]
 
 
@@ -174,7 +174,7 @@ class OnEngine(NamedTuple):
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
-    its model.
+    its model; lag : of ``models.brake.sprung_relaxation``, empty where tyres answer at once.
     """
 
     numbers: np.ndarray
@@ -185,6 +185,12 @@ class OnEngine(NamedTuple):
     rates: np.ndarray
     liveliness: float
     engine: Any
+    lag: Any = ()
+
+
+@inlined
+def relax(contacts, half, slope, lag, surfaces):
+    """Tyres answer at once; ``models.brake.sprung_relaxation`` has what stands here where they lag."""
 
 
 def accelerate(engine: Any, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
@@ -218,7 +224,8 @@ def advance(motion, torques, step, steer, vehicle, own):
         own.forces[:] = 0.0
         held_forces(own.numbers, q, v, own.forces, contacts)
         wheels.start[:] = contacts.along
-        meet(contacts, regular, angles, wheels)
+        relax(contacts, half, vehicle.slope, own.lag, known.surfaces)
+        meet(contacts, regular, known.surfaces.lag, angles, wheels)
         hold(known, before, 0.5 * (before + after), half, motion, vehicle)
         accelerate(own.engine, q, v, rates)
         found[:] = rates[:size]
@@ -233,7 +240,7 @@ def advance(motion, torques, step, steer, vehicle, own):
             own.forces[:] = 0.0
             held_forces(own.numbers, middle[0], middle[1], own.forces, contacts)
             wheels.rate[:] = (contacts.along - wheels.start) / half
-            meet(contacts, regular, angles, wheels)
+            meet(contacts, regular, known.surfaces.lag, angles, wheels)
             hold(known, before, after, step, motion, vehicle)
             if not march(own.engine, q, v):
                 return GAVE_UP, time
@@ -244,7 +251,11 @@ def advance(motion, torques, step, steer, vehicle, own):
     return FINE, time
 
 
-def compiled(accelerate: Callable[..., Any], march: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """``advance`` by an engine's own compiled functions, compiled; see ``samples.moved``."""
-    put = globals() | {"accelerate": accelerate, "march": march}
-    return njit(cache=True, error_model="numpy")(named(FunctionType(advance.__code__, put, "advance"), name))
+def advance_with(**parts: Callable[..., Any]) -> Callable[..., Any]:
+    """``advance`` with other functions in the places of those that stand here for others; see ``samples.moved``."""
+    return FunctionType(advance.__code__, globals() | parts, "advance")
+
+
+def compiled(name: str, **parts: Callable[..., Any]) -> Callable[..., Any]:
+    """``advance_with`` an engine's own compiled functions, compiled."""
+    return njit(cache=True, error_model="numpy")(named(advance_with(**parts), name))

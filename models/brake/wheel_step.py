@@ -80,9 +80,13 @@ def phi_1(z):
 
 @lean
 def passed(way, rate, decay, time):
-    """Integral over a time of what covers a way with a rate that decays as exp(-decay t)."""
+    """Integral over a time of what covers a way with a rate that decays as exp(-decay t).
+
+    With z = decay t it is t way (1 / (1 - exp(-z)) - 1 / z), whose series 1/2 + z/12 - z^3/720 ends with an error of
+    z^5/30240: both branches lose at most 1e-13 of it, the other one by the difference of two like numbers.
+    """
     z = decay * time
-    return time * way * (0.5 + z / 12.0) if abs(z) < 0.01 else (rate * time - way) / decay
+    return time * way * (0.5 + z / 12.0 - z**3 / 720.0) if abs(z) < 0.01 else (rate * time - way) / decay
 
 
 @lean

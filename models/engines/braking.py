@@ -105,13 +105,16 @@ class Carried:
         self._model: FreeModel = free_model(engine, driven)
 
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
+        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, a step at a time, each moved by the engine."""
-        time, report = 0.0, Report(*motion.report)
+        """As ``models.brake.advance.advance``, or ``advance_lagging`` with its ``Lag``, a step at a time, each moved by
+        the engine."""
+        time, report, go = 0.0, Report(*motion.report), advance
+        if lag:
+            from models.brake.relaxation import advance_lagging as go
         for n in range(len(torques) - 1):
             before = motion.state.copy()
-            status, used = advance(motion, torques[n : n + 2], step, steer, vehicle)
+            status, used = go(motion, torques[n : n + 2], step, steer, vehicle, *lag)
             time += used
             if status != FINE:
                 return status, time

@@ -3,9 +3,9 @@
 Its steps are those of ``models.brake.sprung_step``; compiled code calls MuJoCo, and all of a sample is compiled.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from models.brake.sprung_step import (
     Held,
     OnEngine,
     advance,
+    advance_with,
     fill,
     held,
     held_forces,
@@ -35,6 +36,10 @@ from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise, mass
+
+if TYPE_CHECKING:
+    from models.brake.relaxation import Lag
+    from models.brake.sprung_relaxation import ContactLag
 
 BLINK = 1e-5
 """s: time over which wheels that only roll are looked at."""
@@ -71,16 +76,25 @@ class OnSprings:
         driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
         return free_model(self.engine, driven)
 
-    @cached_property
-    def _parts(self) -> tuple[OnEngine, Any, Any]:
-        """What steps need, ``advance`` and the generator of samples: compiled where the engine can be called so."""
-        engine, go, by_steps, size = self._model.compiled(), advance, moved(advance), self.size
-        if engine is not None:
+    def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
+        """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called
+        so."""
+        if self._model.compiled() is not None:
             from models.engines import braking_sprung_mujoco as native
 
-            go, by_steps = native.advance, native.by_steps
-        table = self._model.numbers
-        own = OnEngine(
+            return native.lagging() if lags else (native.advance, native.by_steps)
+        if not lags:
+            return advance, moved(advance)
+        from models.brake.sprung_relaxation import relax
+
+        go = advance_with(relax=relax)
+        return go, moved(go)
+
+    @cached_property
+    def _own(self) -> OnEngine:
+        """What steps need, of tyres that answer at once."""
+        engine, size, table = self._model.compiled(), self.size, self._model.numbers
+        return OnEngine(
             table,
             self._at_wheels(table),
             Contacts(*np.zeros((3, self.wheels))),
@@ -90,7 +104,6 @@ class OnSprings:
             self.liveliness,
             engine or self._model,
         )
-        return own, go, by_steps
 
     def _at_wheels(self, table: np.ndarray) -> AtWheels:
         """Of the wheels that hold what is at the end of a table."""
@@ -98,25 +111,44 @@ class OnSprings:
         return AtWheels(Held(*table[-HELD * self.wheels :].reshape(HELD, self.wheels)), wheels, surfaces(self.wheels))
 
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
+        self,
+        motion: Motion,
+        torques: np.ndarray,
+        step: float,
+        steer: np.ndarray,
+        vehicle: OnRoad,
+        lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
         """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
-        A run begins with accelerations of zero. Raises RunFailed where the vehicle turns over.
+        lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
+        vehicle turns over.
         """
-        own, go, _ = self._parts
+        go, _ = self._go(lag is not None)
         with self._model.at_step(step):
-            status, time = go(motion, torques, step, steer, vehicle, own)
+            status, time = go(motion, torques, step, steer, vehicle, self._own._replace(lag=lag or ()))
         return self._sound(status, time), time
 
     def moving(
-        self, told: Any, kept: Any, sample: float, braking: Any, *rest: Any
+        self,
+        told: Any,
+        kept: Any,
+        sample: float,
+        braking: Any,
+        motion: Motion,
+        vehicle: OnRoad,
+        lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
-        own, _, by_steps = self._parts
-        step = sample / (braking.torques.shape[0] - 1)
+        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
+        RunFailed as ``advance``."""
+        _, by_steps = self._go(lag is not None)
+        step, own = sample / (braking.torques.shape[0] - 1), self._own
         self.check_step(step)
-        rows = by_steps(told, kept, sample, braking, *rest, own)
+        if lag is not None:
+            from models.brake.sprung_relaxation import ContactLag
+
+            own = own._replace(lag=ContactLag(*lag, np.zeros(1)))
+        rows = by_steps(told, kept, sample, braking, motion, vehicle, own)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)
@@ -142,7 +174,7 @@ class OnSprings:
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
-        own, none = self._parts[0], np.zeros(steer.size)
+        own, none = self._own, np.zeros(steer.size)
         known = self._at_wheels(own.numbers)
         for part in known.held:
             part[:] = 0.0
@@ -151,6 +183,6 @@ class OnSprings:
         turning = own.contacts.along / vehicle.plane.radius
         under_wheels(state, 0.0, vehicle, known.surfaces)
         known.wheels.start[:] = own.contacts.along
-        meet(own.contacts, 0.0, vehicle.tables.angles, known.wheels)
+        meet(own.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
         hold(known, none, none, BLINK, motion_of(state, turning), vehicle)
         return self._model.acceleration(0.0, *state), turning

@@ -1,8 +1,21 @@
 """A braked vehicle on its suspension in MuJoCo, compiled as a whole: steps, and samples of them."""
 
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 from models.brake import samples
 from models.brake.sprung_step import compiled
 from models.engines.mujoco_native import accelerate, march
 
-advance = compiled(accelerate, march, "in_mujoco")
+advance = compiled("in_mujoco", accelerate=accelerate, march=march)
 by_steps = samples.compiled(advance, "by_steps_in_mujoco")
+
+
+@cache
+def lagging() -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Both of tyres that lag."""
+    from models.brake.sprung_relaxation import relax
+
+    go = compiled("lagging_in_mujoco", accelerate=accelerate, march=march, relax=relax)
+    return go, samples.compiled(go, "by_lagging_steps_in_mujoco")

@@ -6,6 +6,7 @@ It stands where ``models.engines.braking_sprung.OnSprings`` stands, with the sam
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,10 @@ from models.engines.spatial_protocol import INTEGRATORS, check_modes
 from models.engines.stability import LONG_RUN
 from models.vehicles.spatial_linear import linearise
 
+if TYPE_CHECKING:
+    from models.brake.plain.relaxation import Lagging
+    from models.brake.relaxation import Lag
+
 NAME = "reference"
 
 
@@ -35,16 +40,23 @@ class PlainOnSprings:
         self._changes = np.zeros(len(self.suspension.tyres))
 
     def advance(
-        self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad
+        self,
+        motion: Motion,
+        torques: np.ndarray,
+        step: float,
+        steer: np.ndarray,
+        vehicle: OnRoad,
+        lag: "Lagging | None" = None,
     ) -> tuple[int, float]:
         """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
-        A run begins with accelerations of zero. Raises RunFailed where the vehicle turns over.
+        lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
+        vehicle turns over.
         """
         if not motion.accelerations.any():
             self._changes[:] = 0.0
         course = Course(vehicle, steer, vehicle.slope * self.liveliness * step)
-        steps, moving, time = Steps(self.suspension, course, step), self._moving(motion), 0.0
+        steps, moving, time = Steps(self.suspension, course, step), self._moving(motion, lag), 0.0
         for ends in pairwise(torques):
             status, used = steps.on(moving, np.array(ends))
             time += used
@@ -54,15 +66,27 @@ class PlainOnSprings:
                 return AT_REST, time
         return FINE, time
 
-    def _moving(self, motion: Motion) -> Moving:
+    def _moving(self, motion: Motion, lag: "Lagging | None") -> Moving:
         """The same arrays as plain code reads them: a row of the report for each wheel."""
-        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3])
+        return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3], lag)
 
     def moving(
-        self, told: Told, kept: Kept, sample: float, braking: Braking, motion: Motion, vehicle: OnRoad
+        self,
+        told: Told,
+        kept: Kept,
+        sample: float,
+        braking: Braking,
+        motion: Motion,
+        vehicle: OnRoad,
+        lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``; Refused for a step that is too long, RunFailed as ``advance``."""
-        torques, time, status = braking.torques, 0.0, FINE
+        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
+        RunFailed as ``advance``."""
+        torques, time, status, lagging = braking.torques, 0.0, FINE, None
+        if lag is not None:
+            from models.brake.plain.relaxation import Lagging
+
+            lagging = Lagging(lag.length, vehicle.slope, lag.angle)
         step = sample / (len(torques) - 1)
         self.check_step(step)
         pressures = Pressures(braking.chambers, braking.brakes, sample, braking.air)
@@ -73,7 +97,7 @@ class PlainOnSprings:
                     pressures.by_valves(told.valves, torques)
                 else:
                     pressures.by_pressures(told.pressures, torques)
-                status, used = self.advance(motion, torques, step, told.steer, vehicle)
+                status, used = self.advance(motion, torques, step, told.steer, vehicle, lagging)
                 time += used
                 kept.now[0] = time
                 kept.rows[kept.left[0]] = kept.now

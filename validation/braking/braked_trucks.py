@@ -14,8 +14,8 @@ from models.brake.port.ask import checked
 from models.brake.surfaces import Stretch, road
 from models.brake.trailer import CHOSEN, train
 from models.systems.braking.march import Start
-from models.systems.braking.procedures import check_engine, ready
-from models.systems.braking.run import run
+from models.systems.braking.procedures import ready
+from models.systems.braking.run import carried, run
 from models.systems.braking.scene import BrakingScene, build
 from validation.braking.braked_wheels import DRY, ICE, SPEED, Error, Moved, bent
 
@@ -110,8 +110,8 @@ def braking_scene(**tables: Any) -> BrakingScene:
 def lagging_at_rest(implementation: str, folder: Path) -> float:
     """Braked to a stop in a slide on tyres that lag, then watched for 1 s: way and speed since it rests (m, m/s)."""
     scene = braking_scene(relaxation={"front": 0.5, "rear": 0.5})
-    check_engine(scene, implementation)
     vehicle, begun = ready(scene, "stop")
+    vehicle = carried(vehicle, implementation)
     begun.state[1, 1] = 0.2
     path = vehicle.run(AllApplied(4), begun, 10.0)
     rest = Start(path.states[-1].copy(), path.turning[-1].copy())

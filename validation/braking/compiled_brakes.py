@@ -29,7 +29,7 @@ def tyre(tables: Tables, under: Surface, motion: Motion, load: float, of: Braked
     below.first[0], below.second[0], below.share[0] = under.first, under.second, under.share
     wheels.start[0], wheels.load[0] = motion.start, load
     ahead = motion.forwards if motion.start >= 0.0 else -motion.forwards
-    slide(0, ahead, motion.across, motion.regular, tables.angles, wheels)
+    slide(0, ahead, motion.across, motion.regular, below.lag, tables.angles, wheels)
     given = StepInput(motion.start, motion.start + of.step * motion.rate, *of.torques, of.step)
     compiled_tyre(0, given, Wheel(of.radius, of.inertia, of.turning), tables, wheels, below, Report(*report))
     return report[:, 0]

@@ -1,13 +1,10 @@
-"""Slip angles that lag behind, once more in plain code: see ``models.brake.relaxation`` for the law.
-
-The lag solves a linear equation of constant coefficients, whose solution is an exponential of a matrix.
-"""
+"""Slip angles of a truck that lag behind, by plain code, and a braked turn on such tyres beside written equations."""
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.linalg import expm
 
 from models.brake.brake import Brake, of_wheels
+from models.brake.plain import relaxation as plain
 from models.brake.plane_vehicle import PAPER, truck
 from models.brake.pressure import Chambers
 from models.systems.braking.march import on_tyres
@@ -15,9 +12,6 @@ from models.tyre.magic_formula import surface
 from validation.braking.sprung_box import GRADIENT, steady
 from validation.braking.truck_equations import turned
 
-GRAVITY = 9.81
-SLOW, DAMPING, SLOWEST = 1.0, 0.7, 1e-9
-"""Speed (m/s) below which the damper fades in, its damping ratio at rest, speed (m/s) that counts as rest."""
 SPEED, UNTIL, STEER = 11.11, 9.0, 0.03
 """Speeds (m/s) from which and to which the truck turns, and its steer angle (rad)."""
 
@@ -31,26 +25,14 @@ def lag_on(
     length: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lagging tan of the slip angles (W,) after a time (s), and with the damper's part (W,).
+    """``models.brake.plain.relaxation.lag_on`` by a state (2, 3): x, y, heading and their rates.
 
-    state (2, 3) : x, y, heading and their rates; places (W, 2) : of the wheels (m); lag (W,) : before, NaN where it is
-    to begin as in steady motion; slope : largest cornering coefficient (1/rad); length (W,) : m.
+    places (W, 2) : of the wheels (m); steer (W,) : rad; lag (W,) : the angles before.
     """
     velocity, turning = state[1, :2], state[1, 2]
     centres = velocity + turning * (places @ rotation(state[0, 2] + 0.5 * np.pi).T)
-    u, v = np.array([rotation(state[0, 2] + own).T @ centre for own, centre in zip(steer, centres, strict=True)]).T
-    speed = np.abs(u)
-    before = np.where(np.isnan(lag), v / np.maximum(speed, SLOWEST), lag)
-    after = np.array([_taken_up(*own, time) for own in zip(before, speed, v, length, strict=True)])
-    stiffness = np.sqrt(max(slope, SLOWEST) * GRAVITY * length)
-    fade = np.clip(1.0 - speed / SLOW, 0.0, 1.0)
-    return after, after + fade**2 * v * 2.0 * DAMPING / stiffness
-
-
-def _taken_up(lag: float, speed: float, across: float, length: float, time: float) -> float:
-    """sigma a' = v - |u| a over a time (s)."""
-    rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
-    return float((expm(rates) @ (lag, 1.0))[0])
+    speeds = np.array([rotation(state[0, 2] + own).T @ centre for own, centre in zip(steer, centres, strict=True)]).T
+    return plain.lag_on(lag, speeds, time, length, slope)
 
 
 def rotation(angle: float) -> np.ndarray:

@@ -25,6 +25,8 @@ from validation.braking.sprung_box import SPIN, car, steady
 from validation.spatial.cars import twin
 
 STATES, SEED = 100, 22
+LENGTHS = np.array([0.4, 0.4, 0.3, 0.3])
+"""m, over which tyres relax where they do."""
 LEAN = 0.3
 """rad: largest roll and pitch of the states."""
 
@@ -90,8 +92,9 @@ def apart(compiled: np.ndarray, plain: np.ndarray) -> float:
     return off if np.isfinite(off) else np.inf
 
 
-def vehicle_on(vehicle: Sprung, engine: str, valves: bool) -> Braked:
-    """On wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis."""
+def vehicle_on(vehicle: Sprung, engine: str, valves: bool, lags: bool = False) -> Braked:
+    """On wet road with ice after 3 m, dry on the left: steered to the left, brakes with hysteresis; lags : whether its
+    tyres relax over LENGTHS."""
     front, rear = (
         Brake(push_out=0.4, release=0.3, rising=level, falling=1.1 * level)
         for level in ((150.0, 50.0) if valves else (3e2, 1e2))
@@ -107,6 +110,7 @@ def vehicle_on(vehicle: Sprung, engine: str, valves: bool) -> Braked:
         substeps=2,
         engine=PlainOnSprings(vehicle) if engine == "reference" else OnSprings(engine, vehicle),
         sprung=vehicle,
+        relaxation=LENGTHS if lags else None,
     )
 
 
@@ -115,15 +119,17 @@ def controller(valves: bool) -> Controller:
     return SlipBangBang(wheels=4) if valves else steady(*4 * (4e4,))
 
 
-def run(vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0) -> Path:
+def run(
+    vehicle: Sprung, engine: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False
+) -> Path:
     """So many seconds of a stop from a speed (m/s)."""
-    return vehicle_on(vehicle, engine, valves).run(controller(valves), speed, duration)
+    return vehicle_on(vehicle, engine, valves, lags).run(controller(valves), speed, duration)
 
 
 @cache
-def plain_run(vehicle: str, duration: float, valves: bool = True, speed: float = 10.0) -> Path:
+def plain_run(vehicle: str, duration: float, valves: bool = True, speed: float = 10.0, lags: bool = False) -> Path:
     """``run`` by plain code."""
-    return run(VEHICLES[vehicle](), "reference", duration, valves, speed)
+    return run(VEHICLES[vehicle](), "reference", duration, valves, speed, lags)
 
 
 def paths_apart(one: Path, other: Path) -> float:

@@ -69,6 +69,7 @@ CASES = (
     "braking_controllers",
     "braking_engines",
     "braking_suspension",
+    "braking_relaxation",
     "braking_reference",
     "measured_formats",
     "measured_virtual",

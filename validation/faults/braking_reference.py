@@ -41,11 +41,17 @@ def _stop() -> float:
     return whole.paths_apart(whole.run(whole.bent.__wrapped__(), ENGINE, DURATION), whole.plain_run("bent", DURATION))
 
 
+def _lagging() -> float:
+    found = whole.run(whole.car(), ENGINE, DURATION, lags=True)
+    return whole.paths_apart(found, whole.plain_run("car", DURATION, lags=True))
+
+
 CHECKS = {
     "accelerations": Check("accelerations at random states beside plain code", "by the largest", 1e-12, _accelerations),
     "stop": Check("a piece of a stop beside plain code", "m, rad, per s", BOUND, _stop),
+    "lagging": Check("the same on tyres that lag", "m, rad, per s", BOUND, _lagging),
     "friction": Check("friction by stacked tables", "by the largest", 1e-12, _law(laws.frictions)),
-    "tyre": Check("a braked wheel over a step", "by the largest", BOUND, _law(laws.tyre_reports)),
+    "tyre": Check("a braked wheel over a step", "by the largest", 1e-12, _law(laws.tyre_reports)),
     "road": Check("surfaces under the wheels", "by the largest", 1e-12, _law(laws.surfaces)),
     "pressure": Check(
         "pressures and torques along commands", "by the largest", 1e-12, _law(laws.torques_by_commands, 20)
@@ -221,6 +227,23 @@ def _longer(real: Any) -> Any:
     return lambda state, time, steer, slope, length, lag: real(state, time, steer, slope, 1.01 * length, lag)
 
 
+def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
+    """What tyres on the suspension lag by, changed."""
+    return attribute("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
+
+
+def _half_as_far(contacts: Any, half: float, *rest: Any) -> tuple[Any, ...]:
+    """Without the half of the step before."""
+    lag = rest[1]
+    lag.behind[0] = 0.0
+    return contacts, half, *rest
+
+
+def _faster(contacts: Any, *rest: Any) -> tuple[Any, ...]:
+    """By speeds along the wheels that are 1 % too large."""
+    return contacts._replace(along=1.01 * contacts.along), *rest
+
+
 BENCH, COMPILED = "validation.braking.plain_brakes", "validation.braking.compiled_brakes"
 FAULTS = (
     Fault(
@@ -242,6 +265,8 @@ FAULTS = (
     Fault("Euler's step for Runge and Kutta's", "step", _march(_euler)),
     Fault("moment on turning wheels 1 % too large", "step", _march(_spun_more)),
     Fault("forces of the front tyres exchanged", "step", _march(_forces_exchanged)),
+    Fault("slip angles that lag over half of each step", "lagging", _relaxed(_half_as_far)),
+    Fault("slip angles that lag by a speed 1 % too large", "lagging", _relaxed(_faster)),
     Fault("brake torque 1 % too large", "brake", attribute("models.brake.samples:by_valves", _more_torque)),
     Fault("valves that answer at once", "brake", attribute(f"{BENCH}:by_valves", _quick_valves)),
     Fault("cornering stiffness 30 % too large", "tyre", _stacked(lambda t: (t.mu_x, 1.3 * t.h))),

@@ -4,7 +4,8 @@ Half a step by the accelerations at its start leads to its middle, where loads, 
 wheels' speeds are read; the mean forces of the whole step follow, and Runge and Kutta's method marches under them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from models.brake.plain.suspension import Contact, Held, Suspension
 from models.brake.plain.tyre import Braked, Motion, Surface, tyre
 from models.brake.surfaces import OnRoad
 from models.multibody.plain.march import march
+
+if TYPE_CHECKING:
+    from models.brake.plain.relaxation import Lagging
 
 SPINS, LEANS, UPRIGHT, OVER = 6, slice(4, 6), 0.5, 6
 """Column of a wheel's report with its turning; places of roll and pitch; where they turn the vehicle over (rad), and
@@ -35,13 +39,14 @@ class Course:
 @dataclass(eq=False)
 class Moving:
     """A vehicle on its way, all moved in place: state (2, n), turning (W,) in rad/s, changes (W,) of the speeds along
-    the wheels (m/s^2), reports (W, 7), and accelerations (3,) of the first coordinates."""
+    the wheels (m/s^2), reports (W, 7), accelerations (3,) of the first coordinates, and what lags of its tyres."""
 
     state: np.ndarray
     turning: np.ndarray
     changes: np.ndarray
     report: np.ndarray
     found: np.ndarray
+    lag: "Lagging | None" = None
 
 
 class Steps:
@@ -56,6 +61,8 @@ class Steps:
         under, middle = self._under(own.state, self.step), np.array([torques[0], torques.mean(axis=0)])
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
+        if own.lag is not None:
+            own.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
         held = self._hold(own, contacts, starts, under, middle, half)
         rates = self.vehicle.acceleration(q, v, held)
         own.found[:] = rates[: own.found.size]
@@ -105,6 +112,8 @@ class Steps:
         course = self.course
         for i, contact in enumerate(contacts):
             motion = Motion(starts[i], own.changes[i], contact.passing, contact.sliding, course.regular)
+            if own.lag is not None:
+                motion = replace(motion, across=own.lag.across(i, max(motion.forwards, course.regular)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
             braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, own.turning[i])
             own.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)

@@ -141,17 +141,16 @@ class Braked:
         air = still(self.chambers, self.sample)._replace(pressure=now.pressure, torque=now.torque)
         torques = np.zeros((self.substeps + 1, self.plane.wheels))
         braking = Braking(air, self.chambers, self.brakes, torques)
-        given = (told, kept, self.sample, braking, motion, self.on_road)
-        if self.engine is not None:
-            moving: Iterator[tuple[int, float, float, float]] = self.engine.moving(*given)
-            return moving
-        if self.relaxation is None:
-            return by_steps(*given)
-        from models.brake.relaxation import Lag, by_lagging_steps
+        go, given = by_steps, [told, kept, self.sample, braking, motion, self.on_road]
+        if self.relaxation is not None:
+            from models.brake.relaxation import Lag, by_lagging_steps
 
-        # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady one
-        angle = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
-        return by_lagging_steps(*given, Lag(self.relaxation, angle))
+            # straight ahead tyres begin without slip angles, whatever the wheels are steered, in a turn as in a steady
+            # one
+            angle = np.full(self.plane.wheels, np.nan if now.state[1, 1:].any() else 0.0)
+            go, given = by_lagging_steps, [*given, Lag(self.relaxation, angle)]
+        moving: Iterator[tuple[int, float, float, float]] = (go if self.engine is None else self.engine.moving)(*given)
+        return moving
 
 
 def on_tyres(

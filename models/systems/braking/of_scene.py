@@ -1,5 +1,6 @@
 """From a scene of braking to a vehicle on its road, ready to run."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 from models.brake.brake import Brake, of_wheels
 from models.brake.controller import Controller
 from models.brake.controllers import CONTROLLERS
-from models.brake.plane_vehicle import PAPER, Plane, Truck, truck
+from models.brake.plane_vehicle import GRAVITY, PAPER, Plane, Truck, truck
 from models.brake.pressure import Chambers
 from models.brake.surfaces import Road, road
 from models.brake.surfaces import Stretch as Numbered
@@ -55,7 +56,21 @@ def braked(scene: BrakingScene, procedure: Procedure) -> Braked:
         sprung=sprung,
         engine=engine,
     )
+    if lags is not None:
+        _check_lags(scene, vehicle, min(lags.front, lags.rear))
     return extended(vehicle, scene)
+
+
+def _check_lags(scene: BrakingScene, vehicle: Braked, shortest: float) -> None:
+    """Refuse steps at which the vehicle would rock up at rest on its tyres, which relax over a length (m) or more."""
+    from models.brake.relaxation import longest_step
+
+    lively = GRAVITY if vehicle.engine is None else vehicle.engine.liveliness
+    longest = longest_step(vehicle.slope, lively, shortest)
+    if vehicle.sample / vehicle.substeps > longest:
+        least = math.ceil(vehicle.sample / longest)
+        allowed = f"must be at least {least}: at rest the vehicle rocks up on tyres of so short a [relaxation]"
+        raise InputError(scene.file, "run.substeps", vehicle.substeps, allowed)
 
 
 def plane_of(scene: BrakingScene) -> Plane:

@@ -10,7 +10,7 @@ from models.core.finding import Finding
 from models.core.scene_effects import lines as effect_lines
 from models.systems.braking.assumptions import assumptions
 from models.systems.braking.of_scene import braked, controller_of, sprung_of, surfaces_of, vehicle_of
-from models.systems.braking.procedures import check_engine, engines_of, port_of, ready
+from models.systems.braking.procedures import engines_of, port_of, ready
 from models.systems.braking.scene import BrakingScene
 from models.tyre.tyre_source import NAMES
 from models.vehicles.plausible import GYRATION, HEIGHT, MASS, TRACK, WHEELBASE, plausible
@@ -25,8 +25,6 @@ PROCEDURES = {
 
 def check(scene: BrakingScene, engines: tuple[str, ...]) -> None:
     """Everything that can be refused before a run is refused here, before any file is written."""
-    for engine in engines_of(scene, engines):
-        check_engine(scene, engine)
     _check_parts(scene, engines_of(scene, engines))
     for name in scene.procedures:
         ready(scene, name)

@@ -15,7 +15,7 @@ from models.brake.plane_vehicle import Plane
 from models.brake.port.setup import Run, opened
 from models.brake.steering import Response, Steering, response
 from models.brake.surfaces import check_way, surfaces, under_wheels
-from models.core.errors import InputError, Refused
+from models.core.errors import InputError
 from models.systems.braking.march import Braked, Path, Start
 from models.systems.braking.of_scene import SPRUNG_ENGINE, braked, controller_of
 from models.systems.braking.scene import BrakingScene, Procedure
@@ -75,12 +75,6 @@ def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
     if scene.vehicle.file is None:
         return asked or ("reference",)
     return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
-
-
-def check_engine(scene: BrakingScene, engine: str) -> None:
-    """Refuse an engine that would leave an effect of the scene out."""
-    if scene.relaxation is not None and engine != "reference":
-        raise Refused(engine, "the lag of tyres is not in its steps: use --engine reference", scene.file)
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:

@@ -12,7 +12,7 @@ from models.systems.braking.assumptions import assumptions
 from models.systems.braking.errors import OtherRuns, with_error
 from models.systems.braking.march import Braked, Path, Start
 from models.systems.braking.of_scene import on_springs
-from models.systems.braking.procedures import answers, check_engine, engines_of, looped, ready
+from models.systems.braking.procedures import answers, engines_of, looped, ready
 from models.systems.braking.scene import BrakingScene
 from models.systems.braking.stop_report import WHEELS
 
@@ -29,14 +29,8 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     """
     name = procedure or next(iter(scene.procedures))
     (engine,) = engines_of(scene, (engine,) if engine else ())
-    check_engine(scene, engine)
     vehicle, start = ready(scene, name)
-    if vehicle.sprung is not None:
-        vehicle = replace(vehicle, engine=on_springs(engine, vehicle.sprung))
-    elif engine != "reference":
-        from models.engines.braking import Carried
-
-        vehicle = replace(vehicle, engine=Carried(engine, vehicle.plane))
+    vehicle = carried(vehicle, engine)
     assumed, begun = assumptions(scene, name, vehicle), time.perf_counter()
     try:
         path = looped(scene, name, vehicle, start, engine)
@@ -48,6 +42,17 @@ def run(scene: BrakingScene, engine: str = "", *, procedure: str = "", error: bo
     stop = judged(_labelled(scene, name, engine, path, time.perf_counter() - begun), assumed)
 
     return with_error(stop, scene, _other_runs(scene, name, vehicle, start, engine)) if error else stop
+
+
+def carried(vehicle: Braked, engine: str) -> Braked:
+    """The vehicle marched by an engine; by its own steps in the plane, which are the reference's."""
+    if vehicle.sprung is not None:
+        return replace(vehicle, engine=on_springs(engine, vehicle.sprung))
+    if engine == "reference":
+        return vehicle
+    from models.engines.braking import Carried
+
+    return replace(vehicle, engine=Carried(engine, vehicle.plane))
 
 
 def _other_runs(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str) -> OtherRuns:

@@ -228,8 +228,6 @@ TABLE = {
         "relaxation",
         "a state per wheel, exact within a step",
         {"lags": 4},
-        excludes=SUSPENSION,
-        why="whose tyres answer at once",
         modules=("models.brake.relaxation",),
         usual={"front": 0.3, "rear": 0.3},  # m, chosen
     ),

@@ -1,0 +1,56 @@
+"""Slip angles that lag behind, in plain code: see ``models.brake.relaxation`` for the law.
+
+The lag solves a linear equation of constant coefficients, whose solution is an exponential of a matrix.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+GRAVITY = 9.81
+SLOW, DAMPING, SLOWEST = 1.0, 0.7, 1e-9
+"""Speed (m/s) below which the damper fades in, its damping ratio at rest, speed (m/s) that counts as rest."""
+
+
+def lag_on(
+    angle: np.ndarray, speeds: np.ndarray, time: float, length: np.ndarray, slope: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The lagging tan of the slip angles (W,) after a time (s), and with the damper's part (W,).
+
+    angle (W,) : before, NaN where it is to begin as in steady motion; speeds (2, W) : along and across (m/s); length
+    (W,) : m; slope : largest cornering coefficient (1/rad).
+    """
+    (u, v), stiffness = speeds, np.sqrt(max(slope, SLOWEST) * GRAVITY * length)
+    before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST), angle)
+    after = np.array([_taken_up(*own, time) for own in zip(before, np.abs(u), v, length, strict=True)])
+    fade = np.clip(1.0 - np.abs(u) / SLOW, 0.0, 1.0)
+    return after, after + fade**2 * v * 2.0 * DAMPING / stiffness
+
+
+def _taken_up(angle: float, speed: float, across: float, length: float, time: float) -> float:
+    """sigma a' = v - |u| a over a time (s)."""
+    rates = np.array([[-speed, across], [0.0, 0.0]]) * (time / length)
+    return float((expm(rates) @ (angle, 1.0))[0])
+
+
+@dataclass(eq=False)
+class Lagging:
+    """Tyres that lag: lengths (W,) in m, slope (1/rad), angles (W,) as tan, the time (s) by which they are behind the
+    motion, and what slip angles are taken by, the damper's part included."""
+
+    length: np.ndarray
+    slope: float
+    angle: np.ndarray
+    behind: float = 0.0
+    taken: np.ndarray | None = None
+
+    def reach(self, speeds: np.ndarray, half: float) -> None:
+        """Move on to half a step (s) after the speeds (2, W) along and across (m/s)."""
+        self.angle, self.taken = lag_on(self.angle, speeds, self.behind + half, self.length, self.slope)
+        self.behind = half
+
+    def across(self, i: int, forwards: float) -> float:
+        """Speed (m/s) across wheel i at which it would have its slip angle at a speed (m/s) along it."""
+        assert self.taken is not None
+        return float(self.taken[i]) * forwards

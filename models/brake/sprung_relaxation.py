@@ -1,0 +1,29 @@
+"""Tyres that lag on a vehicle on its suspension: the law of ``models.brake.relaxation`` at the contacts of its wheels.
+
+Where a step begins, the speeds there move the angles over the half of the step before, which had to wait for them, and
+over the half of this one: no state has its forces taken for the lag alone.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from models.brake.relaxation import take_up
+from models.machine.compiled import lean
+
+
+class ContactLag(NamedTuple):
+    """A ``Lag``, length and angle (W,), and behind (1,): the time (s) by which its angles are behind the motion."""
+
+    length: np.ndarray
+    angle: np.ndarray
+    behind: np.ndarray
+
+
+@lean
+def relax(contacts, half, slope, lag, surfaces):
+    """Move a ``ContactLag`` on to half a step (s) after its ``Contacts``, and let the tyres of the ``Surfaces`` lag."""
+    time = lag.behind[0] + half
+    for i in range(lag.angle.size):
+        take_up(i, contacts.along[i], contacts.across[i], time, slope, lag, surfaces.lag)
+    lag.behind[0] = half

@@ -1,0 +1,104 @@
+"""Tyres that relax on a braked vehicle on its suspension: a closed form, limits, and plain code."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.systems.braking.march import Path as Run
+from models.tyre.magic_formula import surface
+from validation.braking import plain_sprung as whole
+from validation.braking.sprung_box import box, braked, car, steady
+from validation.common.rows import Observed, Row, System
+
+TITLE = "Relaxing tyres on the suspension"
+SYSTEM: System = "anti-lock"
+ENGINES = ("mujoco", "exudyn")
+SLICK = 1e-6
+"""Friction by that of a wet road: the car keeps its course whatever its wheels are steered."""
+SPEED, STEER = 20.0, 0.02
+TURNING = (200.0, 200.0, 100.0, 100.0)
+"""Torques (N m) at which no wheel locks."""
+
+
+def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
+    """A quick share in Exudyn, whose steps need no compiling; both engines and the stiff limit in the full one."""
+    engines = ENGINES[1:] if quick else ENGINES
+    vehicles = ("car",) if quick else tuple(whole.VEHICLES)
+    rows = [_rise_row(engine) for engine in engines] + [_short_row("exudyn")]
+    rows += [_reference_row(vehicle, engine, 0.05 if quick else 0.5) for vehicle in vehicles for engine in engines]
+    if not quick:
+        rows.append(_stiff_row())
+    return rows, {}
+
+
+def _rise_row(engine: str) -> Row:
+    return Observed(
+        f"braking_relaxation.rise.{engine}",
+        SYSTEM,
+        "slip angles of wheels that are turned at once, over three relaxation lengths, beside 1 - exp(-u t / sigma)",
+        rise_apart(engine),
+        "of the angle in the end",
+    ).at_most(2e-6, "first order by the way; what friction of a millionth leaves of the course", "closed form")
+
+
+def rise_apart(engine: str, samples: int = 20) -> float:
+    """The car at a speed whose front wheels are turned by a step: tan of the slip angle in the middle of each step."""
+    slick = surface("wet").scaled(SLICK)
+    vehicle = replace(braked(car(), slick, engine, STEER), relaxation=whole.LENGTHS)
+    path = vehicle.run(steady(*4 * (0.0,)), SPEED, samples * vehicle.sample - 1e-6)
+    ways = SPEED * np.cos(STEER) * (path.times[1:] - 0.5 * vehicle.sample)
+    risen = np.tan(path.reports.slip_angle[:, :2]) / -np.tan(STEER)
+    return float(np.abs(risen - (1.0 - np.exp(-ways[:, None] / whole.LENGTHS[:2]))).max())
+
+
+def turn(engine: str | None, length: float, stiffer: float | None = None, duration: float = 0.2) -> Run:
+    """A braked turn of the car, or of the box so many times as stiff, on tyres of a relaxation length (m), 0 for none;
+    without an engine in the plane."""
+    vehicle = car() if stiffer is None else box(stiffer, 0.01)
+    torques, substeps = steady(*TURNING), 2 if stiffer is None else 4
+    own = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
+    return replace(own, relaxation=np.full(4, length) if length else None).run(torques, 10.0, duration)
+
+
+def _short_row(engine: str) -> Row:
+    return Observed(
+        "braking_relaxation.short",
+        SYSTEM,
+        "how far tyres of 0.2 m move the end of a braked turn from that without relaxation, by those of 0.1 m",
+        short_ratio(engine),
+        "",
+    ).within(2.0, 0.05, "to first order in the length, whose limit is a tyre that answers at once", "closed form")
+
+
+def short_ratio(engine: str) -> float:
+    """Ratio of the moves (m, rad) of the first coordinates."""
+    none, one, two = (turn(engine, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
+    return float(np.abs(two - none).max() / np.abs(one - none).max())
+
+
+def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
+    found = whole.run(whole.VEHICLES[vehicle](), engine, duration, lags=True)
+    return Observed(
+        f"braking_relaxation.reference.{vehicle}.{engine}",
+        SYSTEM,
+        f"{duration:g} s of a stop of the {vehicle} on tyres that relax in {engine}, a slip controller in the loop",
+        whole.paths_apart(found, whole.plain_run(vehicle, duration, lags=True)),
+        "m, rad, per s",
+    ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
+
+
+def _stiff_row() -> Row:
+    apart = []
+    for stiffer in (1.0, 100.0):
+        ends = [turn(engine, 0.3, stiffer, 2.0).states[-1, 0, :2] for engine in ("mujoco", None)]
+        apart.append(float(np.hypot(*(ends[1] - ends[0]))))
+    return Observed(
+        "braking_relaxation.stiff",
+        SYSTEM,
+        "how far the box on relaxing tyres ends a braked turn from the plane vehicle, springs 100 times as stiff by "
+        "the plain ones",
+        apart[1] / apart[0],
+        "",
+    ).at_most(0.1, "the plane vehicle is the limit, reached with the time that dampers take, a tenth", "shared kernel")
