@@ -325,9 +325,9 @@ def _blind_spots(more: bool, out: Path | None, resume: Path | None) -> None:
     """Audit all shared functions; raises InputError for options that go with a report."""
     if more:
         raise InputError("--blind-spots", "", True, "goes without --quick and --against")
-    from validation.blind_spots.audit import CHILDREN, audit, summary
+    from validation.blind_spots.audit import TRACE, audit, summary
 
-    folder = _folder("blind-spots", CHILDREN, "", out, resume)
+    folder = _folder("blind-spots", TRACE, "", out, resume)
     try:
         with _progress(False) as progress:
             lines = audit(folder, progress)

@@ -2,7 +2,6 @@
 
 import ast
 import json
-import os
 import subprocess
 import sys
 
@@ -10,15 +9,19 @@ import numpy as np
 import pytest
 from numba import njit
 
+import validation.blind_spots.compiled_spoiling  # noqa: F401  makes numba know what is spoiled
+from models.core.errors import InputError
 from models.machine.records import record
-from validation.blind_spots import planting
-from validation.blind_spots.audit import STARTUP, Traced, line_of
+from validation.blind_spots import memory
+from validation.blind_spots.audit import FUNCTIONS, TRACE, Traced, environment, line_of, prepare
 from validation.blind_spots.rewriting import ROOT, NoSuchFunction, rewritten
-from validation.blind_spots.shared import compiled_functions, shared_functions, shared_modules
+from validation.blind_spots.shared import candidates, compiled_functions, shared_functions, shared_modules
 from validation.blind_spots.spoiling import scaled, spoiled
 from validation.blind_spots.table import Line, read, uncovered, write
 from validation.report.blind_spots import blind_spots
 
+PLACE = 3
+"""Of the function that is spoiled within this process."""
 SOURCE = '''"""A module."""
 def law(x, found, room):
     part = found[1:]
@@ -36,49 +39,97 @@ def line(name="models.a:f", rows="", tests="", independent="", ended="whole"):
     return Line(name, ended, 1, 0, rows, tests, independent, "abc")
 
 
-def made(name):
+@pytest.fixture
+def fault():
+    """Function that sets the fault of the place, which has none after the test."""
+    yield lambda value: memory.FAULTS.__setitem__(PLACE, value)
+    memory.FAULTS[PLACE] = 0.0
+    memory.forget()
+
+
+def made(names):
     space = {}
-    exec(compile(rewritten(SOURCE, "models.none", name), "a", "exec"), space)
+    exec(compile(rewritten(SOURCE, "models.none", names), "a", "exec"), space)
     return space
 
 
-def test_what_a_function_returns_and_writes_is_one_percent_off_and_counts_stay():
-    space, found = made("law"), np.array([5.0, 0.0, 7.0])
+def test_what_a_function_returns_and_writes_is_one_percent_off_and_counts_stay(fault):
+    space, found = made({"law": PLACE, "other": PLACE + 1}), np.array([5.0, 0.0, 7.0])
+    fault(0.01)
     assert space["law"](1.5, found, None) == (1.01 * 1.5, 3)
     assert found.tolist() == [5.0, 1.01 * 3.0, 7.0]
     assert space["law"](-1.5, found, None) == (1.01 * 1.5, 3)
     assert space["other"](1.5) == 1.5
 
 
+def test_a_function_without_a_fault_gives_what_it_is_given_itself_and_is_marked():
+    values = np.array([0.5, 1.5])
+    assert made({"other": PLACE})["other"](values) is values
+    assert made({"other": PLACE + 1})["other"]("text") == "text"
+    assert memory.places(memory.RAN) == [PLACE, PLACE + 1] and memory.places(memory.NUMBERS) == [PLACE]
+    memory.forget()
+    assert not memory.places(memory.RAN) and not memory.places(memory.NUMBERS)
+
+
 def test_an_unknown_function_is_an_error():
     with pytest.raises(NoSuchFunction, match="nothing"):
-        rewritten(SOURCE, "models.none", "nothing")
+        rewritten(SOURCE, "models.none", {"nothing": PLACE})
 
 
-def test_compiled_code_spoils_as_python_does():
+def test_nothing_stands_before_what_a_module_takes_from_the_future():
+    source = '"""A module."""\nfrom __future__ import annotations\n' + SOURCE.partition("\n")[2]
+    compile(rewritten(source, "models.none", {"law": PLACE}), "a", "exec")
+
+
+def test_functions_that_call_each_other_are_rewritten():
+    assert rewritten(
+        (ROOT / "models/contact/fastsim_many.py").read_text(),
+        "models.contact.fastsim_many",
+        {
+            name: PLACE
+            for module, _, name in (each.partition(":") for each in candidates())
+            if module == "models.contact.fastsim_many"
+        },
+    )
+
+
+def test_compiled_code_takes_a_fault_as_it_runs_and_compiles_nothing_for_it(fault):
     @njit
     def both(x, values):
-        scaled(values)
-        return spoiled((x, 2)), spoiled(values)
+        scaled(values, PLACE)
+        return spoiled((x, 2), PLACE), spoiled(values, PLACE)
 
     values = np.array([0.5, 1.5])
+    (number, count), array = both(0.3, values)
+    assert (number, count, values.tolist(), array.tolist()) == (0.3, 2, [0.5, 1.5], [0.5, 1.5])
+    assert memory.places(memory.RAN) == memory.places(memory.NUMBERS) == [PLACE]
+    fault(0.01)
     (number, count), array = both(0.3, values)
     assert (number, count) == (1.01 * 0.3, 2)
     assert values.tolist() == [1.01 * 0.5, 1.01 * 1.5]
     assert array == pytest.approx([1.01**2 * 0.5, 1.01**2 * 1.5], rel=1e-15)
+    assert len(both.signatures) == 1
 
 
-def test_records_are_spoiled_field_by_field_in_python_and_in_compiled_code():
+def test_compiled_code_that_gives_no_number_is_marked_as_having_run():
+    assert njit(lambda count: spoiled(count, PLACE))(3) == 3
+    assert memory.places(memory.RAN) == [PLACE] and not memory.places(memory.NUMBERS)
+    memory.forget()
+
+
+def test_records_are_spoiled_field_by_field_in_python_and_in_compiled_code(fault):
+    fault(0.01)
     first = np.array([(0.5, 1.5), (2.5, 3.0)], record("force", "moment"))
     second = first.copy()
-    scaled(first)
-    njit(lambda values: scaled(values))(second)
+    scaled(first, PLACE)
+    njit(lambda values: scaled(values, PLACE))(second)
     assert first.tolist() == [(1.01 * 0.5, 1.01 * 1.5), (1.01 * 2.5, 3.0)]
     assert second.tolist() == [(1.01 * 0.5, 1.01 * 1.5), (1.01 * 2.5, 1.01 * 3.0)]
 
 
-def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places():
-    assert spoiled(np.array([2.0, 0.5])).tolist() == [2.0, 0.505]
+def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places(fault):
+    fault(0.01)
+    assert spoiled(np.array([2.0, 0.5]), PLACE).tolist() == [2.0, 0.505]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +138,7 @@ def test_whole_numbers_of_a_table_that_python_makes_stay_for_they_may_be_places(
 )
 def test_an_argument_that_only_called_functions_fill_is_spoiled_at_the_end(module, name, argument):
     source = ROOT.joinpath(*module.split(".")).with_suffix(".py").read_text()
-    assert f"_scaled_by_audit({argument})" in ast.unparse(rewritten(source, module, name))
+    assert f"_scaled_by_audit({argument}, {PLACE})" in ast.unparse(rewritten(source, module, {name: PLACE}))
 
 
 def test_shared_by_rule_are_the_laws_and_not_what_only_one_engine_has():
@@ -102,34 +153,70 @@ def test_shared_by_rule_are_the_laws_and_not_what_only_one_engine_has():
     assert python not in compiled and python in shared_functions([python, "models.core.errors:InputError"])
 
 
-def process(spoiled_function, code):
-    """What a new process prints, in which the function is spoiled."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join([str(STARTUP), str(ROOT)]),
-        planting.VARIABLE: json.dumps({"spoil": spoiled_function} if spoiled_function else {}),
-    }
-    return float(subprocess.check_output([sys.executable, "-c", code], env=environment, cwd=ROOT))
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder of an audit, whose machine code the tests share."""
+    place = tmp_path_factory.mktemp("audit")
+    prepare(place)
+    return place
 
 
-def test_machine_code_that_is_kept_is_not_taken_for_the_spoiled_function_nor_the_other_way_round():
+def process(folder, faults, code):
+    """What a new process prints, in which functions have faults."""
+    doubles = folder / "memory"
+    shared = memory.shared(doubles)
+    for place in range(len(candidates())):
+        shared[place] = faults.get(candidates()[place], 0.0)
+    return float(subprocess.check_output([sys.executable, "-c", code], env=environment(folder, doubles), cwd=ROOT))
+
+
+def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
     """``aspects`` calls a compiled function that calls ``aspect``; sound, spoiled, and sound again."""
     code = "import numpy as np; from models.contact.hertz import aspects; print(aspects(np.array([0.5]))[0][0])"
-    sound, wrong, again = (process(name, code) for name in ("", "models.contact.hertz:aspect", ""))
+    sound, wrong, again = (process(folder, {"models.contact.hertz:aspect": fault}, code) for fault in (0.0, 0.01, 0.0))
     assert wrong == pytest.approx(1.01 * sound, rel=1e-14) and again == sound
 
 
-def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it():
+def traced(folder, name, **case):
+    """The trace of one case that runs one function and has independent rows."""
+    rows = [{"id": "contact_hertz.p0", "status": "passed", "independence": "closed form"}]
+    item = {"case": "contact_hertz", "rows": rows, "seconds": 1.0, "ran": {name}, "numbers": {name}}
+    return Traced(folder, candidates(), {"contact_hertz": item | case})
+
+
+def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(folder):
     """Hertz' ellipse by Johnson's figures and a closed form; the sound run had no failed row."""
     name = "models.contact.hertz:_contact"
-    case = {"case": "contact_hertz", "rows": [], "seconds": 1.0, "names": {name}}
-    noticed = line_of(name, Traced({"contact_hertz": case}, {name}), "abc")
+    noticed = line_of(name, traced(folder, name), judges=True)
     assert (noticed.ended, noticed.calling, noticed.left) == ("whole", 1, 0)
     assert "contact_hertz.p0" in noticed.rows and "contact_hertz.p0" in noticed.independent
 
 
-def test_a_function_that_nothing_calls_has_a_line_that_says_so():
-    assert line_of("models.a:f", Traced({}, set()), "abc") == Line("models.a:f", "whole", 0, 0, "", "", "", "abc")
+def test_a_row_that_fails_without_a_fault_notices_nothing(folder):
+    name = "models.contact.hertz:_contact"
+    rows = [{"id": "contact_hertz.p0", "status": "failed", "independence": "closed form"}]
+    noticed = line_of(name, traced(folder, name, rows=rows), judges=True)
+    assert noticed.rows and "contact_hertz.p0" not in noticed.rows.split("; ")
+
+
+def test_a_function_that_gives_no_number_has_a_line_that_says_so(folder):
+    name = "models.contact.hertz:_contact"
+    for case, ended in (({"numbers": set()}, "no numbers"), ({"numbers": set(), "ran": set()}, "not run")):
+        line = line_of(name, traced(folder, name, **case), judges=True)
+        assert (line.ended, line.calling, line.left, line.rows) == (ended, 0, 0, "")
+
+
+def test_a_folder_of_other_functions_is_refused(folder, tmp_path):
+    (tmp_path / TRACE).mkdir()
+    (tmp_path / FUNCTIONS).write_text(json.dumps(["models.a:f"]))
+    with pytest.raises(InputError, match=FUNCTIONS):
+        prepare(tmp_path)
+
+
+def test_judges_and_all_others_make_one_line():
+    judges, others = line("models.a:f", rows="x.y"), line("models.a:f", rows="x.z", tests="t")
+    assert judges.with_others(others) == Line("models.a:f", "whole", 2, 0, "x.y; x.z", "t", "", "abc")
+    assert line(ended="not run").with_others(others).ended == "whole"
 
 
 def test_what_nothing_independent_notices_is_not_covered_and_so_is_what_has_no_line():
@@ -142,8 +229,9 @@ def test_what_nothing_independent_notices_is_not_covered_and_so_is_what_has_no_l
     }
 
 
-def test_a_function_that_numba_refuses_counts_as_not_covered():
-    assert not line(rows="x.broken", independent="x.y", ended="not compiled").is_covered
+def test_what_nothing_runs_is_told_and_what_gives_no_number_needs_none():
+    lines = [line("models.a:f", ended="not run"), line("models.a:g", ended="no numbers")]
+    assert uncovered(lines, ["models.a:f", "models.a:g"]) == {"run by nothing": ["models.a:f"]}
 
 
 def test_a_table_is_read_as_it_was_written(tmp_path):

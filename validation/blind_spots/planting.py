@@ -1,105 +1,54 @@
-"""What an audit does to a process before it imports anything: spoil one function, or watch all that are called.
+"""What an audit does to a process before it imports anything: shared functions multiply what they give by a factor.
 
-The environment says what (``VARIABLE``), so that the workers of a process are treated as it is. Files on the disk stay
-as they are: the function's module is rewritten as it is imported, and compiled functions that may call it are neither
-taken from numba's cache nor put there. All others come from it.
+The environment names the functions, so that the workers of a process are treated as it is. Files on the disk stay as
+they are: modules are rewritten as they are imported. All factors are 1 but where the memory of the process says
+otherwise, so that machine code is compiled once, for every function that is spoiled after that.
 """
 
 import json
-import os
 import sys
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from pathlib import Path
 from typing import Any
-
-VARIABLE = "TWINRIG_BLIND_SPOTS"
-"""JSON of an ``order``: {"spoil": "module:name"} or {"trace": path of a folder, "label": name of the work}."""
-recorder: Any = None
-"""Of this process, where it traces."""
 
 
 def start() -> None:
     """Do what the environment says; nothing without it."""
-    order = json.loads(os.environ.get(VARIABLE, "{}"))
-    if "spoil" in order:
-        module, _, name = order["spoil"].partition(":")
-        sys.meta_path.insert(0, Spoiler(module, name))
-        _bypass_cache(order["spoil"])
-    if "trace" in order:
-        _trace(order)
+    from validation.blind_spots.memory import order
+
+    if order():
+        sys.meta_path.insert(0, Planter(json.loads(Path(order()["functions"]).read_text())))
 
 
-class Spoiler:
-    """Finds the module of the spoiled function first, and rewrites it as it is imported."""
+class Planter:
+    """Finds the modules of some functions first, and rewrites them as they are imported.
 
-    def __init__(self, module: str, name: str) -> None:
-        self.module, self.name = module, name
+    functions : ``module:name`` of each; its place in this list is the place of its factor.
+    """
+
+    def __init__(self, functions: list[str]) -> None:
+        self.modules: dict[str, dict[str, int]] = {}
+        for place, function in enumerate(functions):
+            module, _, name = function.partition(":")
+            self.modules.setdefault(module, {})[name] = place
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """The spec of the spoiled module with a loader of its own; None for any other."""
-        if fullname != self.module:
+        """The spec of such a module with a loader that rewrites it; None for any other."""
+        if fullname not in self.modules:
             return None
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is not None and spec.origin is not None:
-            spec.loader = _Rewriting(fullname, spec.origin, self.name)
+            spec.loader = _Rewriting(fullname, spec.origin, self.modules[fullname])
         return spec
 
 
 class _Rewriting(SourceFileLoader):
-    def __init__(self, fullname: str, path: str, name: str) -> None:
+    def __init__(self, fullname: str, path: str, names: dict[str, int]) -> None:
         super().__init__(fullname, path)
-        self.spoiled = name
+        self.names = names
 
-    def get_code(self, fullname: str) -> Any:
+    def source_to_code(self, data: Any, path: Any, *, _optimization: int = -1) -> Any:
         from validation.blind_spots.rewriting import rewritten
 
-        source = self.get_data(self.path).decode()
-        return compile(rewritten(source, fullname, self.spoiled), self.path, "exec", dont_inherit=True)
-
-
-def _bypass_cache(spoiled: str) -> None:
-    """Neither load nor keep machine code of what may call the spoiled function, or takes functions as arguments."""
-    from numba.core import types
-    from numba.core.caching import Cache
-
-    from validation.blind_spots.tracing import name_of, reached
-
-    load, save = Cache.load_overload, Cache.save_overload
-    known: dict[Any, bool] = {}
-
-    def sound(cache: Any, signature: Any) -> bool:
-        function = cache._py_func
-        arguments = getattr(signature, "args", signature)
-        if function not in known:
-            known[function] = spoiled not in {name_of(code) for code in reached(function)}
-        return known[function] and not any(isinstance(each, types.Callable) for each in arguments)
-
-    def load_sound(cache: Any, signature: Any, context: Any) -> Any:
-        return load(cache, signature, context) if sound(cache, signature) else None
-
-    def save_sound(cache: Any, signature: Any, data: Any) -> None:
-        if sound(cache, getattr(data, "signature", signature)):
-            save(cache, signature, data)
-
-    Cache.load_overload, Cache.save_overload = load_sound, save_sound  # type: ignore[method-assign]
-
-
-def _trace(order: dict[str, str]) -> None:
-    """Watch this process; a worker writes what it has called as it ends."""
-    global recorder
-    import atexit
-    from multiprocessing import parent_process, util
-    from pathlib import Path
-    from uuid import uuid4
-
-    from validation.blind_spots.tracing import Recorder
-
-    recorder = Recorder()
-
-    def tell() -> None:
-        if order.get("label"):
-            text = json.dumps({"names": sorted(recorder.names), "numbers": sorted(recorder.numbers)})
-            (Path(order["trace"]) / f"{order['label']}.{uuid4().hex}.json").write_text(text)
-
-    if order.get("label"):
-        util.Finalize(None, tell, exitpriority=0) if parent_process() else atexit.register(tell)
-    recorder.start()
+        parsed = rewritten(bytes(data).decode(), self.name, self.names)
+        return compile(parsed, path, "exec", dont_inherit=True, optimize=_optimization)

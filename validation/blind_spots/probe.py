@@ -1,54 +1,74 @@
-"""A process of an audit: runs cases and tests, and tells what of each failed or, where it traces, called what.
+"""A process of an audit: runs cases and tests, and tells what of each failed and which functions it ran.
 
-``python -m validation.blind_spots.probe JOB``: a JSON file with "cases" and "tests" (what pytest is given), and "out",
-to which a line of JSON is added for each case and test that has ended.
+``python -m validation.blind_spots.probe JOB``: a JSON file with "cases" and "tests" (what pytest is given); "out", to
+which a line of JSON is added for each case and test that has ended; "sound", ids that fail without a fault; and
+"budgets", seconds of the processor after which nothing more begins: if something independent has noticed, and if not.
 """
 
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
+from numba.core import event
 
-from validation.blind_spots import planting
+from validation.blind_spots import memory
+from validation.blind_spots.table import is_independent
 
 
-def label_of(name: str) -> str:
-    """A case or test as the name of a file."""
-    return "".join(letter if letter.isalnum() else "_" for letter in name)[:120]
+def clock() -> float:
+    """Seconds of the processor that this process and those that it has ended took."""
+    return sum(os.times()[:4])
+
+
+class Compiling(event.Listener):
+    """Seconds of the processor that numba took."""
+
+    def __init__(self) -> None:
+        self.seconds, self.depth, self.start = 0.0, 0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        """numba begins, perhaps within another compilation."""
+        self.start = clock() if self.depth == 0 else self.start
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """numba has ended."""
+        self.depth -= 1
+        self.seconds += clock() - self.start if self.depth == 0 else 0.0
 
 
 class Told:
-    """Adds what ended to the file, and what it called."""
+    """Adds what ended to the file, which functions it ran, and how long it took without compiling."""
 
-    def __init__(self, out: Path) -> None:
-        self.out = out
-        self.uncompiled, self.numbers, self.start = False, set[str](), 0.0
-        self.order = json.loads(os.environ.get(planting.VARIABLE, "{}"))
+    def __init__(self, job: dict[str, Any]) -> None:
+        self.out, self.sound, self.budgets = Path(job["out"]), set(job["sound"]), job["budgets"]
+        self.refused, self.noticed, self.start = False, False, 0.0
+        self.compiling = Compiling()
+        event.register("numba:compiler_lock", self.compiling)
+        self.first = self.clock()
 
-    def begin(self, label: str) -> None:
+    def clock(self) -> float:
+        """Seconds without those that numba took."""
+        return clock() - self.compiling.seconds
+
+    def is_enough(self) -> bool:
+        """Whether the budget is used."""
+        return self.clock() - self.first > self.budgets[0 if self.noticed else 1]
+
+    def begin(self) -> None:
         """A case or test begins."""
-        self.start = time.perf_counter() - self.compiling()
-        if planting.recorder is not None:
-            planting.recorder.reset()
-            os.environ[planting.VARIABLE] = json.dumps(self.order | {"label": label})
+        self.start, self.refused = self.clock(), False
+        memory.forget()
 
-    def compiling(self) -> float:
-        """Seconds that numba took so far, where this process traces; they are not told again."""
-        return 0.0 if planting.recorder is None else float(planting.recorder.compiling)
-
-    def end(self, line: dict[str, Any]) -> None:
-        """A case or test has ended."""
-        if planting.recorder is not None:
-            new = planting.recorder.numbers - self.numbers
-            self.numbers |= new
-            line |= {"names": sorted(planting.recorder.names), "numbers": sorted(new)}
-        line |= {"seconds": time.perf_counter() - self.compiling() - self.start}
-        line |= {"uncompiled": self.uncompiled}
+    def end(self, line: dict[str, Any], failed: list[tuple[str, str]]) -> None:
+        """A case or test has ended; failed : ids and grounds."""
+        self.noticed |= any(id not in self.sound and is_independent(id, grounds) for id, grounds in failed)
+        line |= {"ran": memory.places(memory.RAN), "numbers": memory.places(memory.NUMBERS)}
+        line |= {"seconds": self.clock() - self.start, "refused": self.refused}
         with self.out.open("a") as file:
             file.write(json.dumps(line) + "\n")
 
@@ -59,7 +79,7 @@ def run_case(name: str, told: Told) -> None:
 
     from validation.common.rows import rested
 
-    told.begin(label_of(name))
+    told.begin()
     try:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -67,8 +87,9 @@ def run_case(name: str, told: Told) -> None:
         lines = [{"id": row.id, "status": row.status, "independence": row.independence} for row in rows]
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
-        told.uncompiled |= is_of_numba(error)
-    told.end({"case": name, "rows": lines})
+        told.refused |= is_of_numba(error)
+    failed = [(line["id"], line["independence"]) for line in lines if line["status"] == "failed"]
+    told.end({"case": name, "rows": lines}, failed)
 
 
 def is_of_numba(error: BaseException) -> bool:
@@ -81,23 +102,31 @@ class Watching:
 
     def __init__(self, told: Told) -> None:
         self.told, self.failed = told, False
+        self.session: pytest.Session | None = None
+
+    def pytest_sessionstart(self, session: pytest.Session) -> None:
+        """Keep the session, which ends when the budget is used."""
+        self.session = session
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         """A test begins."""
         self.failed = False
-        self.told.begin(label_of(nodeid))
+        self.told.begin()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """A part of a test has ended."""
         self.failed |= report.failed
         if report.when == "teardown":
             marked = dict(report.user_properties).get("grounds", "")
-            self.told.end({"test": report.nodeid, "failed": self.failed, "grounds": marked})
+            line = {"test": report.nodeid, "failed": self.failed, "grounds": marked}
+            self.told.end(line, [(report.nodeid, marked)] if self.failed else [])
+            if self.session is not None and self.told.is_enough():
+                self.session.shouldstop = "the budget is used"
 
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo) -> None:
         """Note that numba refused a function."""
         if call.excinfo is not None:
-            self.told.uncompiled |= is_of_numba(call.excinfo.value)
+            self.told.refused |= is_of_numba(call.excinfo.value)
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:
         """Note what grounds a test names."""
@@ -108,10 +137,11 @@ class Watching:
 
 def main(job: dict[str, Any]) -> None:
     """Cases first, and then tests."""
-    told = Told(Path(job["out"]))
+    told = Told(job)
     for name in job["cases"]:
-        run_case(name, told)
-    if job["tests"]:
+        if not told.is_enough():
+            run_case(name, told)
+    if job["tests"] and not told.is_enough():
         pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
 
 

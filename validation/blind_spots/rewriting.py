@@ -1,18 +1,24 @@
-"""The source of a module with one function spoiled: what it returns, yields or writes into its arguments.
+"""The source of a module whose functions can be spoiled: what they return, yield or write into their arguments.
 
-Numbers that it puts into an argument, or into a part of one, are spoiled as they are put there. An array that functions
-which it calls write into is spoiled as a whole instead, where it ends; behind a pointer, whose length nobody knows, the
-numbers are that those functions are given.
+Numbers that one puts into an argument, or into a part of one, are spoiled as they are put there. An array that
+functions which it calls write into is spoiled as a whole instead, where it ends; behind a pointer, whose length nobody
+knows, the numbers are that those functions are given.
 """
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
 SPOILED, SCALED, PUT = "_spoiled_by_audit", "_scaled_by_audit", "_put_by_audit"
+HELPERS = {"spoiled": SPOILED, "scaled": SCALED, "put": PUT}
+"""Functions of ``spoiling``, and their names in a rewritten module."""
+COMPILES = re.compile(r"\bnumba\b|machine\.compiled")
+"""What the source of a module names that compiles functions."""
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 VIEWS = ("array_at", "double_at", "row", "array", "beyond", "start", "at", "records", "reshape", "ravel")
 """Functions that give a view of their first argument: those of ``models.machine``, and numpy's."""
@@ -114,17 +120,31 @@ def _imported(module: str, name: str) -> tuple[str, str] | None:
 
 
 @cache
-def written(module: str, name: str) -> frozenset[str]:
-    """Arguments that the functions which this one calls write into."""
+def original(module: str, name: str) -> Function | None:
+    """The definition of a function as it stands in the sources; None where there is none."""
     try:
-        function = function_of(tree(module), name)
+        return function_of(tree(module), name)
     except (NoSuchFunction, OSError):
+        return None
+
+
+@cache
+def written(module: str, name: str) -> frozenset[str]:
+    """Arguments that the functions which this one calls write into; none on the way back to a function that waits for
+    the answer, as functions do that call each other."""
+    function = original(module, name)
+    if function is None or (module, name) in _asked:
         return frozenset()
+    _asked.add((module, name))
     known, touched = roots(function), set[str]()
     for node in _inside(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             touched |= handed((module, name), node, known)
+    _asked.remove((module, name))
     return frozenset(touched)
+
+
+_asked: set[tuple[str, str]] = set()
 
 
 def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> set[str]:
@@ -132,9 +152,8 @@ def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> se
     place = _imported(caller[0], getattr(call.func, "id", ""))
     if place is None or place == caller:
         return set()
-    try:
-        callee = function_of(tree(place[0]), place[1])
-    except (NoSuchFunction, OSError):
+    callee = original(*place)
+    if callee is None:
         return set()
     inner = roots(callee)
     touched = set().union(*(_stores(node, inner) for node in _inside(callee))) | written(*place)
@@ -143,8 +162,18 @@ def handed(caller: tuple[str, str], call: ast.Call, known: dict[str, str]) -> se
 
 
 class _Spoil(ast.NodeTransformer):
-    def __init__(self, caller: tuple[str, str], known: dict[str, str], last: list[str]) -> None:
-        self.caller, self.known, self.last = caller, known, last
+    """Spoils what one function gives: caller, its module and name; last, arguments that are spoiled where it ends."""
+
+    def __init__(self, caller: tuple[str, str], known: dict[str, str], last: list[str], place: int) -> None:
+        self.caller, self.known, self.last, self.place = caller, known, last, place
+
+    def body(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """The statements of the function."""
+        made: list[ast.stmt] = []
+        for statement in statements:
+            new = self.visit(statement)
+            made += new if isinstance(new, list) else [new]
+        return made if isinstance(made[-1], ast.Return) else [*made, *self._endings()]
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         return node
@@ -153,20 +182,20 @@ class _Spoil(ast.NodeTransformer):
 
     def visit_Return(self, node: ast.Return) -> list[ast.stmt]:
         if node.value is None or (isinstance(node.value, ast.Constant) and node.value.value is None):
-            return [*endings(self.last), node]
+            return [*self._endings(), node]
         if not self.last:
-            return [ast.Return(_call(SPOILED, node.value))]
-        held = ast.Assign([ast.Name("_given_by_audit", ast.Store())], _call(SPOILED, node.value))
-        return [held, *endings(self.last), ast.Return(ast.Name("_given_by_audit", ast.Load()))]
+            return [ast.Return(self._spoiled(node.value))]
+        held = ast.Assign([ast.Name("_given_by_audit", ast.Store())], self._spoiled(node.value))
+        return [held, *self._endings(), ast.Return(ast.Name("_given_by_audit", ast.Load()))]
 
     def visit_Yield(self, node: ast.Yield) -> ast.Yield:
-        return ast.Yield(_call(SPOILED, node.value)) if node.value else node
+        return ast.Yield(self._spoiled(node.value)) if node.value else node
 
     def visit_Expr(self, node: ast.Expr) -> ast.Expr:
         """What a call hands over to be written behind a pointer is spoiled before; an array is at the end."""
         if isinstance(node.value, ast.Call):
             for root in sorted(handed(self.caller, node.value, self.known))[:1]:
-                given = [each if root_of(each, self.known) else _put(each, root) for each in node.value.args]
+                given = [each if root_of(each, self.known) else self._into(each, root) for each in node.value.args]
                 node.value.args = given
         return node
 
@@ -180,48 +209,54 @@ class _Spoil(ast.NodeTransformer):
         """The assignment with what it puts into an argument spoiled, unless that is spoiled as a whole."""
         into = sorted(_stores(node, self.known))
         if into and not set(into) & set(self.last):
-            node.value = _call(SPOILED, node.value)
+            node.value = self._spoiled(node.value)
         elif into:
             whole = next(name for name in into if name in self.last)
-            node.value = _put(node.value, whole)
+            node.value = self._into(node.value, whole)
         return node
 
+    def _spoiled(self, value: ast.expr) -> ast.Call:
+        return self._call(SPOILED, value)
 
-def _call(name: str, value: ast.expr) -> ast.Call:
-    return ast.Call(ast.Name(name, ast.Load()), [value], [])
+    def _into(self, value: ast.expr, argument: str) -> ast.Call:
+        return self._call(PUT, value, ast.Name(argument, ast.Load()))
+
+    def _endings(self) -> list[ast.stmt]:
+        """Statements that spoil arguments as a whole."""
+        return [ast.Expr(self._call(SCALED, ast.Name(name, ast.Load()))) for name in self.last]
+
+    def _call(self, name: str, *arguments: ast.expr) -> ast.Call:
+        return ast.Call(ast.Name(name, ast.Load()), [*arguments, ast.Constant(self.place)], [])
 
 
-def _put(value: ast.expr, place: str) -> ast.Call:
-    return ast.Call(ast.Name(PUT, ast.Load()), [value, ast.Name(place, ast.Load())], [])
-
-
-def endings(names: list[str]) -> list[ast.stmt]:
-    """Statements that spoil arguments as a whole."""
-    return [ast.Expr(_call(SCALED, ast.Name(name, ast.Load()))) for name in names]
-
-
-def rewritten(source: str, module: str, name: str) -> ast.Module:
-    """The module's tree with the function spoiled; raises NoSuchFunction."""
+def rewritten(source: str, module: str, names: dict[str, int]) -> ast.Module:
+    """The module's tree with some functions spoiled, each by the fault at its place; raises NoSuchFunction."""
     parsed = ast.parse(source)
-    function = function_of(parsed, name)
-    known = roots(function)
-    last = sorted(written(module, name))
-    spoil = _Spoil((module, name), known, last)
-    body: list[ast.stmt] = []
-    for statement in function.body:
-        new = spoil.visit(statement)
-        body += new if isinstance(new, list) else [new]
-    function.body = body if isinstance(body[-1], ast.Return) else [*body, *endings(last)]
-    names = [ast.alias("spoiled", SPOILED), ast.alias("scaled", SCALED), ast.alias("put", PUT)]
-    helper = ast.ImportFrom("validation.blind_spots.spoiling", names, 0)
-    docstring = isinstance(parsed.body[0], ast.Expr) and isinstance(parsed.body[0].value, ast.Constant)
-    parsed.body.insert(1 if docstring else 0, ast.copy_location(helper, parsed.body[0]))
+    for name, place in names.items():
+        function = function_of(parsed, name)
+        last = sorted(written(module, name))
+        function.body = _Spoil((module, name), roots(function), last, place).body(function.body)
+    helpers: list[ast.stmt] = [ast.ImportFrom("validation.blind_spots.spoiling", [*map(_as_helper, HELPERS)], 0)]
+    if COMPILES.search(source):
+        helpers += [ast.Import([ast.alias("validation.blind_spots.compiled_spoiling", "_compiled_by_audit")])]
+    first = sum(1 for _ in takewhile(_stands_first, parsed.body))
+    parsed.body[first:first] = helpers
     return ast.fix_missing_locations(parsed)
+
+
+def _as_helper(name: str) -> ast.alias:
+    return ast.alias(name, HELPERS[name])
+
+
+def _stands_first(statement: ast.stmt) -> bool:
+    """Whether nothing may stand before a statement: a docstring, or what a module takes from the future."""
+    is_docstring = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return is_docstring or (isinstance(statement, ast.ImportFrom) and statement.module == "__future__")
 
 
 def can_be_spoiled(module: str, name: str) -> bool:
     """Whether rewriting finds anything that a function gives back or writes."""
-    function = function_of(rewritten(text(module), module, name), name)
+    function = function_of(rewritten(text(module), module, {name: 0}), name)
     named = {
         node.func.id for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 
-from validation.blind_spots.rewriting import ROOT, Function, text, tree
+from validation.blind_spots.rewriting import COMPILES, ROOT, Function, text, tree
 
 ENGINES = ("exudyn", "mujoco")
 SYSTEMS = "models.systems."
@@ -89,13 +89,23 @@ def is_compiled(function: Function) -> bool:
 @cache
 def compiled_functions() -> list[str]:
     """``module:name`` of every compiled function of the shared modules."""
-    compiling = [module for module in shared_modules() if re.search(r"\bnumba\b|machine\.compiled", text(module))]
+    compiling = [module for module in shared_modules() if COMPILES.search(text(module))]
     return [f"{module}:{name}" for module in compiling for name, each in definitions(module) if is_compiled(each)]
+
+
+@cache
+def law_functions() -> list[str]:
+    """``module:name`` of every function, compiled or not, of the shared modules that hold laws."""
+    laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY]
+    return [f"{module}:{name}" for module in laws for name, _ in definitions(module)]
+
+
+def candidates() -> list[str]:
+    """``module:name`` of all functions that are shared if they give numbers, compiled ones first."""
+    return list(dict.fromkeys((*compiled_functions(), *law_functions())))
 
 
 def shared_functions(numbers: Iterable[str]) -> list[str]:
     """``module:name`` of all shared functions, compiled ones first; numbers : those that were seen to give numbers."""
-    compiled, known = compiled_functions(), set(numbers)
-    laws = [module for module in shared_modules() if module.split(".")[1] not in MACHINERY]
-    others = (f"{module}:{name}" for module in laws for name, _ in definitions(module))
-    return list(dict.fromkeys((*compiled, *(name for name in others if name in known))))
+    compiled, known = set(compiled_functions()), set(numbers)
+    return [name for name in candidates() if name in compiled or name in known]

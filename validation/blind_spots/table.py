@@ -10,7 +10,7 @@ Rows of planted faults are none: they judge checks, not values.
 import csv
 import sys
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from models.core.whole_files import whole_file
@@ -25,9 +25,11 @@ JOINED = "; "
 class Line:
     """What notices one function: ids of rows and tests, which of them are independent, and what was not run.
 
-    ended : "whole", or why not: "crashed", "out of time", "not compiled" (numba refused the spoiled function, so that
-    what failed says nothing), "not spoiled" (rewriting sees nothing that it gives back or writes); calling : how many
-    cases and tests call it; left : how many of these were not run, for want of time; commit : that the line belongs to.
+    ended : "whole", or why not: "crashed", "out of time", "not spoiled" (rewriting sees nothing that it gives back or
+    writes), "no numbers" (what it gives counts or names places), "not run" (by any case or test that was asked);
+    calling : in how many cases and tests that were asked it gives numbers, which are those on independent grounds, and
+    all others if none of these noticed; left : how many of them were not run, for want of time; commit : that the line
+    belongs to.
     """
 
     function: str
@@ -42,12 +44,19 @@ class Line:
     @property
     def is_covered(self) -> bool:
         """Whether something independent notices."""
-        return bool(self.independent) and self.ended != "not compiled"
+        return bool(self.independent)
 
     @property
     def noticed(self) -> int:
         """How many rows and tests notice."""
         return sum(len(text.split(JOINED)) for text in (self.rows, self.tests) if text)
+
+    def with_others(self, line: "Line") -> "Line":
+        """This line of judges, and one of all others, as one."""
+        rows, tests = (JOINED.join(filter(None, texts)) for texts in ((self.rows, line.rows), (self.tests, line.tests)))
+        calling, left = self.calling + line.calling, self.left + line.left
+        ended = line.ended if self.ended in ("whole", "not run", "no numbers") else self.ended
+        return replace(self, ended=ended, calling=calling, left=left, rows=rows, tests=tests)
 
 
 def read(path: Path = KEPT) -> list[Line]:
@@ -80,12 +89,15 @@ def uncovered(lines: Iterable[Line], functions: Iterable[str]) -> dict[str, list
     functions : all that are shared now; those that have no line are "not audited".
     """
     known = {line.function: line for line in lines}
-    gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": [], "not audited": []}
+    gaps: dict[str, list[str]] = {"noticed by nothing": [], "noticed by nothing independent": []}
+    gaps |= {"run by nothing": [], "not audited": []}
     for name in functions:
         line = known.get(name)
-        if line is None or line.ended in ("not spoiled", "not compiled"):
+        if line is None or line.ended == "not spoiled":
             gaps["not audited"].append(name)
-        elif not line.is_covered:
+        elif line.ended == "not run":
+            gaps["run by nothing"].append(name)
+        elif not line.is_covered and line.ended != "no numbers":
             some = line.noticed or line.ended != "whole"
             gaps["noticed by nothing independent" if some else "noticed by nothing"].append(name)
     return {kind: names for kind, names in gaps.items() if names}

@@ -1,0 +1,134 @@
+"""``spoiling`` in compiled code, whose factors are read from memory as it runs: a new fault compiles nothing."""
+
+from typing import Any
+
+import llvmlite.binding
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.targetconfig import ConfigStack
+from numba.extending import intrinsic, overload
+
+from validation.blind_spots.memory import ADDRESS, PLACES, SYMBOL
+from validation.blind_spots.spoiling import put, scaled, spoiled
+
+llvmlite.binding.add_symbol(SYMBOL, ADDRESS)
+
+
+def _pointer(builder: Any, row: int, place: Any) -> Any:
+    """Where the number of a function stands in a row of ``memory``."""
+    double = ir.DoubleType()
+    rows = builder.module.globals.get(SYMBOL)
+    rows = rows or ir.GlobalVariable(builder.module, ir.ArrayType(double, 3 * PLACES), SYMBOL)
+    whole = ir.IntType(64)
+    return builder.gep(rows, [whole(0), builder.add(place, whole(row * PLACES))])
+
+
+@intrinsic
+def ran(typingctx: Any, place: Any) -> Any:
+    """Mark a function that gives no number that could be off."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.store(ir.DoubleType()(1.0), _pointer(builder, 1, arguments[0]))
+        return context.get_dummy_value()
+
+    return types.void(types.int64), generate
+
+
+@intrinsic
+def factor(typingctx: Any, place: Any) -> Any:
+    """Mark a function that gives a number; what the number is multiplied by."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        double = ir.DoubleType()
+        for row in (1, 2):
+            builder.store(double(1.0), _pointer(builder, row, arguments[0]))
+        fault = builder.load(_pointer(builder, 0, arguments[0]))
+        fault.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return builder.fadd(double(1.0), fault)
+
+    return types.float64(types.int64), generate
+
+
+def _same(value, place):
+    ran(place)
+    return value
+
+
+def _product(value, place):
+    return value * factor(place)
+
+
+def _product_if_off(value, place):
+    """The array itself without a fault, as whoever gets it may write into it."""
+    by = factor(place)
+    return value if by == 1.0 else value * by
+
+
+def _is_number(kind: Any) -> bool:
+    return kind == types.float64 or isinstance(kind, types.Complex)
+
+
+@overload(spoiled)
+def _spoiled(value, place):
+    """An array stays where the function may not make one (``lean``)."""
+    if _is_number(value):
+        return _product
+    if isinstance(value, types.BaseTuple) and any(_is_number(part) or _makes_arrays(part) for part in _parts(value)):
+        return _tuple(value)
+    return _product_if_off if _makes_arrays(value) else _same
+
+
+def _parts(kind: types.BaseTuple) -> list[Any]:
+    """Types of what a tuple holds, and of what tuples in it hold."""
+    return [inner for part in kind for inner in (_parts(part) if isinstance(part, types.BaseTuple) else [part])]
+
+
+def _makes_arrays(kind: Any) -> bool:
+    """Whether this is an array of numbers, and the function that is compiled may make another."""
+    flags = ConfigStack.top_or_none()
+    is_array = isinstance(kind, types.Array) and _is_number(kind.dtype)
+    return is_array and flags is not None and bool(flags.nrt)
+
+
+def _tuple(kind: Any) -> Any:
+    """A compiled function that spoils each part of such tuples."""
+    parts = ", ".join(f"spoiled(value[{i}], place)" for i in range(len(kind)))
+    made = f"cls({parts})" if isinstance(kind, types.BaseNamedTuple) else f"({parts},)"
+    names = {"spoiled": spoiled, "cls": getattr(kind, "instance_class", tuple)}
+    exec(f"def whole(value, place):\n    return {made}\n", names)
+    return names["whole"]
+
+
+@overload(scaled)
+def _scaled(values, place):
+    if not isinstance(values, types.Array) or not values.mutable:
+        return lambda values, place: ran(place)
+    if isinstance(values.dtype, types.Record):
+        return _records(values.dtype)
+    if not _is_number(values.dtype):
+        return lambda values, place: ran(place)
+
+    def whole(values, place):
+        by = factor(place)
+        if by != 1.0:
+            for each in np.ndindex(values.shape):
+                values[each] *= by
+
+    return whole
+
+
+def _records(kind: types.Record) -> Any:
+    """A compiled function that puts the numbers of an array of such records off."""
+    lines = "".join(f"            record.{name} = by * record.{name}\n" for name in kind.fields)
+    names = {"np": np, "factor": factor}
+    loop = "        for each in np.ndindex(values.shape):\n            record = values[each]\n"
+    exec(f"def whole(values, place):\n    by = factor(place)\n    if by != 1.0:\n{loop}{lines}", names)
+    return names["whole"]
+
+
+@overload(put)
+def _put(value, into, place):
+    if isinstance(into, types.Array) or not isinstance(value, types.Float | types.BaseTuple):
+        return lambda value, into, place: value
+    return lambda value, into, place: spoiled(value, place)
