@@ -50,7 +50,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     well = as_shown or run_pages(pages(sources), check=False, strict=True)
     add_rows(sources)
     shutil.copyfile(ROOT / "docs" / "mkdocs.yml", work / "mkdocs.yml")
-    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict"]
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
     subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET)
     return well

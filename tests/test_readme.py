@@ -39,6 +39,15 @@ def test_every_study_is_listed_with_its_duration_and_run_by_ci():
         assert name in ci
 
 
+def test_every_command_is_listed():
+    from studies.command_line import app
+
+    text = (ROOT / "docs" / "reference" / "commands.md").read_text()
+    names = [each.name or each.callback.__name__ for each in app.registered_commands]
+    assert len(names) > 5
+    assert [name for name in names if f"`twinrig {name}" not in text] == []
+
+
 def test_every_folder_is_listed():
     text = (ROOT / "CONTRIBUTING.md").read_text()
     for folder in ("twinrig", "models", "studies", "validation", "docs", "tests"):

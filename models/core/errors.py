@@ -68,14 +68,14 @@ def similar_file(path: Path) -> str:
 class RunFailed(RuntimeError):
     """A simulation that did not give a complete, finite answer.
 
+    ``partial`` is what the run had recorded until then, where its system keeps that.
+
     Parameters
     ----------
     engine : name of the engine
     reason : what was found, as a phrase
     time : last time (s) with a good state, None if there is none
     state : the last good state, shape (8,) or None
-
-    ``partial`` is what the run had recorded until then, where its system keeps that.
     """
 
     partial: Any = None

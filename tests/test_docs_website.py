@@ -1,0 +1,62 @@
+"""What the site is built from: copies of all pages where their links lead, and the rows of the newest report."""
+
+import json
+import os
+from fnmatch import fnmatchcase
+
+import yaml
+
+from docs.pages import ROOT, pages
+from docs.validation_cases import newest_report, rows
+from docs.website import copy_pages
+
+ROW = {
+    "id": "audit.one",
+    "quantity": "a | b",
+    "expected": 0.0,
+    "tolerance": 1e-12,
+    "independence": "native",
+    "status": "passed",
+}
+
+
+def test_every_page_is_copied_with_the_pictures_that_it_shows(tmp_path):
+    copy_pages(tmp_path)
+    assert [page.relative_to(tmp_path) for page in pages(tmp_path)] == [page.relative_to(ROOT) for page in pages()]
+    assert (tmp_path / "studies" / "readme_pictures.png").is_file() and (tmp_path / "nav.yml").is_file()
+    assert not [*tmp_path.rglob("*.py")]
+
+
+def test_the_rows_are_those_of_the_newest_report(tmp_path):
+    assert newest_report(tmp_path) is None
+    for age, (name, content) in enumerate({"new": {"rows": [ROW]}, "old": {"rows": []}, "other": {}}.items()):
+        (tmp_path / name).mkdir()
+        path = tmp_path / name / "results.json"
+        path.write_text(json.dumps(content))
+        os.utime(path, (1e9 - age, 1e9 - age))
+    report = newest_report(tmp_path)
+    assert report == tmp_path / "new" / "results.json"
+    assert rows(report).splitlines()[-1] == "| `audit.one` | a \\| b | 0 | 1e-12 | native | passed |"
+
+
+MAY_LACK = ("docs/findings.md", "docs/systems/index.md")
+"""Pages that the navigation names for their place, whether they are there or not."""
+
+
+def entries(nav):
+    """All paths and patterns of a navigation."""
+    for entry in nav:
+        values = (
+            [entry] if isinstance(entry, str) else [value for key, value in entry.items() if key != "ignore_no_matches"]
+        )
+        for value in values:
+            yield from [value] if isinstance(value, str) else entries(value)
+
+
+def test_every_page_has_a_place_in_the_navigation():
+    paths = [*entries(yaml.safe_load((ROOT / "docs" / "nav.yml").read_text())["nav"])]
+    for path in paths:
+        assert "*" in path or (ROOT / path).is_file() or path in MAY_LACK, path
+    for page in pages():
+        name = str(page.relative_to(ROOT))
+        assert any(fnmatchcase(name, path) for path in paths), name
