@@ -324,13 +324,16 @@ def _changes(axis: Any, one: Found) -> None:
     for i, name in enumerate(one.scene.quantities):
         values = np.array([effect.changes[i] for effect in shown])
         axis.plot(
-            np.clip(np.nan_to_num(100 * values, posinf=HIGHEST), LOWEST, HIGHEST),
+            np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST, HIGHEST),
             y,
             "os^Dv"[i % 5],
             color=f"C{i}",
             ms=5,
             label=name.partition(" [")[0],
         )
+    for row, effect in zip(y, shown, strict=True):
+        if not np.isfinite(effect.changes).all():
+            axis.text(HIGHEST, row, "cannot go alone", ha="right", va="center", fontsize=SMALL)
     barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in one.choice.barred]
     if barred:
         place = np.full(len(barred), HIGHEST)

@@ -124,8 +124,10 @@ def _places(figure: Figure, texts: list[Text]) -> list[str]:
 
 
 def _box(text: Text) -> Bbox:
-    """Room that the letters take, without a frame and an arrow."""
-    return Text.get_window_extent(text)
+    """Room that the letters take, without a frame, an arrow, and empty lines below."""
+    box, lines = Text.get_window_extent(text), text.get_text().split("\n")
+    empty = len(lines) - len(text.get_text().rstrip().split("\n"))
+    return Bbox.from_extents(box.x0, box.y0 + empty / len(lines) * box.height, box.x1, box.y1)
 
 
 def _overlap(one: Bbox, other: Bbox) -> bool:

@@ -357,21 +357,25 @@ def _told(one: Difference) -> str:
 
 
 def _figure(one: Path, two: Path, found: list[Difference], results: Results, path: Path) -> None:
-    """Both results and, below, their difference, of the three quantities that differ most."""
+    """Both results and, below, their difference, of the three quantities that differ most, or one that is equal."""
     from models.drawing.figures import BLUE, DARK, TITLE, VERMILION, WIDE, heading, legend_below, plt, save, wrapped
 
-    shown = found[:3]
+    differ = [each for each in found if each.largest != 0][:3]
+    shown = differ or found[:1]
     share = 0.95 * WIDE / len(shown) - 0.3
-    figure, axes = plt.subplots(2, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
-    for (top, below), each in zip(axes.T, shown, strict=True):
+    figure, axes = plt.subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
+    for top, each in zip(axes[0], shown, strict=True):
         top.plot(each.grid, each.one, color=DARK, linewidth=2.0, label=str(one))
         top.plot(each.grid, each.two, color=VERMILION, linewidth=1.0, label=str(two))
         top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE))
+    for below, each in zip(axes[-1], differ, strict=False):
         below.plot(each.grid, np.where(np.isfinite(each.gap), each.gap, np.nan), color=BLUE)
         below.plot(each.at, each.gap[each.row], "o", color=BLUE, markersize=5)
         error = ", rms within the stated error" if each.within else ""
         told = f"difference [{each.unit or '-'}], largest {each.largest:.3g} at the mark{error}"
-        below.set(title=wrapped(told, share, TITLE), xlabel=each.over)
+        below.set_title(wrapped(told, share, TITLE))
+    for lowest, each in zip(axes[-1], shown, strict=True):
+        lowest.set_xlabel(each.over)
     legend_below(figure, axes[0, 0], columns=1)
     heading(figure, f"Largest differences of {len(found)} quantities", results)
     save(figure, path)

@@ -12,8 +12,8 @@ from models.core.discretisation import WARNED, worst_of
 from models.core.told import Results
 from models.drawing.figures import (
     BAD,
-    BLUE,
     COLOURS,
+    GREY,
     LABELS,
     ORANGE,
     WIDE,
@@ -138,7 +138,7 @@ def _panel(axis: Any, at: np.ndarray, what: str, curves: dict[str, list[Any]], s
             at[order],
             np.array(column, float)[order],
             style,
-            color=COLOURS.get(engine, BLUE),
+            color=COLOURS.get(engine, GREY),
             markersize=3.5,
             linewidth=2.2 - 0.6 * min(i, 2),
             label=LABELS[engine] or None,

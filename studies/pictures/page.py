@@ -11,13 +11,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrow
 from matplotlib.transforms import IdentityTransform
 
-from models.drawing.figures import COLOURS, LABELS
+from models.drawing.figures import COLOURS, DARK, GREY, LABELS, ORANGE, PINK, SKY, plt
 from studies.pictures.drawing import drawn
 from studies.pictures.film import Motion, Stage, gaps
 
 WIDTH, HEIGHT = 1280, 720
 EDGE, TOP, TALL = 12, 66, 400
 """Pixels: margin, height of the title, height of the pictures."""
+
+
+LETTERS: dict[Any, Any] = {
+    "font.size": 11.5,
+    **dict.fromkeys(("axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 11.5),
+    "axes.titlesize": 12.5,
+}
+"""Sizes (points) that are still read where a page is shown as wide as other figures."""
 
 
 class Page:
@@ -31,6 +39,13 @@ class Page:
             [arrow.vectors @ stage.curve.direction / 1e3 for arrow in motion.arrows if arrow.kind == stage.curve.kind]
             for motion in motions
         ]
+        with plt.rc_context(LETTERS):
+            self._draw()
+        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def _draw(self) -> None:
+        """All that does not move."""
+        stage, motions = self.stage, self.motions
         no_layout: Any = "none"  # overrides the style of figures; the type hints do not know it
         self._figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, layout=no_layout)
         self._canvas = FigureCanvasAgg(self._figure)
@@ -41,11 +56,10 @@ class Page:
         self._legend()
         axes = self._curves()
         self._clock = self._figure.text(1 - EDGE / WIDTH, 0.96, "", ha="right", fontsize=13, family="monospace")
-        self._cursor = axes.axvline(0.0, color="#222222", lw=1.2)
+        self._cursor = axes.axvline(0.0, color=DARK, lw=1.2)
         for artist in (self._clock, self._cursor):
             artist.set_animated(True)
         self._canvas.draw()
-        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def frames(self) -> Iterator[np.ndarray]:
         """All pages (720, 1280, 3), 8 bits a colour."""
@@ -109,12 +123,13 @@ class Page:
         labels = (LABELS[motion.engine] for motion in self.motions)
         axes.set_title(f"{curve.kind.capitalize()} {curve.meaning}" + marks.format(*labels))
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names))
-        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, difference(self.motions), ha="right", fontsize=9.5)
-        self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]", fontsize=9.5)
+        self._figure.text(1 - EDGE / WIDTH, 12 / HEIGHT, difference(self.motions), ha="right")
+        self._figure.text(70 / WIDTH, 12 / HEIGHT, "time [s]")
         return axes
 
 
-TONES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+TONES = (DARK, PINK, ORANGE, SKY, GREY)
+"""Colours of curves, none of them that of an engine, which stands above its picture."""
 
 
 def difference(motions: list[Motion]) -> str:

@@ -1,0 +1,138 @@
+"""The first picture of the README: one vehicle, three implementations, how far they agree, and what accuracy costs.
+
+``python -m studies.pictures.overview FILE`` runs 2 s of a rough road in both engines and the reference and draws it
+anew; nothing in it depends on the machine, as work is counted in force calls.
+"""
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
+
+import twinrig
+from models.drawing.figures import COLOURS, DARK, GREY, LABELS, PALE, SMALL, WIDE, heading, plt, save
+
+DURATION, FORCE = 2.0, "f1"
+"""Length of a run (s), and the front wheel's force, which is compared."""
+SCENE: dict[str, Any] = {
+    "title": "A vehicle on a rough road",
+    "vehicle": {"parameters": "asymmetric_twin"},
+    "run": {"duration": DURATION},
+    "effects": {"road": {"source": "iso8608", "road_class": "B", "level": "one-sided", "seed": 1, "speed": 20.0}},
+}
+STEPS = (1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4)
+STABLE = {"exudyn": STEPS, "mujoco": STEPS[2:], "reference": STEPS[2:]}
+"""Steps, s, which all divide ``GRID``; and of each curve those at which its method is stable."""
+GRID, FINE = 1e-2, 5e-5
+"""s: spacing of the times at which forces are compared, and step of what is taken for the truth."""
+RUNGE_KUTTA = {"reference": "RK4", "exudyn": "RK44", "mujoco": "RK4"}
+USUAL = {"exudyn": ("GeneralizedAlpha", "usual solver", 1e-2), "mujoco": ("Euler", "usual solver", 2e-3)}
+"""What an engine does if not told otherwise: method, name, step (s)."""
+SHOWN = {"reference": ("-", 3.2), "exudyn": ("-", 1.5), "mujoco": (":", 1.5)}
+"""Line and width of each curve, so that all are seen where they lie on one another."""
+
+
+def draw(path: Path) -> Path:
+    """Run, draw, save ``path`` and return it."""
+    alike = {engine: _run(engine, method, 1e-3) for engine, method in RUNGE_KUTTA.items()}
+    figure, axes = plt.subplot_mosaic(
+        [["idea", "idea", "idea"], ["force", "gap", "price"]], figsize=(WIDE, 4.5), height_ratios=(1, 1.5)
+    )
+    _idea(axes["idea"])
+    _forces(axes["force"], alike)
+    _gaps(axes["gap"], alike)
+    _prices(axes["price"])
+    heading(figure, "twinrig: one vehicle in two engines and by hand, each result with its error and its price")
+    return save(figure, path)
+
+
+def _run(engine: str, method: str, step: float) -> twinrig.Result:
+    """A run by one method at one step."""
+    table = f"engines.{engine}"
+    return twinrig.run(SCENE, engine, set={f"{table}.integrator": method, f"{table}.step": step}, error=False)
+
+
+def _forces(axis: Any, runs: dict[str, twinrig.Result]) -> None:
+    for engine, one in runs.items():
+        line, width = SHOWN[engine]
+        axis.plot(one.times, 1e-3 * one[FORCE], line, color=COLOURS[engine], linewidth=width, label=LABELS[engine])
+    axis.set(xlabel="time [s]", title="The same force [kN] ...", xlim=(0.0, DURATION))
+
+
+def _gaps(axis: Any, runs: dict[str, twinrig.Result]) -> None:
+    """Difference of each engine from the reference, by the largest force."""
+    reference = runs["reference"]
+    largest = np.abs(reference[FORCE]).max()
+    for engine in ("exudyn", "mujoco"):
+        gap = np.maximum.accumulate(np.abs(runs[engine][FORCE] - reference[FORCE])) / largest
+        axis.semilogy(reference.times, np.maximum(gap, 1e-18), color=COLOURS[engine], linewidth=1.6)
+    digits = math.floor(-math.log10(max(line.get_ydata()[-1] for line in axis.lines)))
+    axis.axhline(1e-2, color=DARK, linestyle=":")
+    axis.text(0.03 * DURATION, 1.6e-2, "1 %", va="bottom")
+    axis.set(
+        xlabel="time [s]", ylim=(1e-17, 1.0), xlim=(0.0, DURATION), title=f"... to {digits} digits: difference [-]"
+    )
+
+
+def _prices(axis: Any) -> None:
+    """Largest error of the force by its largest value over force calls: classical Runge-Kutta, and usual solvers."""
+    truth = _run("reference", "RK4", FINE)
+    curves = {engine: (method, f"{LABELS[engine]}, {name}") for engine, (method, name, _) in USUAL.items()}
+    curves |= {"reference": ("RK4", "Runge-Kutta, all three")}
+    for engine, (method, name) in curves.items():
+        points = [_price(_run(engine, method, step), truth, step) for step in STABLE[engine]]
+        calls, errors = zip(*points, strict=True)
+        axis.loglog(calls, errors, "o-", color=COLOURS[engine], markersize=3.5)
+        axis.text(1.4 * calls[-1], errors[-1], name, color=COLOURS[engine], va="center", fontsize=SMALL)
+    for engine, (method, _, step) in USUAL.items():
+        place = _price(_run(engine, method, step), truth, step)
+        axis.plot(*place, "o", markersize=10, markerfacecolor="none", color=COLOURS[engine])
+    axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
+
+
+def _price(one: twinrig.Result, truth: twinrig.Result, step: float) -> tuple[float, float]:
+    """Force calls of a run, and the largest error of its force at common times by the largest force."""
+    rows, fine = round(GRID / step), round(GRID / FINE)
+    error = np.abs(one[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
+    return float(one.counts()["force calls"]), float(error)
+
+
+def _idea(axis: Any) -> None:
+    """The vehicle on its road, and what becomes of one scene file."""
+    axis.set(xlim=(0, 24), ylim=(0, 4.2), aspect="equal")
+    axis.axis("off")
+    x = np.linspace(0.0, 8.2, 300)
+    road = 0.5 + 0.16 * np.sin(1.9 * x) + 0.1 * np.sin(4.3 * x + 1.0)
+    axis.fill_between(x, road, 0.0, color=PALE, alpha=0.6, linewidth=0)
+    axis.plot(x, road, color=GREY)
+    for place in (2.1, 6.1):
+        height = float(np.interp(place, x, road))
+        axis.add_patch(Circle((place, height + 0.45), 0.45, facecolor="white", edgecolor=DARK, linewidth=2.0))
+        spring = np.linspace(height + 0.9, 2.45, 9)
+        axis.plot(place + 0.16 * np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]), spring, color=DARK)
+    axis.add_patch(FancyBboxPatch((1.3, 2.45), 5.6, 0.8, boxstyle="round,pad=0.1", facecolor="#dddddd", edgecolor=DARK))
+    axis.text(4.1, 2.85, "one scene file", ha="center", va="center", fontsize=9)
+    for engine, height in (("exudyn", 3.45), ("mujoco", 2.1), ("reference", 0.75)):
+        name = LABELS[engine] if engine != "reference" else "equations by hand"
+        _arrow(axis, (8.4, 2.1), (10.3, height), COLOURS[engine])
+        _box(axis, (13.2, height), 5.6, name, COLOURS[engine])
+        _arrow(axis, (16.1, height), (17.5, 2.1), COLOURS[engine])
+    _box(axis, (20.7, 2.1), 6.0, "one result: compared,\nits error and its price", DARK, 1.7)
+
+
+def _arrow(axis: Any, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
+    axis.add_patch(FancyArrowPatch(start, end, color=colour, arrowstyle="-|>", mutation_scale=10, linewidth=1.4))
+
+
+def _box(axis: Any, middle: tuple[float, float], wide: float, text: str, colour: str, high: float = 0.95) -> None:
+    corner = middle[0] - wide / 2, middle[1] - high / 2
+    shape = FancyBboxPatch(corner, wide, high, boxstyle="round,pad=0.08", facecolor="white", edgecolor=colour)
+    axis.add_patch(shape)
+    axis.text(*middle, text, color=colour, ha="center", va="center", fontsize=9, fontweight="bold")
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]))
