@@ -20,6 +20,7 @@ from models.core.finding import Finding, lines, queries
 from models.core.whole_files import reason_of, write_whole
 from models.measured.file_kinds import is_measurement
 from studies.command.asked import SCENES, causes, engines_of, findings_of, load_scene, plan_of, ready
+from studies.command.waiting import waiting
 
 app = typer.Typer(
     add_completion=False,
@@ -143,7 +144,8 @@ def show(
     from models.advice.price.effects_text import as_dict
     from models.advice.price.effects_text import lines as price_lines
 
-    found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
+    with waiting("short runs with and without each effect", loaded.system):
+        found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found, loaded.quantities)))
 
 
@@ -186,10 +188,12 @@ def run_scene(
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
     with _queried(loaded):
-        module = ready(loaded, engines)
+        with waiting("checking the scene", loaded.system):
+            module = ready(loaded, engines)
         folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
-        _finish(lambda progress: module.run(loaded, engines, folder, progress), folder, as_json, doubts, strict)
+        work = partial(module.run, loaded, engines, folder)
+        _finish(work, folder, as_json, doubts, strict, loaded.system)
 
 
 @contextmanager
@@ -232,7 +236,8 @@ def price(
 
     loaded = load_scene(scene, changes)
     _say_user_code(loaded)
-    found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
+    with waiting("runs of every engine in ever finer steps", loaded.system):
+        found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
     print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found)))
     if not found.winners:
         sys.exit(1)
@@ -285,7 +290,10 @@ def export(
     """
     from studies.command.export import export as write
 
-    print("\n".join(write(load_scene(scene, changes), engine, out)))
+    loaded = load_scene(scene, changes)
+    with waiting("building the vehicle", loaded.system):
+        lines = write(loaded, engine, out)
+    print("\n".join(lines))
 
 
 @app.command()
@@ -329,7 +337,7 @@ def _blind_spots(more: bool, out: Path | None, resume: Path | None) -> None:
 
     folder = _folder("blind-spots", TRACE, "", out, resume)
     try:
-        with _progress(False) as progress:
+        with waiting("blind spots") as progress:
             lines = audit(folder, progress)
     except KeyboardInterrupt:
         _end(f"interrupted; finished functions are kept: twinrig validate --blind-spots --resume {folder}", 130)
@@ -342,17 +350,18 @@ def _finish(
     as_json: bool,
     doubts: tuple[Finding, ...] = (),
     strict: bool = False,
+    system: str = "",
 ) -> None:
     """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
 
     doubts : about the input, which stand in the summary and, as ``queries.json``, beside the results; strict : whether
-    a broken assumption ends with code 1.
+    a broken assumption ends with code 1; system : of the scene.
     """
     from models.core.result_folders import COMMAND, drop_if_empty
     from models.core.told import summarised
 
     try:
-        with _progress(as_json) as progress:
+        with waiting(folder.name, system) as progress:
             summary = summarised(work(progress))
         if doubts:
             summary["queries"] = queries(doubts)
@@ -381,20 +390,6 @@ def _folder(name: str, blocks: str | None, study: str, out: Path | None, resume:
     if blocks is None:
         raise InputError("--resume", "", str(resume), f"the study {study!r} keeps nothing that can be resumed")
     return resumed_folder(resume, blocks)
-
-
-@contextmanager
-def _progress(silent: bool) -> Iterator[Any]:
-    """A progress bar on the terminal; silent where nobody looks."""
-    if silent or not sys.stderr.isatty():
-        yield lambda text, part: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=1.0)
-        yield lambda text, part: bar.update(task, description=text, completed=part)
 
 
 def _untold(findings: tuple[Finding, ...], told: str) -> list[str]:

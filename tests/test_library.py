@@ -259,6 +259,15 @@ def test_a_file_of_the_users_that_hides_a_package_is_named(tmp_path, hiding):
     assert said.startswith("ImportError") and f"{place} hides twinrig's package" in said and "rename it" in said
 
 
+def test_the_command_names_what_hides_a_package_without_a_traceback(tmp_path):
+    (tmp_path / "models.py").write_text("")
+    script = tmp_path / "twinrig"
+    script.write_text("from twinrig.command import main\nmain()\n")
+    done = fresh(tmp_path, f"import sys, runpy; sys.argv = [{str(script)!r}, 'list']; runpy.run_path({str(script)!r})")
+    assert done.returncode == 1 and done.stderr.startswith(f"twinrig: {tmp_path / 'models.py'} hides twinrig's package")
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_a_folder_without_code_hides_nothing(tmp_path):
     (tmp_path / "models").mkdir()
     assert fresh(tmp_path, "import twinrig").returncode == 0

@@ -65,6 +65,7 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     from models.core.finding import gathered, queries
     from models.systems import run as run_system
     from studies.command.asked import findings_of, plan_of
+    from studies.command.waiting import waiting
     from twinrig.result import Result
 
     loaded = load(scene, set).checked
@@ -74,7 +75,8 @@ def run(scene: AnyScene, engine: str = "", *, set: Changes = None, error: bool =
     with _as_library(loaded):
         plan_of(loaded).check(loaded, checked)
         doubtful = queries(gathered(findings_of(loaded)))
-        answer = run_system(loaded, chosen, error=error, **how)
+        with waiting(f"{loaded.title}: {chosen or loaded.system}", loaded.system):
+            answer = run_system(loaded, chosen, error=error, **how)
     answer.data.attrs["queries"] = json.dumps(doubtful)
     return Result(answer.data, answer.detail)
 
@@ -205,11 +207,14 @@ def price(
     from models.advice.price.recommendation import price as recommended
     from models.advice.price.text import as_dict, lines
     from studies.command.asked import engines_of
+    from studies.command.waiting import waiting
     from twinrig.report import Report
 
     loaded = load(scene, set).checked
     with _as_library(loaded):
-        answer = recommended(loaded, tolerance, quantity, engines_of(engine, loaded.system, "engine"))
+        engines = engines_of(engine, loaded.system, "engine")
+        with waiting("runs of every engine in ever finer steps", loaded.system):
+            answer = recommended(loaded, tolerance, quantity, engines)
     return Report(tuple(lines(answer)), as_dict(answer), answer)
 
 
@@ -232,6 +237,7 @@ def choose(
 
     from models.core.told import summarised
     from studies.command.asked import engines_of, ready
+    from studies.command.waiting import waiting
     from twinrig.report import Report
 
     loaded = _choosing(load(scene, set), quantities, tolerance).checked
@@ -239,7 +245,8 @@ def choose(
     with _as_library(loaded), TemporaryDirectory() as temporary:
         study = ready(loaded, engines)
         kept = _new_folder(folder, "choice") if folder is not None else Path(temporary)
-        summary = summarised(study.run(loaded, engines, kept, lambda text, share: None))
+        with waiting(loaded.title, loaded.system) as progress:
+            summary = summarised(study.run(loaded, engines, kept, progress))
     return Report((loaded.title, *summary["table"]), summary)
 
 

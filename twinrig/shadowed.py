@@ -1,5 +1,6 @@
 """Notice files of the user's that stand in the way of twinrig's packages of the same name."""
 
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -8,7 +9,19 @@ PACKAGES = ("models", "studies", "validation")
 
 
 def check() -> None:
-    """Raise ImportError where Python would import another ``models``, ``studies`` or ``validation`` than twinrig's."""
+    """Raise ImportError where Python would import another ``models``, ``studies`` or ``validation`` than twinrig's.
+
+    The console command ends with the message alone.
+    """
+    try:
+        _check()
+    except ImportError as error:
+        if Path(sys.argv[0]).stem != "twinrig":
+            raise
+        sys.exit(f"twinrig: {error}")
+
+
+def _check() -> None:
     beside = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         spec = find_spec(name)

@@ -11,6 +11,7 @@ from numba import cfunc, types
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
+from models.core.waiting import marching
 from models.engines.contact_bridge import Wheels, check_step, forces
 from models.engines.mujoco_layout import check, offset
 from models.machine.stack import array_at
@@ -99,7 +100,8 @@ class Marcher:
     def run(self, states: Array, steps: int) -> Array:
         """States (n, steps, 2 m) of n runs from ``states`` (n, 2 m); RunFailed unless all of it is finite."""
         whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
-        path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
+        with marching(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
+            path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
         late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
         failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up
         if failed.any():

@@ -14,6 +14,7 @@ import exudyn.itemInterface as typed_items
 import numpy as np
 
 from models.core.trajectory import Trajectory
+from models.core.waiting import marching
 from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
@@ -331,8 +332,9 @@ class ExudynModel:
         note = ""
         try:
             solver = getattr(exu.DynamicSolverType, self.settings.integrator)
-            if not self.built.mbs.SolveDynamic(options, solverType=solver):
-                note = "; the solver reported failure"
+            with marching(lambda: self.built.mbs.systemData.GetTime() / self.settings.duration):
+                done = self.built.mbs.SolveDynamic(options, solverType=solver)
+            note = "" if done else "; the solver reported failure"
         except (exu.ExudynError, RuntimeError, ValueError) as error:
             if "KeyboardInterrupt" in str(error):
                 raise KeyboardInterrupt from error

@@ -9,6 +9,7 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
+from models.core.waiting import marching
 from models.engines.exudyn_system import items, mass_and_force, quiet_settings, start
 
 Listed = Callable[[Any, Any], Any]
@@ -55,7 +56,8 @@ def solve(mbs: Any, options: Any, steps: int, step: float, solver: str) -> bool:
     ti.numberOfSteps, ti.endTime, ti.verboseMode = steps, steps * step, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
     try:
-        return bool(mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver)))
+        with marching(lambda: mbs.systemData.GetTime() / (steps * step)):
+            return bool(mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, solver)))
     except (exu.ExudynError, RuntimeError, ValueError) as error:
         if "KeyboardInterrupt" in str(error):
             raise KeyboardInterrupt from error

@@ -7,6 +7,7 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
+from models.core.waiting import marching
 from models.engines.assembly import Settings
 
 exu.config.printToConsole = False
@@ -66,7 +67,8 @@ def solve(mbs: Any, settings: Settings) -> str:
     ti.generalizedAlpha.spectralRadius = settings.spectral_radius
     ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
     try:
-        done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, settings.integrator))
+        with marching(lambda: mbs.systemData.GetTime() / settings.duration):
+            done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, settings.integrator))
     except (exu.ExudynError, RuntimeError, ValueError) as error:
         if "KeyboardInterrupt" in str(error):
             raise KeyboardInterrupt from error

@@ -18,6 +18,7 @@ from mujoco import rollout
 
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
+from models.core.waiting import marching
 from models.engines.assembly import Assembly, Settings
 from models.engines.mujoco_quiet import quiet
 from models.engines.protocol import guard, landings_followed
@@ -224,7 +225,7 @@ class MujocoModel:
         n = self.settings.steps
         states = np.empty((n + 1, 8))
         states[0] = self.assembly.initial
-        with self.callback(), quiet():
+        with self.callback(), quiet(), marching(lambda: self.data.time / self.settings.duration):
             self._advance(states, [*self.free, *(4 + i for i in self.free)])
         times = self.settings.step * np.arange(n + 1)
         if self.guided:

@@ -10,6 +10,7 @@ from mujoco import rollout
 
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
+from models.core.waiting import marching
 from models.engines.assembly import Settings
 from models.engines.mujoco import CHUNK, INTEGRATORS
 from models.engines.mujoco_callback import installed
@@ -142,7 +143,7 @@ class SpatialMujoco:
         for warning in self.data.warning:
             warning.number = 0
         times = settings.step * np.arange(settings.steps + 1)
-        with self._forces(), quiet():
+        with self._forces(), quiet(), marching(lambda: self.data.time / settings.duration):
             self._advance(path, times, settings)
         counts = {"steps": settings.steps, "force calls": (4 if settings.integrator == "RK4" else 1) * settings.steps}
         states = path[:, 1:] if (np.diff(both) == 1).all() else path[:, both]

@@ -1,0 +1,17 @@
+"""What a run that takes its time is at, for a bar that someone may watch; nothing is computed unless one does."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+MARCHES: list[Callable[[], float]] = []
+"""Shares of the marches that are under way, the innermost last."""
+
+
+@contextmanager
+def marching(share: Callable[[], float]) -> Iterator[None]:
+    """For the block a march is under way; share : what is done of it, 0 to 1, asked from another thread at any time."""
+    MARCHES.append(share)
+    try:
+        yield
+    finally:
+        MARCHES.remove(share)

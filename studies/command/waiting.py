@@ -1,0 +1,162 @@
+"""The bar of a command that takes longer than a second: what is being done and the time left, on a terminal alone.
+
+A thread draws it on stderr, so that results on stdout stay as they are. It knows three things: what a study tells, the
+share of the march that an engine is at, and that numba compiles, which happens once after an installation.
+"""
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from models.core.waiting import MARCHES
+
+DELAY, EVERY = 1.0, 0.1
+"""s until a bar is shown, and between two looks."""
+SLOW = 0.4
+"""s of one compilation from which on it is told: loading what was compiled before takes less."""
+KNOWN = 0.01
+"""Share of a work from which on its time left is told."""
+COMPILING = {"pitch-plane": 5.0}
+"""s that all kernels of a system take to compile on an idle core; an upper bound, as some may be there."""
+LOCK = "numba:compiler_lock"
+"""Numba's event from the beginning to the end of each compilation."""
+Tell = Callable[[str, float], None]
+"""Told what is done now, and which part of all (0 to 1)."""
+
+
+class Kernels:
+    """numba's compilations: how long they took in all, and since when one is under way. Numba asks for both methods."""
+
+    def __init__(self) -> None:
+        self.depth, self.total, self.since, self.attached = 0, 0.0, 0.0, False
+        self._remove: Callable[[], None] = lambda: None
+
+    def attach(self) -> None:
+        """Listen once numba is there; it is not imported for this."""
+        if self.attached or "numba.core.compiler_lock" not in sys.modules:  # which has imported the events
+            return
+        event: Any = sys.modules["numba.core.event"]
+        listener = type("Listener", (event.Listener,), {"on_start": self._start, "on_end": self._end})()
+        event.register(LOCK, listener)
+        self.attached, self._remove = True, lambda: event.unregister(LOCK, listener)
+
+    def detach(self) -> None:
+        """Listen no more."""
+        self._remove()
+
+    def _start(self, *event: Any) -> None:
+        if self.depth == 0:
+            self.since = time.monotonic()
+        self.depth += 1
+
+    def _end(self, *event: Any) -> None:
+        self.depth = max(0, self.depth - 1)
+        if self.depth == 0:
+            self.total += time.monotonic() - self.since
+
+    def spent(self) -> float:
+        """s of all compilations so far."""
+        return self.total + (time.monotonic() - self.since if self.depth else 0.0)
+
+    def busy(self) -> bool:
+        """Whether one is under way that is told."""
+        return self.depth > 0 and time.monotonic() - self.since > SLOW
+
+
+@dataclass
+class Waiting:
+    """What a bar shows: text and share as told, the march that runs, what numba does.
+
+    system : of the scene, for the time that its kernels take.
+    """
+
+    text: str
+    system: str = ""
+    share: float = 0.0
+    begun: float = field(default_factory=time.monotonic)
+    kernels: Kernels = field(default_factory=Kernels)
+    _march: tuple[Any, float] = (None, 0.0)
+
+    def tell(self, text: str, share: float) -> None:
+        """Another work, and which part of all is done."""
+        self.text, self.share = text, min(max(share, 0.0), 1.0)
+
+    def state(self) -> tuple[str, float | None, str]:
+        """Text, share and time left of now; no share where nothing is known of it."""
+        if self.kernels.busy():
+            spent, most = self.kernels.spent(), COMPILING.get(self.system, 0.0)
+            share = spent / most if most > spent else None
+            return "compiling kernels, once", share, _left(most - spent if share else None, spent)
+        worked = time.monotonic() - self.begun - self.kernels.spent()
+        march = MARCHES[-1] if MARCHES else None
+        if march is None:
+            return self.text, self.share or None, _left(_remaining(self.share, worked), worked)
+        if march is not self._march[0]:
+            self._march = march, worked
+        share, since = 0.0, worked - self._march[1]
+        with suppress(Exception):  # an engine that is asked at a bad time
+            share = min(max(float(march()), 0.0), 1.0)
+        return self.text, share, _left(_remaining(share, since), worked)
+
+
+def _remaining(share: float, seconds: float) -> float | None:
+    """s left of a work of which a share took so many seconds."""
+    return seconds * (1.0 - share) / share if share > KNOWN else None
+
+
+def _left(seconds: float | None, spent: float) -> str:
+    """The time left in words, or the time so far where it is not known."""
+    return f"{_told(spent)} so far" if seconds is None else f"{_told(seconds)} left"
+
+
+def _told(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+
+
+@contextmanager
+def waiting(text: str, system: str = "") -> Iterator[Tell]:
+    """A bar on the terminal for the block, if it takes longer than DELAY; what it gives is to be told what is done.
+
+    Nothing is written, and no thread runs, where stderr is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield lambda text, share: None
+        return
+    now, over = Waiting(text, system), threading.Event()
+    thread = threading.Thread(target=_draw, args=(now, over), daemon=True)
+    thread.start()
+    try:
+        yield now.tell
+    finally:
+        over.set()
+        thread.join()
+        now.kernels.detach()
+
+
+def _draw(now: Waiting, over: threading.Event) -> None:
+    """Draw until it is over, from DELAY on."""
+    while not over.wait(EVERY):
+        now.kernels.attach()
+        now.state()  # which sees when a march begins
+        if time.monotonic() - now.begun > DELAY:
+            break
+    else:
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.fields[left]}")
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
+        task = bar.add_task(now.text, total=None, left="")
+        while True:
+            now.kernels.attach()
+            text, share, left = now.state()
+            total = None if share is None else 1.0
+            bar.update(task, description=text, total=total, completed=share or 0.0, left=left)
+            if over.wait(EVERY):
+                return

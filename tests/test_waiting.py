@@ -1,0 +1,125 @@
+"""Bars of what takes long: on a terminal alone, with what is done and the time left, compiling included."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from models.core.waiting import MARCHES, marching
+from models.engines.assembly import Settings
+from models.engines.protocol import build
+from models.systems.pitch_plane.scene import assemble
+from studies.command.waiting import COMPILING, Waiting
+from validation.common.scenes import road_scene
+
+ROOT = Path(__file__).parents[1]
+WORK = """
+import sys, time
+from models.core.waiting import marching
+from studies.command.waiting import waiting
+begun = time.monotonic()
+with waiting("road: exudyn", "pitch-plane") as tell:
+    tell("road: exudyn", 0.0)
+    with marching(lambda: (time.monotonic() - begun) / 4.0):
+        time.sleep({0})
+    import numba
+    from numba.core import event
+    time.sleep(0.3)
+    with event.trigger_event("numba:compiler_lock"):
+        time.sleep({1})
+print("done")
+"""
+
+
+def on_terminal(*command, folder):
+    """What a command writes to a pseudo-terminal as stderr, as text without control sequences, and to a pipe."""
+    outer, inner = pty.openpty()
+    plain = os.environ | {"TERM": "xterm", "COLUMNS": "120", "PYTHONPATH": str(ROOT)}
+    child = subprocess.Popen(command, cwd=folder, env=plain, stdout=subprocess.PIPE, stderr=inner)
+    os.close(inner)
+    drawn = b""
+    while True:
+        try:
+            part = os.read(outer, 65536)
+        except OSError:  # the child has closed its end
+            break
+        if not part:
+            break
+        drawn += part
+    written = child.communicate()[0].decode()
+    os.close(outer)
+    assert child.returncode == 0, drawn
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", drawn.decode()), written
+
+
+def test_a_bar_tells_the_work_the_time_left_and_compiling(tmp_path):
+    drawn, written = on_terminal(sys.executable, "-c", WORK.format(2.5, 1.5), folder=tmp_path)
+    assert re.search(r"road: exudyn [^ ]* +[123] s left", drawn), drawn[-500:]
+    assert re.search(r"compiling kernels, once .* s left", drawn), drawn[-500:]
+    assert written == "done\n"
+
+
+def test_nothing_is_drawn_of_short_work_and_into_pipes(tmp_path):
+    short = "from studies.command.waiting import waiting\nwith waiting('road', ''): pass\nprint('done')"
+    drawn, written = on_terminal(sys.executable, "-c", short, folder=tmp_path)
+    assert drawn == "" and written == "done\n"
+    plain = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", WORK.format(1.5, 0.1)], env=plain, capture_output=True, text=True)
+    assert done.stderr == "" and done.stdout == "done\n"
+
+
+def test_a_command_that_takes_seconds_has_one_and_its_results_do_not(tmp_path):
+    """One run in one engine, at some 15,000 steps a second on an idle core and with twice as many of half the steps."""
+    arguments = ["run", "release", "--engine", "exudyn", "--json", "--out", "out", "--set", "run.duration=30"]
+    command = [sys.executable, "-m", "studies.command_line", *arguments]
+    drawn, written = on_terminal(*command, folder=tmp_path)
+    assert "exudyn" in drawn and re.search(r" s (left|so far)", drawn)
+    assert written.startswith("{") and written.endswith("}\n")
+    kept = b"".join(path.read_bytes() for path in (tmp_path / "out").iterdir() if path.suffix != ".nc")
+    assert b" s left" not in kept
+
+
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco"])
+def test_a_march_tells_how_far_it_is(engine, monkeypatch):
+    """Asked at each look of a thread; here once at its end, when all of it is done."""
+    ends = []
+
+    class Told(list):
+        def remove(self, share):
+            ends.append(share())
+            super().remove(share)
+
+    monkeypatch.setattr("models.core.waiting.MARCHES", Told())
+    scene = road_scene(duration=0.5)
+    build(engine, assemble(scene), Settings({"exudyn": "RK44", "mujoco": "RK4"}[engine], 1e-3, 0.5)).run()
+    assert ends == [pytest.approx(1.0, abs=1e-9)]
+
+
+def test_time_left_follows_the_share_and_leaves_out_compiling(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    shown = Waiting("six runs", "pitch-plane", begun=now[0])
+    shown.tell("six runs", 0.25)
+    now[0] += 10.0
+    assert shown.state() == ("six runs", 0.25, "30 s left")
+    shown.kernels._start()
+    now[0] += 2.0
+    text, share, left = shown.state()
+    assert text == "compiling kernels, once" and left == f"{COMPILING['pitch-plane'] - 2.0:.0f} s left"
+    assert share == pytest.approx(2.0 / COMPILING["pitch-plane"])
+    now[0] += 2.0 * COMPILING["pitch-plane"]
+    assert shown.state()[1:] == (None, f"{2.0 + 2.0 * COMPILING['pitch-plane']:.0f} s so far")
+    shown.kernels._end()
+    assert shown.state() == ("six runs", 0.25, "30 s left")
+    with marching(lambda: 0.5):
+        shown.state()
+        now[0] += 8.0
+        assert shown.state() == ("six runs", 0.5, "8 s left")
+    assert not MARCHES
+    with marching(lambda: 1 / 0):
+        assert shown.state()[1] == 0.0
