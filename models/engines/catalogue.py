@@ -55,6 +55,13 @@ CATALOGUE: dict[str, dict[str, Integrator]] = {
 MISSING = {("exudyn", "DVERK6"): "DVERK6 is named but not implemented in Exudyn; use DOPRI5 or RK67"}
 """Integrators that an engine names and does not have, with what to say to who asks for one."""
 
+ADAPTIVE = {
+    engine: tuple(name for name, own in methods.items() if own.adaptive and (engine, name) not in MISSING)
+    for engine, methods in CATALOGUE.items()
+    if any(own.adaptive for own in methods.values())
+}
+"""Integrators that pick their own steps, of the engines that have some."""
+
 OUTSIDE: dict[str, type] = {}
 """Classes from files outside the tree by their names ``module:Class``, once they are registered (outside.py)."""
 

@@ -41,6 +41,7 @@ def describe(scene: HandlingScene) -> str:
         ),
         *(_line(name, _manoeuvre(scene, name)) for name in scene.manoeuvres),
         _line("run", f"Runge-Kutta 4, {scene.run.step:g} s, in both engines around the same compiled forces"),
+        *(_line(engine, _adaptive(scene, engine)) for engine in scene.engines),
         *(_line(*line) for line in joints_alone(free)),
         _line("shared", "tyres, bristles, driver's controls and the road: no engine has them"),
         _line("reference", "plain equations that share no force with them, where --engine reference asks for it"),
@@ -48,6 +49,11 @@ def describe(scene: HandlingScene) -> str:
     never = "compliance of the carcass, roll and pitch of wheels, steering system"
     assumed = assumption_lines(assumptions(first), 18)
     return "\n".join([*lines, *effect_lines(scene, 18), *assumed, _line("never", never)])
+
+
+def _adaptive(scene: HandlingScene, engine: str) -> str:
+    own, step = scene.engines[engine], scene.run.step
+    return f"{own.integrator} in its place, which picks its own steps to {own.tolerance:g}, rows every {step:g} s"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

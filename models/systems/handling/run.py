@@ -1,6 +1,8 @@
 """A manoeuvre in an engine, and what is read of it: tyres, energies, motion in the vehicle's own axes."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -8,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from models.core.assumptions import judged
-from models.core.discretisation import Estimate, Series, by_cells, by_steps, size_of, stated, summed
+from models.core.discretisation import Estimate, Series, by_cells, by_steps, not_estimated, size_of, stated, summed
 from models.core.errors import RunFailed
 from models.core.resolved import check_resolved
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
+from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel, Plain, free_model
 from models.engines.spatial_reference import SpatialReference
 from models.multibody import forces as at
@@ -42,6 +45,8 @@ MOST_CELLS, CELLS = 200, "tyres.cells"
 """Most cells per strip, and the key that they are set by."""
 MIDDLE = 0.4
 """Share of a manoeuvre after which a part of it is repeated, where no longer step can be."""
+ADAPTIVE = "its steps are kept to a tolerance; for an error leave engines.NAME out: Runge-Kutta 4 tells it"
+"""Why a run whose integrator picks its own steps states no error: that of its tyres' net would be missing."""
 STILL = 1e-6
 """Share of the load at rest, and of the speed at the start, below which a force or a speed is rounding."""
 REPORTS = {
@@ -116,8 +121,11 @@ def run(scene: HandlingScene, engine: str, manoeuvre: str | None = None, error: 
     error : whether the error of the steps is estimated, by further runs. Raises RunFailed where it does not end well.
     """
     name = manoeuvre or next(iter(scene.manoeuvres))
-    asked = scene.manoeuvres[name]
-    drive = driven(engine, scene.handling(name), asked.speed, asked.duration, scene.run.step)
+    asked, handling, adaptive = scene.manoeuvres[name], scene.handling(name), scene.adaptive(engine, name)
+    if adaptive is not None:
+        run = judged_drive(scene, engine, name, driven_adaptively(engine, handling, asked.speed, adaptive))
+        return not_estimated(run, ADAPTIVE) if error else run
+    drive = driven(engine, handling, asked.speed, asked.duration, scene.run.step)
     labelled = judged_drive(scene, engine, name, drive)
     return _with_error(labelled, drive, asked.speed) if error else labelled
 
@@ -273,25 +281,48 @@ def driven(engine: str, handling: Handling, speed: float, duration: float, step:
     """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
     model = build(engine, handling)
     begun = time.process_time()
-    try:
+    with _turning_over(handling, engine):
         path = model.run(*handling.straight(speed), duration, step)
-    except RunFailed as error:  # a car on its roof is soon no state that an engine can march
-        if error.state is not None:
-            _check_upright(handling, np.array([error.time]), error.state[None], engine)
-        raise
     return read(handling, path, engine, time.process_time() - begun)
 
 
+def driven_adaptively(engine: str, handling: Handling, speed: float, settings: Settings) -> Drive:
+    """``driven`` by an integrator of "exudyn" or "reference" that picks its own steps."""
+    from models.engines.free_vehicle_adaptive import march_adaptively
+
+    model, begun = build(engine, handling), time.process_time()
+    with _turning_over(handling, engine):
+        path = march_adaptively(model, *handling.straight(speed), settings)
+    return reported(handling, path, engine, time.process_time() - begun)
+
+
+@contextmanager
+def _turning_over(handling: Handling, engine: str) -> Iterator[None]:
+    """A march that fails because its car turns over says so: on its roof it is soon no state that an engine can
+    march."""
+    try:
+        yield
+    except RunFailed as error:
+        if error.state is not None:
+            _check_upright(handling, np.array([error.time]), error.state[None], engine)
+        raise
+
+
 def read(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
-    """Reports of a run; RunFailed where a tyre's force is not finite, or the step cannot follow."""
-    report, ledger = _reports(handling, run, engine)
-    if not np.isfinite(report).all():
-        raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
-    drive = Drive(handling, run, report, ledger, seconds)
-    _check_upright(handling, run.times, run.positions, engine)
+    """``reported``, of a run in fixed steps; RunFailed where they cannot follow."""
+    drive = reported(handling, run, engine, seconds)
     _check_step(drive, engine)
     check_resolved(engine, run.times, run.positions, run.rates, mass(handling.vehicle))
     return drive
+
+
+def reported(handling: Handling, run: Trajectory, engine: str = "", seconds: float = 0.0) -> Drive:
+    """Reports of a run; RunFailed where a tyre's force is not finite, or the car turns over."""
+    report, ledger = _reports(handling, run, engine)
+    if not np.isfinite(report).all():
+        raise RunFailed(engine, "a tyre's force is not finite: use a smaller step")
+    _check_upright(handling, run.times, run.positions, engine)
+    return Drive(handling, run, report, ledger, seconds)
 
 
 def _reports(handling: Handling, run: Trajectory, engine: str) -> tuple[np.ndarray, np.ndarray]:

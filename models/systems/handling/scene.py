@@ -12,6 +12,8 @@ from models.core.scene_effects import extended, with_own
 from models.core.scene_file import SceneFile, checked
 from models.core.steps import MOST_STEPS, divides, fitting
 from models.core.strict import Query, Strict, accepted, quantity
+from models.engines.assembly import Settings
+from models.engines.catalogue import ADAPTIVE
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.iso8608 import level_of_class
 from models.road.plane_waves import plane_waves
@@ -58,7 +60,16 @@ class RoadTable(Strict):
 class RunTable(Strict):
     """[run]."""
 
-    step: float = quantity("s", "of Runge-Kutta 4 in both engines", default=1e-3)
+    step: float = quantity(
+        "s", "of Runge-Kutta 4 in every engine, or from row to row and the longest of [engines.NAME]", default=1e-3
+    )
+
+
+class Adaptive(Strict):
+    """[engines.NAME]: in place of Runge-Kutta 4 an integrator of this engine that picks its own steps."""
+
+    integrator: str = Field(description="DOPRI5 or ODE23 of exudyn; DOP853, Radau or LSODA of the reference")
+    tolerance: float = Field(default=1e-8, ge=1e-13, le=1e-3, description="of every step, relative; absolute: 1/100")
 
 
 class Manoeuvre(Strict):
@@ -92,6 +103,13 @@ class HandlingScene(SceneFile):
     run: RunTable = RunTable()
     manoeuvres: dict[str, Manoeuvre] = Field(min_length=1, description="driven one by one, a table each")
     effects: dict[str, Any] = Field(default_factory=dict, description="effects of your own, a table each")
+    engines: dict[str, Adaptive] = Field(default_factory=dict, description="engines that pick their own steps")
+
+    def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
+        """How an engine that picks its own steps marches a manoeuvre; None for Runge-Kutta 4."""
+        own = self.engines.get(engine)
+        duration = self.manoeuvres[manoeuvre].duration
+        return None if own is None else Settings(own.integrator, self.run.step, duration, own.tolerance)
 
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
@@ -112,7 +130,19 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         _check_times(scene, place, manoeuvre)
         for control, limits in LIMITS.items():
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
+    for engine, own in scene.engines.items():
+        _check_engine(scene, engine, own)
     return with_own(scene)
+
+
+def _check_engine(scene: HandlingScene, engine: str, own: Adaptive) -> None:
+    """Refuse an engine, or an integrator, that does not pick its own steps."""
+    if engine not in ADAPTIVE:
+        allowed = "no engine with integrators that pick their own steps"
+        raise InputError(scene.file, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
+    if own.integrator not in ADAPTIVE[engine]:
+        allowed = "no integrator of this engine that picks its own steps"
+        raise InputError(scene.file, f"engines.{engine}.integrator", own.integrator, allowed, ADAPTIVE[engine])
 
 
 def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:

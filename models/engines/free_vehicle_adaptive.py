@@ -1,0 +1,99 @@
+"""A free vehicle marched by an integrator that picks its own steps: Exudyn's, or scipy's around plain equations.
+
+Rows are even. Each is the end of a march of its own in Exudyn, which would write rows where its steps fall; scipy's
+methods interpolate by polynomials of their own order. No step is longer than the time between two rows.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from models.core.errors import RunFailed
+from models.core.trajectory import Trajectory
+from models.engines.assembly import Settings
+from models.engines.free_vehicle import FreeModel
+from models.engines.protocol import guard
+
+ABSOLUTE = 1e-2
+"""Absolute tolerance (m, rad, per s) by the relative one."""
+FINEST = 3e-14
+"""Relative tolerance below which scipy's methods would work on rounding."""
+
+
+def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: Settings) -> Trajectory:
+    """From positions and rates (n,), rows every ``settings.step``; RunFailed unless all of it is finite and sane.
+
+    model : of an engine that ``models.engines.catalogue.ADAPTIVE`` names, with one of its integrators there.
+    """
+    march, begun = (_in_exudyn if model.ENGINE == "exudyn" else _by_scipy), np.concatenate((q, v))
+    states, counts = march(model, begun, settings)
+    times = settings.step * np.arange(settings.steps + 1)
+    guard(model.ENGINE, times, states, settings.steps * settings.step)
+    return Trajectory(times, states, counts=counts)
+
+
+def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
+    """States (steps + 1, 2 n), a row at a time, and what it took."""
+    import exudyn as exu
+
+    from models.engines.exudyn import counted
+    from models.engines.exudyn_system import start
+
+    mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
+    states[0], counts = begun, {"steps": 0, "force calls": 0}
+    solver = getattr(exu.DynamicSolverType, settings.integrator)
+    for i in range(settings.steps):
+        start(mbs, *np.split(states[i], 2))
+        try:
+            done = mbs.SolveDynamic(_options(i * settings.step, settings), solverType=solver)
+        except (exu.ExudynError, RuntimeError, ValueError) as error:
+            if "KeyboardInterrupt" in str(error):
+                raise KeyboardInterrupt from error
+            done = False
+        if not done:
+            raise RunFailed("exudyn", "no step is short enough for its tolerance", i * settings.step, states[i])
+        data, took = mbs.systemData, counted(mbs)
+        states[i + 1] = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
+        counts = {name: count + took[name] for name, count in counts.items()}
+    return states, counts
+
+
+def _options(begin: float, settings: Settings) -> Any:
+    """Exudyn's settings of one row from a time (s) on."""
+    from models.engines.exudyn_system import quiet_settings
+
+    options = quiet_settings()
+    ti = options.timeIntegration
+    ti.startTime, ti.endTime, ti.numberOfSteps, ti.verboseMode = begin, begin + settings.step, 1, 0
+    ti.automaticStepSize, ti.explicit.computeEndOfStepAccelerations = True, False
+    ti.relativeTolerance, ti.absoluteTolerance = settings.tolerance, ABSOLUTE * settings.tolerance
+    return options
+
+
+def _by_scipy(model: FreeModel, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
+    """States (steps + 1, 2 n) of plain equations, and what it took."""
+    from scipy.integrate import solve_ivp
+
+    tolerance = max(settings.tolerance, FINEST)
+
+    def rate(time: float, state: np.ndarray) -> np.ndarray:
+        q, v = np.split(state, 2)
+        rates = np.concatenate((v, model.acceleration(time, q, v)))
+        if not np.isfinite(rates).all():  # an explicit method would halve its step for ever
+            raise RunFailed(model.ENGINE, "the accelerations became infinite or not a number", time, state)
+        return rates
+
+    rows = settings.step * np.arange(settings.steps + 1)
+    solution = solve_ivp(
+        rate,
+        (0.0, rows[-1]),
+        begun,
+        method=settings.integrator,
+        t_eval=rows,
+        rtol=tolerance,
+        atol=ABSOLUTE * tolerance,
+        max_step=settings.step,
+    )
+    if not solution.success:
+        raise RunFailed(model.ENGINE, solution.message, float(solution.t[-1]), solution.y[:, -1])
+    return solution.y.T, {"force calls": int(solution.nfev)}
