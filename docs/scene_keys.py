@@ -7,7 +7,7 @@ parameter sets and the options of studies. What stands there is what the models 
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from inspect import getdoc
 from pathlib import Path
@@ -225,10 +225,36 @@ def others() -> list[str]:
     return lines
 
 
+def controllers() -> list[str]:
+    """Section of the parameters of controllers, which a scene of braking sets in [controller.parameters]."""
+    from models.brake.controllers import CONTROLLERS
+    from models.brake.controllers.per_wheel import Common
+
+    lines = [
+        "",
+        "## Parameters of controllers",
+        "",
+        "A scene of braking sets them in `[controller.parameters]`. All have:",
+    ]
+    lines += ["", *_parameters(Common, ("wheels",))]
+    for kind, controller in CONTROLLERS.items():
+        if is_dataclass(controller) and isinstance(controller, type):
+            inherited = tuple(each.name for each in fields(Common))
+            lines += ["", f"### Controller `{kind}`", "", *_parameters(controller, inherited)]
+    return lines
+
+
+def _parameters(kind: type, but: tuple[str, ...]) -> list[str]:
+    """What a class says of its fields, and their defaults."""
+    rows = [f"| `{each.name}` | `{_toml(each.default)}` |" for each in fields(kind) if each.name not in but]
+    head = ["", "| parameter | default |", "|---|---|"] if rows else []
+    return [" ".join((getdoc(kind) or "").split()), *head, *rows]
+
+
 def page() -> str:
     """The whole page."""
     lines = [line for system in SYSTEMS for line in of_system(system)]
-    return HEAD + "\n".join([*lines, *others(), *options()]) + "\n"
+    return HEAD + "\n".join([*lines, *others(), *controllers(), *options()]) + "\n"
 
 
 def main(path: Path = PAGE) -> None:
