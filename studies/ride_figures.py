@@ -88,14 +88,14 @@ def outputs_figure(
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
-        label = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
+        what = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
         names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
         curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
             axis.plot(found.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
-        axis.set(xlabel="speed [m/s]", ylabel=label, ylim=(0, None), title=kind.capitalize())
+        axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
         _name_below(axis)
     _save(figure, above, ": standard deviations over speed", path)
 
