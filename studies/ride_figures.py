@@ -64,6 +64,7 @@ def along_figure(
     right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
     for axis in (left, right):
         axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
+        _say_where_none(axis)
     legend_below(figure, left, columns=2)
     _save(figure, above, ": which correlations of the road matter where", path)
 
@@ -96,8 +97,16 @@ def outputs_figure(
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
+        _say_where_none(axis)
         _name_below(axis)
     _save(figure, above, ": standard deviations over speed", path)
+
+
+def _say_where_none(axis: plt.Axes) -> None:
+    """Words in a panel whose curves have no finite value, as of forces under white noise."""
+    if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
+        axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
+        axis.set_yticks([])
 
 
 def _written(unit: str) -> str:
