@@ -44,14 +44,15 @@ def contact_figure(
     forces : the result whose last motion is shown.
     """
     length, width = (MILLI * np.ptp(np.concatenate([getattr(f, name)[f.inside] for f in patches])) for name in "xy")
-    size = WIDE, float(np.clip(3.4 * width / length + 2.4, 3.8, 8.0))
+    size = WIDE, float(np.clip(3.2 * width / length + 1.9, 3.8, 8.0))
     figure, axes = plt.subplots(1, 2, figsize=size, sharex=True, sharey=True)
     _pressure(axes[0], patches, pressure)
     _tractions(axes[1], patches, friction, max(length, width) / ARROWS)
     for axis in axes:
         axis.set(aspect="equal", xlabel="x, direction of rolling [mm]")
         axis.grid(visible=False)
-    axes[0].set_ylabel("y, to the right [mm]")
+    for axis in axes:
+        axis.set_ylabel("y, to the right [mm]")
     axes[0].invert_yaxis()  # as seen from above, where x is ahead
     heading(figure, title, {"forces": forces})
     save(figure, path)
@@ -73,8 +74,8 @@ def _pressure(axis: Any, patches: list[Fields], what: str) -> None:
         cells.set_clim(0.0, greatest)
         axis.add_collection(cells)
     axis.autoscale_view()
-    axis.figure.colorbar(cells, ax=axis, location="bottom", label="pressure [MPa]", shrink=0.8, aspect=30)
-    axis.set_title(f"{what},\nlargest {greatest:,.0f} MPa")
+    axis.figure.colorbar(cells, ax=axis, location="left", label="pressure [MPa]", shrink=0.8, aspect=25)
+    axis.set_title(f"{what[0].upper()}{what[1:]},\nlargest {greatest:,.0f} MPa")
 
 
 def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float) -> None:
@@ -86,12 +87,12 @@ def _tractions(axis: Any, patches: list[Fields], friction: float, spacing: float
         axis.add_collection(PolyCollection(_rectangles(f), facecolor=colours, edgecolor="face", linewidth=0.2))
         x, y, px, py = _arrows(f, spacing / MILLI)
         arrows = axis.quiver(MILLI * x, MILLI * y, px, py, **scaled, width=0.004, color=DARK)
-    axis.quiverkey(arrows, 0.98, 1.03, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
+    axis.quiverkey(arrows, 0.9, 1.03, largest, f"{MEGA * largest:,.0f} MPa", labelpos="W")
     marks = [plt.Rectangle((0, 0), 1, 1, facecolor=colour) for colour in (STICK, SLIP)]
     area = np.concatenate([(f.dx * f.dy)[f.inside] for f in patches])
     slip = float(area[np.concatenate([f.slips[f.inside] for f in patches])].sum() / area.sum())
     labels = [f"stick, {100 * (1 - slip):.0f} % of the area", f"slip, {100 * slip:.0f} %"]
-    axis.legend(marks, labels, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+    axis.figure.legend(marks, labels, loc="outside lower right", ncols=2)
     axis.set_title("Traction on the wheel,\nand where it sticks and slips")
 
 

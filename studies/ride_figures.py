@@ -60,10 +60,11 @@ def along_figure(
             right.plot(over.speeds[:-1], over.of(case, name)[:-1], STYLES[i], color=COLOURS[i])
     for x in vehicle.axles:
         left.axvline(x, color="0.8", zorder=0)
-    left.set(xlabel="x forward [m]  (grey: axles)", title=f"Along the body at {speed:g} m/s")
+    left.set(xlabel="x forward [m]  (grey: axles)", title=f"Vertical acceleration along the body, {speed:g} m/s")
     right.set(xlabel="speed [m/s]", title=f"At {name!r} over speed" if name else "")
     for axis in (left, right):
-        axis.set(ylabel="deviation of vertical acceleration [m/s²]", ylim=(0, None))
+        axis.set(ylabel="standard deviation [m/s²]", ylim=(0, None))
+        _say_where_none(axis)
     legend_below(figure, left, columns=2)
     _save(figure, above, ": which correlations of the road matter where", path)
 
@@ -88,16 +89,24 @@ def outputs_figure(
     figure, axes = panels(len(groups), min(2, len(groups)), 3.4)
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
-        unit = "-, of the static load" if kind == "tyre force" else unit
+        what = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
         names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
         curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
             axis.plot(found.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
         if not np.isfinite(list(curves.values())).any():
             axis.set(xlim=(0, found.speeds.max()), yticks=[])
-        axis.set(xlabel="speed [m/s]", ylabel=f"standard deviation [{unit}]", ylim=(0, None), title=kind.capitalize())
+        axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
+        _say_where_none(axis)
         _name_below(axis)
     _save(figure, above, ": standard deviations over speed", path)
+
+
+def _say_where_none(axis: plt.Axes) -> None:
+    """Words in a panel whose curves have no finite value, as of forces under white noise."""
+    if not any(np.isfinite(line.get_ydata()).any() for line in axis.lines if line.get_transform() == axis.transData):
+        axis.text(0.5, 0.5, "no finite variance", transform=axis.transAxes, ha="center")
+        axis.set_yticks([])
 
 
 def _written(unit: str) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from models.core.told import Results
-from models.drawing.figures import SMALL, WIDE, heading, plt, save
+from models.drawing.figures import WIDE, heading, legend_below, plt, save
 from models.tyre.tyre_table import TyreTable
 
 SLIPS = np.linspace(0.0, 1.0, 1001)
@@ -24,7 +24,7 @@ def tyre_figure(
         top = 1.08 * max(x.max(), y.max())
         for i, angle in enumerate(angles):
             colour = COLOURS(0.9 * i / max(len(angles) - 1, 1))
-            row[0].plot(SLIPS, x[i], color=colour, label=f"{angle:g}")
+            row[0].plot(SLIPS, x[i], color=colour, label=f"{angle:g}°")
             row[1].plot(SLIPS, y[i], color=colour)
             row[2].plot(x[i], y[i], color=colour)
         row[0].set(xlabel="slip [-]", ylabel="μx [-]", ylim=(0, top), title=f"{name}: along the wheel")
@@ -32,13 +32,6 @@ def tyre_figure(
         row[2].set(
             xlabel="μx [-]", ylabel="μy [-]", xlim=(0, top), ylim=(0, top), aspect="equal", title="Both, slip 0 to 1"
         )
-        row[2].legend(
-            *row[0].get_legend_handles_labels(),
-            title="slip angle [deg]",
-            fontsize=SMALL,
-            title_fontsize=SMALL,
-            loc="center left",
-            bbox_to_anchor=(1.0, 0.5),
-        )
-    heading(figure, f"{title}: friction under {load / 1e3:.4g} kN", results)
+    legend_below(figure, axes[0, 0], columns=len(angles))
+    heading(figure, f"{title}: friction under {load / 1e3:.4g} kN, by slip angle", results)
     save(figure, path)

@@ -82,7 +82,7 @@ def _empty(axes) -> bool:
     curves = any(np.isfinite(values).any() and (values[np.isfinite(values)] != 0).any() for values in lines)
     points = any(np.isfinite(np.asarray(line.get_xdata(), float)).any() for line in axes.lines)
     flat = lines and max(map(len, lines)) > 2 and not curves
-    others = axes.images or axes.patches or axes.collections or (axes.child_axes and not axes.lines)
+    others = axes.texts or axes.images or axes.patches or axes.collections or (axes.child_axes and not axes.lines)
     return not others and (bool(flat) or not points)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.drawing.figures import BLUE, COLOURS, PALE, SMALL, VERMILION, WIDE, heading, plt
+from models.drawing.figures import COLOURS, PALE, SKY, SMALL, VERMILION, WIDE, heading, plt
 
 LAWS = (
     "no contact",
@@ -19,7 +19,7 @@ LAWS = (
 )
 NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
 BRIDGES = {"native": "native", "jitted": "jitted, from Python", "plain": "plain Python"}
-PARTS = (("own", "engine", PALE), ("kernel", "kernel", BLUE), ("over", "bridge", VERMILION))
+PARTS = (("own", "engine", PALE), ("kernel", "kernel", SKY), ("over", "bridge", VERMILION))
 METHODS = {"mujoco": "Euler", "exudyn": "ExplicitEuler"}
 WHEELS = 4
 LINES = {1: ":", WHEELS: "-", 8: "--"}
@@ -70,7 +70,9 @@ def _laws(axis: Any, points: list[dict[str, Any]]) -> None:
     axis.set_xticks(range(len(LAWS)), LAWS, rotation=35, ha="right")
     axis.set(ylabel="time per step [µs]", title="One call per step")
     axis.grid(True, axis="y", alpha=0.3)
-    axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high * (high / low) ** 0.4)  # room for the legend
+    axis.legend(fontsize=SMALL, loc="upper left", ncols=2)
 
 
 def _shares(axis: Any, points: list[tuple[str, dict[str, Any]]]) -> None:
