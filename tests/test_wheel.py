@@ -35,9 +35,10 @@ def wheel(tmp_path_factory):
 def command(wheel, tmp_path_factory):
     """Function that runs ``twinrig ARGS`` of the installed wheel in a folder; packages that it needs are those here."""
     place = tmp_path_factory.mktemp("environment")
-    venv.create(place, with_pip=True)
+    venv.create(place)
     python = place / "bin" / "python"
-    subprocess.run([python, "-m", "pip", "install", "-q", "--no-deps", str(wheel)], check=True)
+    install = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", str(wheel)]
+    subprocess.run(install, check=True)
     paths = {"base": str(place), "platbase": str(place)}
     site = Path(sysconfig.get_path("purelib", vars=paths))
     (site / "needed.pth").write_text(f"{sysconfig.get_path('purelib')}\n")

@@ -46,7 +46,7 @@ class Subject:
             f"{self.title}",
             f"From the scene {self.source} by twinrig {version('twinrig')}. SI units. {self.axes}",
             f"Has {', '.join(has)}.",
-            *(["Leaves out, for these act by functions of twinrig:"] if left_out else ["Leaves nothing out."]),
+            *(["Leaves out:"] if left_out else ["Leaves nothing out."]),
             *(f"  {text}" for text in left_out),
         ]
         return "\n".join(lines)

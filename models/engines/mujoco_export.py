@@ -32,6 +32,7 @@ DIGITS = 17
 def add_shapes(spec: mujoco.MjSpec, masses: Mapping[str, float]) -> None:
     """A box at every body of a specification that touches nothing and weighs nothing; masses (kg) by body, for its
     size."""
+    spec.visual.headlight.ambient = spec.visual.headlight.diffuse = [0.5, 0.5, 0.5]
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for i, (name, mass) in enumerate(masses.items()):
         half = max(LEAST, 0.5 * (mass / DENSITY) ** (1 / 3))

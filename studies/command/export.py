@@ -46,6 +46,6 @@ def export(scene: Any, engine: str, out: Path | None) -> list[str]:
     path = target(scene, engine, out)
     write_whole(path, answer.text)
     left_out = [f"    {text}" for text in answer.left_out]
-    head = "  left out, for these act by functions of twinrig:" if left_out else "  leaves nothing out"
+    head = "  left out:" if left_out else "  leaves nothing out"
     opened = f"python -m mujoco.viewer --mjcf={path}" if engine == "mujoco" else f"python {path}"
     return [f"{scene.title}: {path}", f"  has {', '.join(answer.has)}", head, *left_out, f"  open it: {opened}"]
