@@ -145,10 +145,10 @@ def test_the_system_whose_adhesion_is_measured_is_the_one_behind_the_port(tmp_pa
 
 
 def test_steps_at_which_a_vehicle_would_rock_up_on_its_tyres_are_refused():
-    lags = {"relaxation": {"front": 0.02, "rear": 0.5}, "road": {"stretches": [{"left": "dry"}]}}
+    lags = {"relaxation": {"front": 0.005, "rear": 0.5}, "road": {"stretches": [{"left": "dry"}]}}
     with pytest.raises(InputError, match=r"run\.substeps = 1: must be at least 2: .* rocks up"):
-        ready(scene(run={"sample": 0.01, "substeps": 1}, **lags), "straight")
-    ready(scene(run={"sample": 0.01, "substeps": 2}, **lags), "straight")
+        ready(scene(run={"sample": 0.01, "substeps": 1}, **lags), "stop")
+    ready(scene(run={"sample": 0.01, "substeps": 2}, **lags), "stop")
 
 
 def test_a_stop_from_walking_pace_has_figures_of_its_wheels():

@@ -27,7 +27,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     engines = ENGINES[1:] if quick else ENGINES
     vehicles = ("car",) if quick else tuple(whole.VEHICLES)
     rows = [_rise_row(engine) for engine in engines] + [_short_row("exudyn")]
-    rows += [_reference_row(vehicle, engine, 0.05 if quick else 0.5) for vehicle in vehicles for engine in engines]
+    rows += [_reference_row(vehicle, engine, 0.05 if quick else 0.2) for vehicle in vehicles for engine in engines]
     if not quick:
         rows.append(_stiff_row())
     return rows, {}
