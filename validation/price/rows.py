@@ -64,7 +64,7 @@ def _reference(problem: Problem, measured: Measured) -> Row:
     return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,
-        f"uncertainty of the reference ({problem.reference}), {quantity}",
+        f"uncertainty of the reference ({problem.reference}) in the {quantity}",
         problem.uncertainty[quantity],
         measured.unit,
     ).at_most(
@@ -82,7 +82,7 @@ def _orders(measured: Measured) -> list[Row]:
         Observed(
             f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
-            f"observed order of the largest {quantity} error, {named(curve)}",
+            f"observed order of the largest error of the {quantity}, {named(curve)}",
             found,
             "",
         ).within(
@@ -109,7 +109,7 @@ def _promises(problem: Problem, measured: Measured) -> Row:
     return Observed(
         f"price.{problem.key}.cheapest",
         SYSTEM,
-        "error of the table's cheapest settings by their tolerance, each of them run, largest",
+        "largest ratio of the error of a recommended cheapest setting to its tolerance, each of them run",
         worst,
         "",
     ).within(
