@@ -59,8 +59,8 @@ def _stops_row(ends: list[str]) -> Row:
     limits = [end for end in ends if any(limit in end for limit in LIMITS)]
     wrong = [f"{i}: {end}" for i, end in enumerate(ends) if end and end not in limits]
     what = (
-        f"{len(ends)} random legal stops, {len(limits)} of which end by a limit of the vehicle: those that do not "
-        f"finish: {'; '.join(wrong[:3])}"
+        f"stops that do not finish, of {len(ends)} random legal ones, {len(limits)} of which end by a limit of the "
+        f"vehicle: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "").within(
         0, 0, "asked for", "none"

@@ -145,7 +145,10 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
     first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
-        key, what = f"braking_port.bits.{_id(name)}", f"{len(first.times) - 1} samples, {name}"
+        key, what = (
+            f"braking_port.bits.{_id(name)}",
+            f"a run through the {name} has the bits of the callable, {len(first.times) - 1} samples",
+        )
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue

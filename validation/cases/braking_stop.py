@@ -162,9 +162,9 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
     some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
     some = "" if set(surfaces) <= set(ASKED) else some
     what = (
-        f"{runs} stops from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
+        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
         f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
-        f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
+        f"watched for {AFTER:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs").within(

@@ -55,7 +55,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         with processes(2) as pool:
             again, half = pool.submit(run_paths, job, SOME), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, found, forces / "killed")
-            rows += [_same_row("workers", f"{SOME} paths by 1 worker and by 2", found, again.result()), killed]
+            rows += [
+                _same_row(
+                    "workers", f"{SOME} paths have the same bits with 1 worker and with 2", found, again.result()
+                ),
+                killed,
+            ]
             halved = half.result()  # nothing else runs while the engines are timed
             engines, prices = _engines(scene, truth, times, found, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
@@ -76,7 +81,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
     engines, _ = _engines(scene, job.truth, times, found, 2, None)
     return [
         _path_row(forces, 1.0, found),
-        _same_row("workers", "12 paths by 1 and by 2 workers", found, two),
+        _same_row("workers", "12 paths have the same bits with 1 worker and with 2", found, two),
         _interrupted_row(job, found, forces / "stopped"),
         *engines,
     ]
@@ -119,7 +124,9 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
         run_paths(job, 12, blocks, blocks=Blocks(3), progress=stop)
     except KeyboardInterrupt:
         again = run_paths(job, 12, blocks, blocks=Blocks(3))
-        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found, again)
+        return _same_row(
+            "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", found, again
+        )
     raise AssertionError("the interrupt was lost")
 
 

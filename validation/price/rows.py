@@ -169,6 +169,6 @@ def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> 
     name = f"price.{measured.key}.default.{whose}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
     told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     bounds = told if kind == "seconds" else "exact"
-    what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
+    what = f"ratio of {kind}: {owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, to {words}"
     why = f"at its default {p.setting.label()} its error is {measured.error(p):.3g} {unit}"
     return [Observed(name, SYSTEM, what, lost.factor, "times").beside(bounds, why, "none")]
