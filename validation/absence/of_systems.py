@@ -196,7 +196,7 @@ def rows(quick: bool) -> list[Row]:
     engines = Observed(
         "absent.references.engines",
         SYSTEM,
-        "engines that bare scenes of braking, contact, wheelset and ride import by their references",
+        "engines that bare scenes of braking, contact, wheelset and ride import beside the reference that they run in",
         len(seen_there["engines"]),
         "",
     ).at_most(0, "a fresh process", "none")
@@ -220,7 +220,7 @@ def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
         behaves(
             f"absent.{system}.bits",
             SYSTEM,
-            f"{system}: path of a bare scene, once without the files of effects, once after all of them ran",
+            f"{system}: a bare scene takes the same path without the files of effects and after all effects ran",
             "the same" if seen_there["same"] else "not the same",
             "the same",
             "to the last bit, in every implementation",
@@ -249,7 +249,7 @@ def _present(system: str, more: dict[str, Counts]) -> list[Row]:
         behaves(
             f"absent.{system}.adds.{name}",
             SYSTEM,
-            f"{system}: what {name} adds",
+            f"{system}: counts that the effect {name} adds to a bare scene",
             _text(counts),
             _text(declared(system, name, counts)),
             "positive control: what its file says, and no more",

@@ -177,7 +177,7 @@ def rows(quick: bool = False) -> list[Row]:
         behaves(
             "absent.ride.states",
             SYSTEM,
-            "states of R19-ride: alone, with Wk, with Wk and Wd",
+            "number of states of R19-ride alone, with the filter Wk, and with Wk and Wd",
             ", ".join(str(states(dict(FILTERS[:count]))) for count in range(3)),
             "42, 50, 56",
             "twice 19 freedoms, two filters at each of two axles; Wk has 8 states, Wd 6",
@@ -185,7 +185,7 @@ def rows(quick: bool = False) -> list[Row]:
         behaves(
             "absent.ride.speed",
             SYSTEM,
-            "linear vehicles that three speeds need: R19-ride, R19-free",
+            "number of linear vehicles that three speeds need, for R19-ride and for R19-free",
             f"{linearised('r19_ride')}, {linearised('r19_free')}",
             "1, 3",
             "without side forces and drag nothing depends on the speed",
@@ -193,7 +193,7 @@ def rows(quick: bool = False) -> list[Row]:
         behaves(
             "absent.ride.curves",
             SYSTEM,
-            "curves and callbacks of a quarter car, then of one with three curves",
+            "number of curves and callbacks of a quarter car, and of a quarter car with three curves",
             f"{_counts(bare)}; {_counts(curved)}",
             "exudyn 0, 1, mujoco 0, 1; exudyn 3, 2, mujoco 3, 1",
             "one callback reads the road, in MuJoCo all forces stand in it; a bent spring of Exudyn has its own",
@@ -201,7 +201,7 @@ def rows(quick: bool = False) -> list[Row]:
         behaves(
             "absent.ride.noise",
             SYSTEM,
-            "outputs of a half car that white noise reaches: tyres without damping, with it",
+            "number of outputs of a half car that white noise reaches, with tyres without damping and with damping",
             f"{noisy(0.0)}, {noisy(100.0)}",
             "0, 2",
             "the road's rate goes through tyre damping alone",

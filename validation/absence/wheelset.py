@@ -81,7 +81,7 @@ def rows() -> list[Row]:
         behaves(
             "absent.wheelset.fastsim",
             SYSTEM,
-            "rates of a wheelset where FASTSIM's net is made of no numbers: linear law, FASTSIM",
+            "rates of a wheelset while FASTSIM's net holds no numbers, with the linear law and with FASTSIM",
             ", ".join(without_net(law) for law in ("linear", "fastsim")),
             "the same, no numbers",
             "what is not read cannot spoil anything",
@@ -89,7 +89,7 @@ def rows() -> list[Row]:
         behaves(
             "absent.wheelset.suspension",
             SYSTEM,
-            "spring-dampers in Exudyn and actuators in MuJoCo: of the chosen wheelset; of a free one",
+            "number of spring-dampers in Exudyn and actuators in MuJoCo, for the chosen wheelset and for a free one",
             "; ".join(counts),
             "2, 6; 0, 2",
             "one for each end in Exudyn; one for each direction in MuJoCo, where two hold the vehicle's weight",

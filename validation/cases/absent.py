@@ -122,11 +122,15 @@ def _imports() -> list[Row]:
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
     kernels = len(found["marches"]) + len(found["derivatives"])
     return [
-        Observed("absent.imports", SYSTEM, "modules of effects that a bare scene imports", len(foreign), "").at_most(
-            0, why, "none"
-        ),
         Observed(
-            "absent.kernels", SYSTEM, "kernels that a bare scene compiles beyond its own march", kernels - 1, ""
+            "absent.imports", SYSTEM, "number of modules of effects that a bare scene imports", len(foreign), ""
+        ).at_most(0, why, "none"),
+        Observed(
+            "absent.kernels",
+            SYSTEM,
+            "number of kernels that a bare scene compiles beyond its own march",
+            kernels - 1,
+            "",
         ).at_most(0, "the same process; the reference compiles one march per kind of scene, when first asked", "none"),
     ]
 
@@ -144,20 +148,20 @@ def _absence(engine: str, folder: Path) -> list[Row]:
         Observed(
             f"absent.frames.{engine}",
             SYSTEM,
-            f"{engine}: Python functions entered by 1,980 more steps",
+            f"{engine}: number of Python functions that 1,980 more steps enter",
             long.frames - short.frames,
             "",
         ).at_most(0, why, "none"),
         Observed(
             f"absent.memory.{engine}",
             SYSTEM,
-            f"{engine}: memory that 1,980 more steps take beside their result",
+            f"{engine}: memory that 1,980 more steps take beyond their result",
             long.memory - short.memory,
             "B",
         ).at_most(1980, f"{why}; less than a byte per step is a wrapper's own", "none"),
-        Observed(f"absent.callbacks.{engine}", SYSTEM, f"{engine}: callbacks of a bare scene", callbacks, "").at_most(
-            0, "counted over all items, and in the engine's globals before, during and after the march", "none"
-        ),
+        Observed(
+            f"absent.callbacks.{engine}", SYSTEM, f"{engine}: number of callbacks that a bare scene has", callbacks, ""
+        ).at_most(0, "counted over all items, and in the engine's globals before, during and after the march", "none"),
     ]
 
 
@@ -168,7 +172,7 @@ def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row
     return behaves(
         f"absent.present.{effect}",
         SYSTEM,
-        f"what {effect} adds",
+        f"counts that the effect {effect} adds to a bare scene",
         _text(found),
         _text(wanted),
         "positive control: the counts that are zero above do move, and by as much as they should",

@@ -37,7 +37,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             f"audit.{engine}.{parameters}.{geometry}",
             SYSTEM,
-            f"acceleration, {engine} against the equations of the paper, {parameters}, {geometry} geometry",
+            f"largest difference of the acceleration in {engine} from the paper's equations, "
+            f"{parameters}, {geometry} geometry",
             difference(engine, parameters, geometry),
             "of the largest",
         ).at_most(

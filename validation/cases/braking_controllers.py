@@ -101,14 +101,14 @@ def _loop_rows() -> list[Row]:
         Observed(
             "braking_controllers.loop",
             SYSTEM,
-            "area of the brake's loop, whole and partial, by its closed form, less 1",
+            "relative difference of the area of the brake's hysteresis loop, whole and partial, from its closed form",
             worst,
             "",
         ).at_most(1e-3, "two lines and a hold between them", "closed form"),
         behaves(
             "braking_controllers.push_out",
             SYSTEM,
-            "torque up to the push-out pressure",
+            "brake torque at and below the push-out pressure",
             "some" if rise.any() else "none",
             "none",
             "the springs hold the shoes back",
@@ -116,7 +116,7 @@ def _loop_rows() -> list[Row]:
         behaves(
             "braking_controllers.sense",
             SYSTEM,
-            "torque as pressure falls and rises",
+            "brake torque as the pressure falls and rises",
             "never reversed" if sense else "reversed",
             "never reversed",
             "friction loses work on every loop",
@@ -137,7 +137,7 @@ def _supply_row() -> Row:
     return Observed(
         "braking_controllers.strokes",
         SYSTEM,
-        "pressure in the chambers at the fifth full stroke, by p (V / (V + v))^5, less 1",
+        "relative difference of the chamber pressure at the fifth full stroke from p (V / (V + v))^5",
         float(np.abs(air.pressure / left - 1.0).max()),
         "",
     ).at_most(1e-6, "p V of reservoir and chambers together is kept but for what is let out", "closed form")
@@ -154,21 +154,21 @@ def _cycle_rows(name: str) -> list[Row]:
         Observed(
             f"braking_controllers.period_{name}",
             SYSTEM,
-            f"period of the five-phase limit cycle, {name}, by the exact one, less 1",
+            f"relative difference of the period of the five-phase limit cycle from the exact period, {name}",
             own.period / period - 1.0,
             "",
         ).at_most(1e-4, "frozen speed; every switch is located", "closed form"),
         Observed(
             f"braking_controllers.utilisation_{name}",
             SYSTEM,
-            f"its mean friction by the peak, {name}, less the exact one",
+            f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, {name}",
             own.utilisation - used,
             "",
         ).at_most(1e-3, "as above", "closed form"),
         behaves(
             f"braking_controllers.planted_{name}",
             SYSTEM,
-            f"spin inertia wrong by 0.1 %, {name}",
+            f"a planted error of 0.1 % in the spin inertia is noticed in the period, {name}",
             "told" if abs(own.period / wrong - 1.0) > 1e-4 else "missed",
             "told",
             "a planted fault",
@@ -176,7 +176,8 @@ def _cycle_rows(name: str) -> list[Row]:
         Observed(
             f"braking_controllers.sampled_{name}",
             SYSTEM,
-            f"period of the same controller sampled every 5.5 ms, {name}, by the continuous one, less 1",
+            "relative difference of the period with samples of 5.5 ms from the period of the "
+            f"continuous controller, {name}",
             sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / own.period - 1.0,
             "",
         ).beside(0.0, "each switch comes up to a sample late", "native"),
@@ -215,14 +216,14 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
         Observed(
             "braking_controllers.locks",
             SYSTEM,
-            f"longest lock of any wheel above 15 km/h in {len(stops)} stops of four controllers",
+            f"longest time for which a wheel locks above 15 km/h in {len(stops)} stops of four controllers",
             max(one["locked"] for one in stops.values()),
             "ms",
         ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaves(
             "braking_controllers.stands",
             SYSTEM,
-            "end of all of these stops",
+            f"how {len(stops)} stops of four controllers end",
             "at rest" if all(one["stands"] for one in stops.values()) else "moving",
             "at rest",
             "below 1.5 m/s all brakes are applied",
@@ -240,8 +241,8 @@ def _substep_rows() -> list[Row]:
                 Observed(
                     f"braking_controllers.stop_{on}_{n}",
                     SYSTEM,
-                    "stopping distance of a quarter vehicle "
-                    f"under a sampled controller on {on}, {n} substeps, by the reference, less 1",
+                    "relative difference of a quarter vehicle's stopping distance from the "
+                    f"reference, sampled controller on {on}, {n} substeps",
                     own / tight - 1.0,
                     "",
                 ).at_most(1e-2, "DOP853 at 1e-10 with locking as an event", "native")
@@ -264,15 +265,15 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
         Observed(
             "braking_controllers.ice_mean",
             SYSTEM,
-            f"mean stopping distance on ice of {runs} runs with 4 "
-            f"substeps, by that of {runs} others with {fine}, less 1",
+            f"relative difference of the mean stopping distance on ice of {runs} runs with 4 substeps "
+            f"from {runs} others with {fine}",
             float(found[0].mean() / found[1].mean() - 1.0),
             "",
         ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),
         Observed(
             "braking_controllers.ice_level",
             SYSTEM,
-            "chance of a larger difference if their means are the same",
+            "chance of a larger difference between the mean stopping distances on ice if the true means are the same",
             level,
             "",
         ).beside("above 0.05: no difference is shown", "Welch's test", "none"),

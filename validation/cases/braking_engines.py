@@ -46,7 +46,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"braking_engines.{name.replace(' ', '_')}",
             SYSTEM,
-            f"end of the turn, {name} beside the compiled step at 1 ms",
+            f"distance at the end of a turn between {name} and the compiled step at 1 ms",
             float(np.hypot(end.x - compiled.x, end.y - compiled.y)),
             "m",
         ).at_most(
@@ -61,7 +61,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"braking_engines.speed.{steps}",
             SYSTEM,
-            f"compiled truck on ice, slip bang-bang in the loop, samples of 5.5 ms in {steps} step(s), once",
+            f"speed of a compiled truck with a bang-bang slip controller on ice, samples of 5.5 ms in {steps} step(s)",
             speed(steps),
             "times real time",
         ).aim(100.0, "asked for; by the processor's time, which wanders", "at least")
@@ -98,7 +98,7 @@ def _load_rows() -> list[Row]:
         Observed(
             f"braking_engines.transfer.{name.replace(' ', '-')}",
             SYSTEM,
-            f"axle loads with the {name} locked",
+            f"relative difference of the axle loads from those of a rigid truck, {name} locked",
             error,
             "relative",
         ).at_most(1e-6, "loads are solved with the forces that they allow, not lagged", "closed form")
@@ -109,7 +109,7 @@ def _load_rows() -> list[Row]:
         Observed(
             "braking_engines.locked-front",
             SYSTEM,
-            "lateral way of a truck with steered, locked front wheels",
+            "sideways distance of a truck with steered, locked front wheels",
             abs(sideways_with_locked_front_wheels()),
             "m",
         ).at_most(1e-3, "a locked wheel's force is against its way, wherever it points", "closed form"),
@@ -120,13 +120,13 @@ def _symmetry_rows(until: float, steered: Turned) -> list[Row]:
     mirrored, straight = turn(until, -STEER), turn(until, 0.0)
     apart = max(abs(mirrored.x - steered.x), abs(mirrored.y + steered.y), abs(mirrored.heading + steered.heading))
     return [
-        Observed("braking_engines.mirror", SYSTEM, "mirrored turn beside the turn", apart, "m, rad").at_most(
-            1e-9, "left and right differ by rounding alone", "closed form"
-        ),
+        Observed(
+            "braking_engines.mirror", SYSTEM, "difference between a turn and its mirror image", apart, "m, rad"
+        ).at_most(1e-9, "left and right differ by rounding alone", "closed form"),
         Observed(
             "braking_engines.no_yaw",
             SYSTEM,
-            "yaw and lateral way without steering on equal friction",
+            "yaw and sideways distance without steering on equal friction",
             abs(straight.heading) + abs(straight.y),
             "m, rad",
         ).at_most(0.0, "equal forces have no moment", "closed form"),
@@ -145,13 +145,21 @@ def _trailer_rows(quick: bool) -> list[Row]:
     why = "wheels that only roll: low speed, stiff tyres"
     rows = [
         Observed(
-            "braking_engines.pull", SYSTEM, "drawbar angle on a straight pull, relative", straight_pull(), ""
+            "braking_engines.pull",
+            SYSTEM,
+            "relative difference of the drawbar angle on a straight pull from its closed form",
+            straight_pull(),
+            "",
         ).at_most(1e-4, why, "closed form")
     ]
     if not quick:
         rows += [
             Observed(
-                f"braking_engines.circle_{name}", SYSTEM, f"radius of the {name} axle on a circle, relative", off, ""
+                f"braking_engines.circle_{name}",
+                SYSTEM,
+                f"relative difference of the radius of the {name} axle on a circle from its closed form",
+                off,
+                "",
             ).at_most(1e-4, why, "closed form")
             for name, off in zip(("front", "rear"), circle(), strict=True)
         ]

@@ -59,8 +59,8 @@ def _stops_row(ends: list[str]) -> Row:
     limits = [end for end in ends if any(limit in end for limit in LIMITS)]
     wrong = [f"{i}: {end}" for i, end in enumerate(ends) if end and end not in limits]
     what = (
-        f"{len(ends)} random legal stops, {len(limits)} of which end by a limit of the vehicle: those that do not "
-        f"finish: {'; '.join(wrong[:3])}"
+        f"stops that do not finish, of {len(ends)} random legal ones, {len(limits)} of which end by a limit of the "
+        f"vehicle: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_limits.stops", SYSTEM, what.removesuffix(": "), len(wrong), "").within(
         0, 0, "asked for", "none"
@@ -103,7 +103,7 @@ def _jackknife_row() -> Row:
     return Observed(
         "braking_limits.jackknife",
         SYSTEM,
-        f"largest angle of a hinge that is kept of a train that folds, limit 1 rad: {told}",
+        f"largest hinge angle that is kept of a train that folds, limit 1 rad: {told}",
         angle if told else math.nan,
         "rad",
     ).within(1.0, 0.02, "a sample before the limit", "closed form")
@@ -127,12 +127,16 @@ def _roll_rows() -> list[Row]:
     limit = float(reason.rpartition("limit ")[2]) if "rolls over" in reason else math.nan
     return [
         Observed(
-            "braking_limits.roll_over", SYSTEM, f"limit at which a vehicle rolls over: {reason}", limit, "m/s^2"
+            "braking_limits.roll_over",
+            SYSTEM,
+            f"sideways acceleration at which a vehicle rolls over: {reason}",
+            limit,
+            "m/s^2",
         ).within(GRAVITY * track / (2.0 * height), 0.005, "g t / (2 h); printed to two digits", "closed form"),
         behaves(
             "braking_limits.roll_over.kept",
             SYSTEM,
-            "path until it rolls over",
+            "the path until the vehicle rolls over is kept",
             "kept" if end is not None and end.partial is not None and len(end.partial.times) > 50 else "lost",
             "kept",
             "the run ends there, and is not lost",
@@ -149,7 +153,7 @@ def _slow_apply_row() -> Row:
     return Observed(
         "braking_limits.slow_apply",
         SYSTEM,
-        "pressure after 0.5 s of slow apply, by its law, less 1",
+        "relative difference of the pressure after 0.5 s of slow apply from its law",
         float(air.pressure[0]) / (8.0 * -math.expm1(-0.5 / 1.2)) - 1.0,
         "",
     ).at_most(1e-12, "supply (1 - exp(-t / slow))", "closed form")
@@ -163,7 +167,8 @@ def _cycle_row() -> Row:
     return Observed(
         "braking_limits.cycle_from_rolling",
         SYSTEM,
-        "period of the limit cycle that a rolling wheel reaches by a fast first application, by the exact one, less 1",
+        "relative difference of the period of the limit cycle, after a fast first application to a "
+        "rolling wheel, from the exact period",
         reached / period - 1.0,
         "",
     ).at_most(1e-4, "the cycle does not know how it was begun", "closed form")
@@ -185,7 +190,8 @@ def _yaw_row(speed: float) -> Row:
     return Observed(
         f"braking_limits.yaw.{speed:g}",
         SYSTEM,
-        f"yaw of a stop from {speed:g} m/s on split friction, steps of 20 ms by steps of 0.1 ms",
+        f"ratio of the yaw with steps of 20 ms to the yaw with steps of 0.1 ms, stop from {speed:g} "
+        "m/s on split friction",
         yaw(1) / yaw(200),
         "",
     ).within(
@@ -216,7 +222,7 @@ def _refused_row(name: str, ask: Callable[[], Any]) -> Row:
     return behaves(
         f"braking_limits.refused.{name.replace(' ', '-')}",
         SYSTEM,
-        name,
+        f"a scene with {name} is refused",
         outcome,
         "refused",
         "a vehicle that cannot be has no answer",

@@ -85,7 +85,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"braking_port.cost.{_id(name)}",
             SYSTEM,
-            f"one exchange, {name}, 95 % interval {low:.1f} to {high:.1f}",
+            f"time of an exchange with a controller, {name}, 95 % interval {low:.1f} to {high:.1f}",
             cost,
             "us",
         ).beside("", f"median of rounds of {ROUND} in which all ways have their turn", "none")
@@ -145,7 +145,10 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
     first = run(_scene(folder, duration, {"callable": EXAMPLE, "log": "port.log"})).detail
     rows = []
     for name, table in {**ways, "replay": {"replay": "port.log"}}.items():
-        key, what = f"braking_port.bits.{_id(name)}", f"{len(first.times) - 1} samples, {name}"
+        key, what = (
+            f"braking_port.bits.{_id(name)}",
+            f"a run through the {name} has the bits of the callable, {len(first.times) - 1} samples",
+        )
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue
@@ -160,7 +163,7 @@ def _alive(path: Driven) -> Row:
     return behaves(
         "braking_port.bits.alive",
         SYSTEM,
-        f"pressures turn, here {turns} times",
+        f"the pressure changes direction often enough to tell controllers apart, here {turns} times",
         "yes" if turns > 8 else "no",
         "yes",
         "bits of a controller that does nothing prove nothing",
@@ -280,14 +283,18 @@ def _fault_rows(one: dict[str, Any]) -> list[Row]:
         behaves(
             key,
             SYSTEM,
-            f"{one['kind']}, after {well} samples that are kept",
+            f"end of a run whose controller fails, {one['kind']}, after {well} samples that are kept",
             found,
             one["expected"],
             "named, at its sample, with the path until then",
         ),
-        Observed(f"{key}.seconds", SYSTEM, f"{one['kind']}: until the run has ended, once", one["seconds"], "s").aim(
-            2.0 * TIMEOUT, f"twice the time-out of {TIMEOUT:g} s"
-        ),
+        Observed(
+            f"{key}.seconds",
+            SYSTEM,
+            f"time until a run whose controller fails has ended, {one['kind']}, measured once",
+            one["seconds"],
+            "s",
+        ).aim(2.0 * TIMEOUT, f"twice the time-out of {TIMEOUT:g} s"),
     ]
 
 

@@ -16,11 +16,23 @@ ENGINES = ("mujoco", "exudyn")
 SHORT, LONG = 0.05, 1.0
 """s of a stop, in the quick share and in the full one."""
 LAWS = {
-    "friction": (laws.frictions, 1e-12, "friction by stacked tables beside each table on its nodes"),
-    "tyre": (laws.tyre_reports, 1e-12, "forces, slips and turning of a braked wheel over a step"),
-    "road": (laws.surfaces, 1e-12, "surfaces under wheels that pass seams and lines, and their shares"),
-    "pressure": (laws.torques_by_commands, 1e-12, "pressures, torques and supply along random commands"),
-    "relaxation": (laws.lags, 1e-12, "slip angles that lag by a relaxation length"),
+    "friction": (laws.frictions, 1e-12, "difference of the friction by stacked tables from each table on its nodes"),
+    "tyre": (
+        laws.tyre_reports,
+        1e-12,
+        "difference of the forces, slips and rate of a braked wheel over a step from plain code",
+    ),
+    "road": (
+        laws.surfaces,
+        1e-12,
+        "difference of the surfaces, and their shares, under wheels that pass seams and lines from plain code",
+    ),
+    "pressure": (
+        laws.torques_by_commands,
+        1e-12,
+        "difference of pressures, torques and supply along random commands from plain code",
+    ),
+    "relaxation": (laws.lags, 1e-12, "difference of slip angles that lag by a relaxation length from plain code"),
 }
 """Both sides at random states, the bound, and what it is."""
 WHY = "another algorithm in plain code; they differ by rounding"
@@ -49,7 +61,8 @@ def _acceleration_row(vehicle: str, engine: str) -> Row:
     return Observed(
         f"braking_reference.accelerations.{vehicle}.{engine}",
         SYSTEM,
-        f"accelerations of the {vehicle} in {engine} at {whole.STATES} states of any heading beside plain code",
+        f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
+        f"{whole.STATES} states of any heading",
         whole.apart(found, whole.plain_accelerations(vehicle)),
         "by the largest",
     ).at_most(1e-12, WHY, "native")
@@ -59,8 +72,8 @@ def _relaxing_row() -> Row:
     return Observed(
         "braking_reference.relaxing_turn",
         SYSTEM,
-        "end of a braked turn of the truck on ice, tyres that relax over 0.3 m, 8 steps in a sample, beside Newton's "
-        "and Euler's equations with the lags as states",
+        "difference at the end of a braked turn of the truck on ice from Newton's and Euler's "
+        "equations, tyres that relax over 0.3 m, 8 steps in a sample",
         turn_apart(0.3, 8),
         "m",
     ).at_most(
@@ -73,7 +86,8 @@ def _turn_row(vehicle: str) -> Row:
     return Observed(
         f"braking_reference.turn.{vehicle}",
         SYSTEM,
-        f"steady circle of the {vehicle}, 30 m at 8 m/s: steer angles, state and turning beside plain code",
+        f"largest difference of a steady circle of the {vehicle} from plain code: steer angles, state "
+        "and yaw, 30 m at 8 m/s",
         float(np.nan_to_num(np.abs(found - plain).max(), nan=np.inf)),
         "rad, m, per s",
     ).at_most(1e-10, "the same equations, solved to rounding", "native")
@@ -84,7 +98,8 @@ def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
     return Observed(
         f"braking_reference.stop.{vehicle}.{engine}",
         SYSTEM,
-        f"{duration:g} s of a stop of the {vehicle} in {engine} under a slip controller on split and changing friction",
+        f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain "
+        "code, slip controller on split and changing friction",
         whole.paths_apart(found, whole.plain_run(vehicle, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")

@@ -90,18 +90,30 @@ def _headline_rows(name: str, curve: dict[str, Any]) -> list[Row]:
     ours, _ = errors.pop("ours")
     why = f"asked for; the exact distance is {curve['exact']:.6f} m, from the slip's own equation to 1e-9"
     rows = [
-        Observed(f"{key}.distance", SYSTEM, f"{name}, 5.5 ms: stopping distance from rolling", ours, "").at_most(
-            BOUND, why, "closed form"
-        ),
         Observed(
-            f"{key}.steady", SYSTEM, f"{name}, 5.5 ms: stopping distance at constant slip", curve["steady"], ""
+            f"{key}.distance",
+            SYSTEM,
+            f"relative error of the stopping distance of a wheel that rolls first, {name}, steps of 5.5 ms",
+            ours,
+            "",
+        ).at_most(BOUND, why, "closed form"),
+        Observed(
+            f"{key}.steady",
+            SYSTEM,
+            f"relative error of the stopping distance at constant slip, {name}, steps of 5.5 ms",
+            curve["steady"],
+            "",
         ).at_most(1e-7, "m v^2 / (2 F); exact in each step but the last, at rest", "closed form"),
     ]
     for scheme, (error, left) in errors.items():
         said = f", and still rolls at {left:.2g} m/s in {PATIENCE:g} times the time of stopping" if left else ""
         rows.append(
             Observed(
-                f"{key}.{scheme.split()[-1].lower()}", SYSTEM, f"{name}, 5.5 ms: {scheme}{said}", 100.0 * error, "%"
+                f"{key}.{scheme.split()[-1].lower()}",
+                SYSTEM,
+                f"relative error of the stopping distance with {scheme}, {name}, steps of 5.5 ms{said}",
+                100.0 * error,
+                "%",
             ).beside(f"{100.0 * ours:.1e} % of ours", "the same vehicle, torque and table", "closed form")
         )
     return rows
@@ -115,7 +127,8 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
     return Observed(
         f"braking_stop.further.{name.replace(', ', '.').replace(' ', '-')}",
         SYSTEM,
-        f"{name} ({on}, {100 * slip:g} % slip, {speed:g} m/s), 5.5 ms: stopping distance",
+        f"relative error of the stopping distance, {name} ({on}, {100 * slip:g} % slip, {speed:g} "
+        "m/s), steps of 5.5 ms",
         error,
         "",
     ).at_most(BOUND, "as the four above", "closed form")
@@ -149,9 +162,9 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
     some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
     some = "" if set(surfaces) <= set(ASKED) else some
     what = (
-        f"{runs} stops from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
+        f"wrong stops of {runs} from 11.11 m/s, in steps below 1 ms from {SLOW:g}: {len(surfaces)} surfaces, "
         f"brakes from 0 to 1.5 of lock, steps of {1e3 * min(steps):g} to {1e3 * max(steps):g} ms{some}, "
-        f"watched for {AFTER:g} s of standstill: those with no number, a wheel speed outside 0 to v / r, no stop, "
+        f"watched for {AFTER:g} s of standstill; wrong is no number, a wheel speed outside 0 to v / r, no stop, "
         f"or any motion after it: {'; '.join(wrong[:3])}"
     )
     return Observed("braking_stop.sweep", SYSTEM, what.removesuffix(": "), len(wrong), "runs").within(
@@ -169,7 +182,8 @@ def _locked_row() -> Row:
     return Observed(
         "braking_stop.locked",
         SYSTEM,
-        f"locked wheels on {len(SURFACES)} surfaces: stopping distance against v^2 / (2 mu g)",
+        "relative difference of the stopping distance with locked wheels from v^2 / (2 mu g) on "
+        f"{len(SURFACES)} surfaces",
         max(errors),
         "",
     ).at_most(1e-9, "asked for", "closed form")
@@ -186,8 +200,8 @@ def _release_row() -> Row:
     return Observed(
         "braking_stop.release",
         SYSTEM,
-        f"locked wheels on {len(SURFACES)} surfaces under a torque that "
-        "falls, steps of 1, 5.5 and 20 ms: time at which they turn again",
+        f"error of the time at which locked wheels turn again under a falling torque, {len(SURFACES)} "
+        "surfaces, steps of 1, 5.5 and 20 ms",
         max(errors),
         "s",
     ).at_most(1e-3, "asked for: the time at which torque falls to that of sliding", "closed form")
@@ -199,7 +213,7 @@ def _friction_row(levels: int) -> Row:
     return Observed(
         "braking_stop.friction",
         SYSTEM,
-        f"{levels} levels of friction, brakes beyond lock: those at which the stopping distance does not fall",
+        f"levels of friction, of {levels}, at which a higher level does not shorten the stop, brakes beyond lock",
         sum(b >= a for a, b in pairwise(ways)),
         "",
     ).within(0, 0, "asked for", "none")

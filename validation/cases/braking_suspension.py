@@ -55,7 +55,8 @@ def _locked_rows(mu: float) -> list[Row]:
             Observed(
                 f"braking_suspension.locked.{place}",
                 SYSTEM,
-                f"stopping distance of the {name}, wheels locked, mu = {mu:g}, beside v^2 / (2 mu g)",
+                f"relative difference of the {name}'s stopping distance from v^2 / (2 mu g), wheels "
+                f"locked, mu = {mu:g}",
                 abs(way / exact - 1.0),
                 "relative",
             ).at_most(
@@ -64,12 +65,16 @@ def _locked_rows(mu: float) -> list[Row]:
             Observed(
                 f"braking_suspension.transfer.{place}",
                 SYSTEM,
-                f"load transfer of the {name} beside m a h / L and its weight that leans",
+                f"relative difference of the {name}'s load transfer from m a h / L and the shift of its leaning weight",
                 abs(gained * plane.wheelbase / moment - 1.0),
                 "relative",
             ).at_most(2e-2 if mu == HARD else 2e-3, "pitch takes the weight forwards, and wheels less", "closed form"),
             Observed(
-                f"braking_suspension.weight.{place}", SYSTEM, "loads by the weight, late in braking", weight, ""
+                f"braking_suspension.weight.{place}",
+                SYSTEM,
+                "ratio of the sum of the wheel loads to the weight, late in braking",
+                weight,
+                "",
             ).within(1.0, 1e-4, "the body has come to rest on its springs", "closed form"),
             Observed(
                 f"braking_suspension.stays.{place}",
@@ -90,7 +95,7 @@ def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
         Observed(
             f"braking_suspension.{what}.box.{mu:g}",
             SYSTEM,
-            f"{what} of the box beside springs in series and the weight that leans",
+            f"relative difference of the box's {what} from that of springs in series and the leaning weight",
             abs(value / theory - 1.0),
             "relative",
         ).at_most(bound, "closed form to first order in the pitch angle", "closed form")
@@ -102,7 +107,11 @@ def _mirror_rows(turn: Run, mirrored: Run) -> list[Row]:
     apart = np.abs(turn.states[-1, 0, :3] * (1.0, -1.0, -1.0) - mirrored.states[-1, 0, :3]).max()
     return [
         Observed(
-            "braking_suspension.mirror", SYSTEM, "mirrored J-turn of the car beside the J-turn", float(apart), "m, rad"
+            "braking_suspension.mirror",
+            SYSTEM,
+            "difference between a J-turn of the car and its mirror image",
+            float(apart),
+            "m, rad",
         ).at_most(1e-9, "left and right differ by rounding alone", "closed form")
     ]
 
@@ -117,7 +126,7 @@ def _engine_rows(wet: TyreTable) -> list[Row]:
         Observed(
             "braking_suspension.engines",
             SYSTEM,
-            "end of a braked turn, Exudyn beside MuJoCo at 1 ms",
+            "distance between Exudyn and MuJoCo at the end of a braked turn, steps of 1 ms",
             float(np.hypot(*(ends[1] - ends[0]))),
             "m",
         ).at_most(5e-3, "the same forces around two multibody codes", "shared kernel")
@@ -130,12 +139,16 @@ def _order_rows(wet: TyreTable) -> list[Row]:
         Observed(
             "braking_suspension.step",
             SYSTEM,
-            "stopping distance of a braked turn at 5.5 ms beside 0.34 ms",
+            "relative difference of the stopping distance of a braked turn in steps of 5.5 ms from steps of 0.34 ms",
             abs(float(ways[0] / ways[2] - 1.0)),
             "relative",
         ).at_most(5e-4, "order two", "none"),
         Observed(
-            "braking_suspension.substeps", SYSTEM, "the same at 1.4 ms", abs(float(ways[1] / ways[2] - 1.0)), "relative"
+            "braking_suspension.substeps",
+            SYSTEM,
+            "relative difference of the stopping distance of a braked turn in steps of 1.4 ms from steps of 0.34 ms",
+            abs(float(ways[1] / ways[2] - 1.0)),
+            "relative",
         ).beside(5e-4, "four substeps, as a scene has them", "none"),
     ]
 
@@ -152,14 +165,14 @@ def _ice_rows() -> list[Row]:
         Observed(
             "braking_suspension.ice.locks",
             SYSTEM,
-            "longest lock above 15 km/h on ice, slip bang-bang",
+            "longest time for which a wheel locks above 15 km/h on ice, bang-bang slip controller",
             float(stops[0].locks().longest.max()),
             "s",
         ).at_most(0.1, "the controller holds the wheels", "none"),
         Observed(
             "braking_suspension.ice.distance",
             SYSTEM,
-            "stopping distance on ice beside the plane vehicle's",
+            "difference of the stopping distance on ice from that of the plane vehicle",
             abs(ways[0] / ways[1] - 1.0),
             "relative",
         ).beside(0.05, "single runs on ice scatter", "none"),
@@ -188,7 +201,7 @@ def _speed_row(wet: TyreTable) -> Row:
     return Observed(
         "braking_suspension.speed",
         SYSTEM,
-        "the car in MuJoCo at four substeps, by the time on the wall, once",
+        "speed of the car in MuJoCo at four substeps, measured once",
         speed,
         "times real time",
     ).aim(
@@ -216,7 +229,8 @@ def _limit_rows(ends: list[list[float]]) -> list[Row]:
         Observed(
             "braking_suspension.limit",
             SYSTEM,
-            "how far the box ends a J-turn from the plane vehicle, springs 100 times as stiff by the plain ones",
+            "ratio of distances from the plane vehicle at the end of the box's J-turn: springs 100 "
+            "times as stiff, to the plain springs",
             ends[-1][1] / ends[0][1],
             "",
         ).at_most(0.05, "stiff springs are the plane vehicle with algebraic load transfer", "shared kernel")

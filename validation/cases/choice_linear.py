@@ -108,7 +108,7 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
         behaves(
             "choice_linear.honest",
             SYSTEM,
-            "scenes reported as kept which a route finds broken",
+            "scenes that are reported as kept although another route shows that they are not",
             str(lies),
             "0",
             "never reported as kept when it is not",
@@ -117,7 +117,8 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
         Observed(
             "choice_linear.frequency",
             SYSTEM,
-            f"confirmed changes against sums over frequencies of M, D, K with singular mass, {len(second)} scenes",
+            "largest difference of confirmed changes from sums over frequencies of M, D and K with "
+            f"singular mass, {len(second)} scenes",
             gap,
             "",
         ).at_most(1e-3, "what the frequency grid leaves", "native"),
@@ -133,7 +134,7 @@ def _prediction_row(found: list[Judged]) -> Row:
     return Observed(
         "choice_linear.predictions",
         SYSTEM,
-        f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones",
+        f"share of {len(ratios)} predicted changes below 5 % that are within a factor of 2 of the confirmed ones",
         share,
         "",
     ).within(
@@ -148,8 +149,8 @@ def _identity_row(found: list[Judged]) -> Row:
     return Observed(
         "choice_linear.identity",
         SYSTEM,
-        "variance of what is left by the whole scene's covariance and the "
-        "reduced adjoint, against the reduced covariance, worst of all scenes",
+        "difference of the variance of what is left, from the whole scene's covariance and the "
+        "reduced adjoint, from the reduced covariance, worst of all scenes",
         max(one.identity for one in found),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
@@ -164,24 +165,24 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
         Observed(
             "choice_linear.nearby",
             SYSTEM,
-            f"largest change by the tolerance, {len(saving)} of {len(found)} "
-            f"scenes in which effects were left out, {DRAWS} random speeds of the range each, with every mass, "
-            "stiffness and damping up to 5 % off at random",
+            f"largest ratio of the change to the tolerance in {len(saving)} of {len(found)} scenes in "
+            f"which effects were left out, {DRAWS} random speeds each, every mass, stiffness and "
+            "damping up to 5 % off at random",
             max(one.nearby for one in found),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
             "choice_linear.said",
             SYSTEM,
-            f"share of {len(found)} scenes in which all that could go was refused, with its reason",
+            f"share of {len(found)} scenes in which all effects that could go were refused with a reason",
             told / len(found),
             "",
         ).at_most(0.1, "asked: at most a tenth", "none"),
         Observed(
             "choice_linear.equal_accuracy",
             SYSTEM,
-            "saving in calls at equal accuracy as it is printed, against "
-            f"the covariance of what runs sample, worst of {len(saving)} scenes",
+            "difference of the printed saving in calls at equal accuracy from the covariance of what "
+            f"runs sample, worst of {len(saving)} scenes",
             max(gaps),
             "",
         ).at_most(
@@ -208,7 +209,7 @@ def _saving_row(found: list[Judged]) -> Row:
     return Observed(
         "choice_linear.saving",
         SYSTEM,
-        "calls at equal accuracy, whole scene by what is left, median of "
+        "ratio of calls of the whole scene to calls of what is left, at equal accuracy, median of "
         f"{len(saved)} scenes at 2 % (upper quartile {np.percentile(saved, 75):.3g})",
         float(np.median(saved)),
         "times",
@@ -231,7 +232,7 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
         behaves(
             "choice_linear.pair.alone",
             SYSTEM,
-            "wheels without mass under damped tyres: body acceleration",
+            "change of the body acceleration by wheels without mass under damped tyres",
             "infinite" if np.isinf(alone[0]) else "finite",
             "infinite",
             "white noise reaches the body",
@@ -240,14 +241,18 @@ def _pair() -> tuple[list[Row], dict[str, Any]]:
         behaves(
             "choice_linear.pair.chosen",
             SYSTEM,
-            "both are left out at 3 %, one for the other's sake",
+            "both effects are left out at 3 %, each for the other's sake",
             "yes" if {mass, damper} <= set(choice.left_out) else "no",
             "yes",
             f"together they change body acceleration by {100 * both[0]:.2f} %",
             "none",
         ),
         Observed(
-            "choice_linear.pair.step", SYSTEM, "step limit with both left out, by the whole scene's", step, "times"
+            "choice_linear.pair.step",
+            SYSTEM,
+            "ratio of the step limit with both effects left out to that of the whole scene",
+            step,
+            "times",
         ).within(691 / 24, 0.6, "published: 691 1/s fall to 24 1/s, as far as these digits go", "published"),
     ], {"alone": alone.tolist(), "both": both.tolist(), "step": step}
 
@@ -263,10 +268,18 @@ def _activity_rows() -> list[Row]:
     change = float(np.sqrt(confirmed(rest, chooser.rows)[0] / chooser.full[0][0]) - 1.0)
     return [
         Observed(
-            "choice_linear.activity", SYSTEM, "share of energy activity that the body's pitch inertia holds", share, ""
+            "choice_linear.activity",
+            SYSTEM,
+            "share of the energy activity that the body's pitch inertia holds",
+            share,
+            "",
         ).beside(0.16, "published ranking, of a road whose details differ"),
         Observed(
-            "choice_linear.activity.misleads", SYSTEM, "change of body acceleration with pitch locked", change, ""
+            "choice_linear.activity.misleads",
+            SYSTEM,
+            "change of the body acceleration with the pitch locked",
+            change,
+            "",
         ).at_most(1e-12, "a symmetric body bounces without pitch, however active that is", "closed form"),
     ]
 

@@ -82,7 +82,7 @@ def _kept(found: list[JudgedByRuns]) -> list[Row]:
         Observed(
             "choice_nonlinear.honest",
             SYSTEM,
-            "choices reported as kept that two more runs find broken",
+            "choices that are reported as kept although two more runs show that they are not",
             float(sum(not one.honest for one in found)),
             "",
         ).at_most(0.0, "asked: never", "none"),
@@ -99,7 +99,7 @@ def _refused() -> Row:
     return behaves(
         "choice_nonlinear.refused",
         SYSTEM,
-        f"a ride of {FEWEST} copies, tolerance {100 * FINE:g} %, where chance may add more than that",
+        f"choice for a ride of {FEWEST} copies at a tolerance of {100 * FINE:g} %, where chance may add more than that",
         said,
         "refused",
         "and how many samples would tell",
@@ -134,21 +134,22 @@ def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
         Observed(
             name,
             SYSTEM,
-            f"calls saved, median of {len(own)} scenes of {system}",
+            f"ratio of calls before and after the choice, median of {len(own)} scenes of {system}",
             float(np.median(calls[:, 0] / calls[:, 2])),
             "times",
         ).aim(5.0, note, "at least"),
         Observed(
             f"{name}.step",
             SYSTEM,
-            "the same by longer steps alone, with all effects",
+            "ratio of calls before and after longer steps alone, with all effects, median of "
+            f"{len(own)} scenes of {system}",
             float(np.median(calls[:, 0] / calls[:, 1])),
             "times",
         ).beside("", "what is left is due to effects", "none"),
         Observed(
             f"{name}.seconds",
             SYSTEM,
-            "CPU seconds saved, each run once, median of the scenes",
+            "ratio of CPU seconds before and after the choice, each run once, median of the scenes",
             float(np.median(seconds[:, 0] / seconds[:, 2])),
             "times",
         ).beside("", "of calls, and of what a call takes", "none"),

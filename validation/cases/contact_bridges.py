@@ -234,13 +234,13 @@ def _price_rows(prices: Prices) -> list[Row]:
         name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
         if one.engine == "mujoco":
             value, low, high = median(step / (own + kernel))
-            what, bound = f"by the step without contact and {4 * calls} kernel times", 1.3
+            what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
         else:
             value, low, high = median((step - own - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (
-            f"{ENGINE_NAMES[one.engine]}, {one.method}: step with FASTSIM at four wheels (21 x 21, native, "
-            f"{spelled(step, 1e6)} us), {what}, 95 % interval {low:.3f} to {high:.3f}"
+            f"{ENGINE_NAMES[one.engine]}, {one.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
+            f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
         rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, WHY))
     return rows
@@ -256,7 +256,7 @@ def _threads_row() -> Row:
     return behaves(
         "contact_bridges.threads",
         SYSTEM,
-        "MuJoCo, ten runs of 100 steps with FASTSIM in two threads beside one",
+        "ten runs of 100 steps with FASTSIM in MuJoCo give the same bits in two threads as in one",
         same,
         "identical",
         "the kernel holds nothing between calls",
@@ -275,7 +275,8 @@ def _agreement_row() -> Row:
     return Observed(
         "contact_bridges.agreement",
         SYSTEM,
-        "state after 0.1 s with FASTSIM in MuJoCo beside Exudyn, by the largest displacement or rate",
+        "difference of the state after 0.1 s with FASTSIM in MuJoCo from that in Exudyn, over the "
+        "largest displacement or rate",
         float((np.abs(path[-1] - other) / scale).max()),
         "",
     ).at_most(1e-10, "the same kernel and method; what differs is rounding", "shared kernel")

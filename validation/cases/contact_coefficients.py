@@ -119,8 +119,8 @@ def _worst(name: str, off: Array, nodes: Array, where: str, bound: float) -> Row
     return Observed(
         f"contact_coefficients.{name}.{where.split()[1]}.{where.split()[-1]}",
         SYSTEM,
-        f"{name} of the published table against the exact theory, {where}: worst of {len(off)}, at "
-        f"{ratio:.4g}, nu {nu:g}",
+        f"relative difference of {name} of the published table from the exact theory, {where}: worst "
+        f"of {len(off)}, at a/b {ratio:.4g}, nu {nu:g}",
         float(off.max()),
         "",
     ).at_most(bound, WHY, "published")
@@ -133,7 +133,7 @@ def _misprint(nodes: Array) -> Row:
     return behaves(
         "contact_coefficients.misprint",
         SYSTEM,
-        f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4, a misprint that is about, off by {off:.1%}",
+        f"C23 = {MISPRINT} at a/b = 0.8, nu = 1/4 is a misprint that is widespread, off by {off:.1%}",
         "found" if off > BOUNDS["C23"] else "passed",
         "found",
         "a table that no one computes again keeps its misprints",
@@ -154,7 +154,7 @@ def _between_rows(between: Array, nodes: Array) -> list[Row]:
         Observed(
             f"contact_coefficients.between.{span}.{name}",
             SYSTEM,
-            f"{name} half-way between tabulated {span}: error of the interpolation, worst",
+            f"largest error of the interpolation of {name} half-way between tabulated {span}",
             float(off[part, i].max()),
             "",
         ).at_most(0.01, why, "native")
@@ -178,7 +178,11 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     ]
     return [
         Observed(
-            f"contact_coefficients.{place}", SYSTEM, f"{what} against the exact theory, worst", float(values.max()), ""
+            f"contact_coefficients.{place}",
+            SYSTEM,
+            f"largest difference of {what} from the exact theory",
+            float(values.max()),
+            "",
         ).at_most(bound, why, "native")
         for place, what, values, bound, why in parts
     ]

@@ -89,13 +89,13 @@ def _hertz_rows() -> list[Row]:
             Observed(
                 f"contact_exact.{name}.order",
                 SYSTEM,
-                "order of the greatest pressure, 21 to 63 cells",
+                "observed order of the greatest pressure, 21 to 63 cells",
                 float(order[1]),
                 "",
             ).within(2.0, 0.4, "collocation at the middle of cells", "closed form"),
             _row(
                 f"{name}.residual",
-                f"{where}: contact conditions unmet, by the displacement",
+                f"{where}: unmet contact conditions, over the displacement",
                 max(coarse.residual, fine.residual),
                 1e-9,
                 "the proof of the solution",
@@ -132,7 +132,7 @@ def _strip_rows(cells: int) -> list[Row]:
     return [
         _row(
             f"carter.{share:g}",
-            f"Carter's cylinder at {share:g} of the creepage of sliding, {cells} cells: force by mu N",
+            f"error of the force on Carter's cylinder over mu N, {share:g} of the creepage of sliding, {cells} cells",
             abs(_strip(cells, share)[2]),
             0.2 / cells,
             why,
@@ -154,7 +154,7 @@ def _shift_rows() -> list[Row]:
     return [
         _row(
             f"cattaneo.{share:g}",
-            f"Cattaneo and Mindlin's shift of a ball, {share:g} of sliding: force by mu N",
+            f"error of the force on Cattaneo and Mindlin's shifted ball over mu N, {share:g} of sliding",
             abs(shift(share, 0.0, 40).fx / LIMIT + share),
             1e-3,
             why,
@@ -183,14 +183,18 @@ def _sliding_rows() -> list[Row]:
         rows.append(
             _row(
                 f"sliding.{angle:g}",
-                f"sliding at creepage 1, {angle:g} rad from x: force beside mu N against the creepage, by mu N",
+                "difference of the force from mu N against the creepage, over mu N, sliding "
+                f"at creepage 1, {angle:g} rad from x",
                 float(gap),
                 2.6e-3,
                 "half of 0.3 degrees",
             )
         )
     most = np.hypot(solved.fx, solved.fy) / LIMIT - 1.0
-    return [*rows, _row("sliding.most", "force above mu N, by mu N", max(float(most), 0.0), 1e-12, "Coulomb")]
+    return [
+        *rows,
+        _row("sliding.most", "excess of the force above mu N, over mu N", max(float(most), 0.0), 1e-12, "Coulomb"),
+    ]
 
 
 def _symmetry_rows() -> list[Row]:
@@ -198,10 +202,10 @@ def _symmetry_rows() -> list[Row]:
     name, cells = "x, y against spin", 20
     there, back, mirror = roll(name, cells), roll(name, cells, -1.0), roll(name, cells, 1.0, -1.0)
     return [
-        _row("reversed", "F(-creepage) + F(creepage), by mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
+        _row("reversed", "F(-creepage) + F(creepage), over mu N", float(np.abs(there + back).max()), 1e-7, "odd"),
         _row(
             "mirrored",
-            "forces beside those of the mirror image in y, by mu N",
+            "difference of the forces from those of the mirror image in y, over mu N",
             float(np.abs(there - mirror * [1, -1, -1]).max()),
             1e-7,
             "no side is preferred",
@@ -219,7 +223,7 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
         rows.append(
             _row(
                 f"refined.{name.replace(', ', '.').replace(' ', '_')}",
-                f"rolling, {name}: error of {cells} cells along each axis by mu N",
+                f"error of the rolling force with {cells} cells along each axis, over mu N, {name}",
                 float(left[-1]),
                 bound,
                 "as its documentation states",
@@ -232,7 +236,11 @@ def _refinement_rows(refined: dict[str, list[list[float]]]) -> list[Row]:
     return [
         *rows,
         Observed(
-            "contact_exact.order", SYSTEM, "order in the cells of the rolling forces, mean of the cases", order, ""
+            "contact_exact.order",
+            SYSTEM,
+            "observed order of the rolling forces in the size of the cells, mean of the cases",
+            order,
+            "",
         ).within(1.5, 0.6, "2 where all slips, 1 where much sticks", "none"),
     ]
 
@@ -266,7 +274,7 @@ def _converged_row() -> Row:
 
 def _sample(quick: bool) -> tuple[list[list[Any]], list[Row]]:
     """Every row of the other program's sample that this folder of data holds, and the worst difference."""
-    words = "forces of CONTACT's sample (40 cells, own error 0.6 %) by mu N, worst"
+    words = "largest difference from the forces of CONTACT's sample (40 cells, error 0.6 %) over mu N"
     folder = data_folder()
     if folder is None or not (folder / SAMPLE).is_file():
         return [], [not_run("contact_exact.sample", SYSTEM, words, f"TWINRIG_DATA names no folder with {SAMPLE}")]

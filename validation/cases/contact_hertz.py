@@ -40,7 +40,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"contact_hertz.{name}",
             SYSTEM,
-            f"{NAMES.get(name, name)}, axis ratios 1e-6 to 1e6: worst relative error",
+            f"largest relative error of {NAMES.get(name, name)}, axis ratios 1e-6 to 1e6",
             max(worst),
             "",
         ).at_most(BOUND, WHY, "closed form")
@@ -124,17 +124,21 @@ def _published() -> list[Row]:
         Observed(
             "contact_hertz.contact.p0",
             SYSTEM,
-            "largest pressure of a wheel on a rail, 100 kN",
+            "largest pressure of a wheel on a rail at 100 kN",
             float(touching.p0),
             "Pa",
         ).within(1.22674e9, 1e6, why, "native"),
         Observed(
-            "contact_hertz.contact.approach", SYSTEM, "approach of the same", float(touching.approach), "m"
+            "contact_hertz.contact.approach",
+            SYSTEM,
+            "approach of a wheel to a rail at 100 kN",
+            float(touching.approach),
+            "m",
         ).within(1.04996e-4, 1e-8, why, "native"),
         Observed(
             "contact_hertz.scaling",
             SYSTEM,
-            "axes at eight times the load, by the axes",
+            "ratio of the axes at eight times the load to the axes at the load",
             float(eight.a / touching.a),
             "",
         ).within(2.0, 1e-14, "axes go with the cube root of the load", "closed form"),
@@ -158,7 +162,12 @@ def _behaviour() -> list[Row]:
     }
     rows = [
         behaves(
-            f"contact_hertz.refused.{name.replace(' ', '_')}", SYSTEM, f"refused: {name}", _outcome(ask), "refused", why
+            f"contact_hertz.refused.{name.replace(' ', '_')}",
+            SYSTEM,
+            f"a contact is refused: {name}",
+            _outcome(ask),
+            "refused",
+            why,
         )
         for name, ask in asked.items()
     ]
@@ -166,7 +175,7 @@ def _behaviour() -> list[Row]:
         behaves(
             "contact_hertz.nothing",
             SYSTEM,
-            "no load, negative load, a gap",
+            "contact forces without load, with a negative load and across a gap",
             "zero" if exact else "not zero",
             "zero",
             "nothing touches: exactly zero, no number near it",

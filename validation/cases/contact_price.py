@@ -77,7 +77,7 @@ def _reference_rows(cases: list[Case], quick: bool) -> list[Row]:
         Observed(
             "contact_price.reference",
             SYSTEM,
-            f"exact forces computed anew against those kept, {len(answers)} cases, largest difference by mu N",
+            f"largest difference of exact forces computed anew from those kept, over mu N, {len(answers)} cases",
             max(answers),
             "",
         ).at_most(REFERENCE[quick], "what the cells leave uncertain after their first order is taken out", "none")
@@ -198,7 +198,7 @@ def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[floa
 def _program_rows(answers: dict[str, Any]) -> list[Row]:
     t = {name: np.array(own) for name, own in answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
-    what = "contact and forces by the program of 1983, by the time of the one of 1982"
+    what = "ratio of the time of contact and forces by the program of 1983 to that of the program of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])
     return [
         Observed(
@@ -226,7 +226,7 @@ def _table_row(folder: Path) -> Row:
     path.unlink()
     out.unlink()
     assert answers == {"rows": ROWS, "wrong": 0}
-    what = f"a CSV of {ROWS:,} contacts answered, with errors and status, once"
+    what = f"time to answer a CSV of {ROWS:,} contacts with errors and status, measured once"
     return Observed("contact_price.table", SYSTEM, what, seconds, "s").beside(
         "seconds", "reported and never gated", "none"
     )

@@ -88,7 +88,12 @@ def _file_rows() -> list[Row]:
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
         return [
-            not_run(f"contact_profiles.{name}", SYSTEM, f"built-in {name} against the benchmark's file", reason)
+            not_run(
+                f"contact_profiles.{name}",
+                SYSTEM,
+                f"largest difference of the built-in {name} from the benchmark's file",
+                reason,
+            )
             for name in ("S1002", "UIC60")
         ]
     wheel, rail = read_profile(folder / WHEEL_FILE, "wheel"), read_profile(folder / RAIL_FILE, "rail")
@@ -97,7 +102,7 @@ def _file_rows() -> list[Row]:
         Observed(
             f"contact_profiles.{name}",
             SYSTEM,
-            f"built-in {name}, largest distance from the benchmark's file",
+            f"largest distance of the built-in {name} from the benchmark's file",
             1e3 * value,
             "mm",
         ).at_most(1e3 * NEAR, "the figure set for the built-in profiles", "published")
@@ -136,19 +141,29 @@ def _place_rows(cases: list[dict[str, Any]]) -> list[Row]:
     at5 = _main(by[5.0])
     return [
         Observed(
-            "contact_profiles.flange", SYSTEM, "shift from which the flange carries the wheel", flange, "mm"
+            "contact_profiles.flange", SYSTEM, "sideways shift from which the flange carries the wheel", flange, "mm"
         ).within(FLANGE, 0.25, f"{BENCHMARK}; half of its steps", "published"),
         Observed(
-            "contact_profiles.jump_from", SYSTEM, "place of contact on the rail at 4.5 mm", _main(by[4.5])["rail"], "mm"
+            "contact_profiles.jump_from",
+            SYSTEM,
+            "place of contact on the rail at a shift of 4.5 mm",
+            _main(by[4.5])["rail"],
+            "mm",
         ).within(TWO_PATCHES["from"], 1.0, f"{BENCHMARK}; where the patch is before it jumps", "published"),
-        Observed("contact_profiles.jump_to", SYSTEM, "place of contact on the rail at 5 mm", at5["rail"], "mm").within(
+        Observed(
+            "contact_profiles.jump_to", SYSTEM, "place of contact on the rail at a shift of 5 mm", at5["rail"], "mm"
+        ).within(
             TWO_PATCHES["to"],
             1.0,
             f"{BENCHMARK}; a touching point here, the middle of a patch 4 mm wide there",
             "published",
         ),
         Observed(
-            "contact_profiles.places", SYSTEM, "places closer than 0.2 mm at 5 mm", float(len(by[5.0]["places"])), ""
+            "contact_profiles.places",
+            SYSTEM,
+            "places that are closer than 0.2 mm at a shift of 5 mm",
+            float(len(by[5.0]["places"])),
+            "",
         ).within(2.0, 0.0, "both ends of the jump", "published"),
     ]
 
@@ -163,19 +178,23 @@ def _benchmark_rows(cases: list[dict[str, Any]]) -> list[Row]:
         Observed(
             "contact_profiles.load",
             SYSTEM,
-            "vertical sum of the patches' loads less the wheel's, at every shift",
+            "difference of the vertical sum of the patches' loads from the wheel load, at every shift",
             float(vertical),
             "N",
         ).at_most(1e-6, "patches share the load without loss", "none"),
         Observed(
             "contact_profiles.peak",
             SYSTEM,
-            "peak pressure at 5 mm, exact, of the patch that carries most",
+            "largest pressure at a shift of 5 mm, exact theory, of the patch that carries most",
             by[5.0]["exact"],
             "MPa",
         ).beside(TWO_PATCHES["peak"], BENCHMARK),
         Observed(
-            "contact_profiles.flange_peak", SYSTEM, "peak pressure at 6.5 mm, exact", by[FLANGE]["exact"], "MPa"
+            "contact_profiles.flange_peak",
+            SYSTEM,
+            "largest pressure at a shift of 6.5 mm, exact theory",
+            by[FLANGE]["exact"],
+            "MPa",
         ).beside("about 2600", BENCHMARK),
     ]
 

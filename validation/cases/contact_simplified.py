@@ -199,7 +199,7 @@ def _hertz_rows(hertz: dict[str, dict[str, float]]) -> list[Row]:
 
 def _jump_row(jump: float) -> Row:
     return Observed(
-        "contact_simplified.continuity", SYSTEM, "largest jump of N(a3), lopsided contact", jump, "N"
+        "contact_simplified.continuity", SYSTEM, "largest jump of the load N(a3) of a lopsided contact", jump, "N"
     ).at_most(
         JUMP, "every step of the sweep is bisected to neighbouring numbers; the figure set for the theory", "none"
     )
@@ -255,15 +255,16 @@ def _time_rows(times: dict[str, list[float]]) -> list[Row]:
         Observed(
             "contact_simplified.time.forces",
             SYSTEM,
-            f"FASTSIM twice with the refit, {cost(times['roll'])}, by the 1982 program, {cost(times['1982'])}",
+            f"ratio of the time of FASTSIM twice with the refit, {cost(times['roll'])}, to that of "
+            f"the 1982 program, {cost(times['1982'])}",
             _ratio(times, "roll", "1982"),
             "",
         ).beside("about 3 with the contact, which contact_price compares", why),
         Observed(
             "contact_simplified.time.exact",
             SYSTEM,
-            "the exact normal problem at the same fineness, "
-            f"{cost(times['exact'])}, by this one, {cost(times['press'])}",
+            "ratio of the time of the exact normal problem at the same fineness, "
+            f"{cost(times['exact'])}, to that of this method, {cost(times['press'])}",
             _ratio(times, "exact", "press"),
             "",
         ).beside("", "what the theory saves", "none"),

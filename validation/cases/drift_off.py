@@ -151,7 +151,7 @@ def _row(found: Saved) -> Row:
     scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
     what = (
         f"drift-off of {found['name']}, {found['source']}, {found['rate']:g} Hz: median of {found['members']} runs "
-        f"(half of them {scatter}) by the prediction {found['predicted']:.2f} s"
+        f"(half of them {scatter}) over the prediction {found['predicted']:.2f} s"
     )
     why = f"10 % is asked; the median lies in {found['low']:.2f} to {found['high']:.2f} s at 95 %"
     return Observed(key, SYSTEM, what, found["median"] / found["predicted"], "").within(1.0, 0.1, why, "closed form")

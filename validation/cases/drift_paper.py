@@ -69,7 +69,15 @@ FIGURES = (
         "about 800",
         "mostly 5 % of the inertia term, by which the model's inertia is wrong",
     ),
-    ("moment.rms", "guided, both", "moment rms", "the same, rms", "N m", "not given", "for comparison with other runs"),
+    (
+        "moment.rms",
+        "guided, both",
+        "moment rms",
+        "rms of the enforced moment, perturbed model and noisy forces",
+        "N m",
+        "not given",
+        "for comparison with other runs",
+    ),
     (
         "inertia",
         "guided, both",
@@ -99,7 +107,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "drift.moment.ratio",
             SYSTEM,
-            "enforced moment by inertia term, perturbed model alone",
+            "ratio of the enforced moment to the inertia term, perturbed model alone",
             lacking["moment max"] / lacking["inertia max"],
             "",
         ).within(
@@ -115,7 +123,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             Observed(
                 "drift.moment.order",
                 SYSTEM,
-                "order in which the undisturbed moment falls with the period, 1000 to 2000 Hz",
+                "observed order in which the undisturbed moment falls with the period, 1000 to 2000 Hz",
                 log2(rates[1000.0]["moment max"] / rates[2000.0]["moment max"]),
                 "",
             ).within(2.0, 0.2, "linear interpolation errs by f'' T^2 / 8", "closed form")

@@ -198,7 +198,8 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
                 Observed(
                     f"drift_solvers.{name}.{solver.replace(' ', '.')}",
                     SYSTEM,
-                    f"drift-off of the {name} run by that of the first solver ({first:.2f} s), {solver}",
+                    f"ratio of the drift-off time of the {name} run to that of the first solver "
+                    f"({first:.2f} s), {solver}",
                     one["drift-off"] / first,
                     "",
                 ).within(
@@ -215,8 +216,8 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
         Observed(
             "drift_solvers.interpolation",
             SYSTEM,
-            "largest pitch error at the end by any accurate "
-            "solver with samples joined by a spline, by that of the reference with straight lines",
+            "ratio of pitch errors at the end: largest of accurate solvers with samples joined by a "
+            "spline, to the reference with straight lines",
             max(smooth) / linear,
             "",
         ).within(0.0, 0.2, "interpolation is what drifts", "native"),
@@ -232,14 +233,21 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
             Observed(
                 f"drift_solvers.growth.{key}",
                 SYSTEM,
-                f"growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s, {one['name']}, by the closed law",
+                f"ratio of the growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s to "
+                f"the closed law, {one['name']}",
                 one["growth"] / one["law"],
                 "",
             ).within(1.0, 0.1, f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form")
         ]
         for axis, what in (
-            ("f3z", f"damage of the front section force, body z, {one['name']}, no noise, by the truth's"),
-            ("f3x", f"the same, body x, {one['name']}"),
+            (
+                "f3z",
+                f"ratio of the damage of the front section force, body z, to the true damage, {one['name']}, no noise",
+            ),
+            (
+                "f3x",
+                f"ratio of the damage of the front section force, body x, to the true damage, {one['name']}, no noise",
+            ),
         ):
             id, damage = f"drift_solvers.bias.{key}.{axis}", one[f"damage {axis}"]
             rows.append(Observed(id, SYSTEM, what, damage, "").beside("1", "what smoothing takes away", "none"))

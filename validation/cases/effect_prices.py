@@ -97,19 +97,20 @@ def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
         Observed(
             f"effect_prices.same.{engine}",
             SYSTEM,
-            f"{engine}: states of a bare scene against a hand-built model",
+            f"{engine}: largest difference of the states of a bare scene from those of a hand-built model",
             found["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
         slower(
             f"effect_prices.ratio.{engine}",
-            f"{engine}: time of a bare scene by that of a hand-built model whose result passes the same guard",
+            f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
+            "whose result passes the same guard",
             found["ratio"],
             why,
         ),
         slower(
             f"effect_prices.unchecked.{engine}",
-            f"{engine}: time of a bare scene by that of a hand-built model whose result nobody checks",
+            f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
             found["unchecked"],
             why,
         ),
@@ -129,14 +130,14 @@ def _wheelset(steps: int, quick: bool) -> list[Row]:
         Observed(
             "effect_prices.same.wheelset",
             SYSTEM,
-            "states of a bare wheelset, and its contact forces by their "
-            "load, against one written out for linear creep on cones alone",
+            "largest difference of a bare wheelset's states, and of its contact forces over their "
+            "load, from a hand-written wheelset with linear creep on cones",
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
         slower(
             "effect_prices.ratio.wheelset",
-            "time of a bare wheelset by that of the written one, whose path passes the same checks",
+            "ratio of the time of a bare wheelset to that of the hand-written one, whose path passes the same checks",
             ratio,
             "what the kernel of all wheelsets costs where no effect is named",
         ),
@@ -156,7 +157,7 @@ def _rides(quick: bool) -> list[Row]:
             Observed(
                 f"effect_prices.same.ride.{engine}",
                 SYSTEM,
-                f"{engine}: states of a bare ride against those of {WRITTEN[engine]}",
+                f"{engine}: largest difference of the states of a bare ride from those of {WRITTEN[engine]}",
                 gap,
                 "m, rad, m/s, rad/s",
             ).at_most(
@@ -166,7 +167,7 @@ def _rides(quick: bool) -> list[Row]:
             ),
             slower(
                 f"effect_prices.ratio.ride.{engine}",
-                f"{engine}: time of a bare ride by that of {WRITTEN[engine]}",
+                f"{engine}: ratio of the time of a bare ride to that of {WRITTEN[engine]}",
                 ratio,
                 "what the machinery of all vehicles in space costs where no effect is named",
             ),
@@ -185,15 +186,15 @@ def _cars(steps: int, quick: bool) -> list[Row]:
         Observed(
             "effect_prices.same.handling",
             SYSTEM,
-            "MuJoCo: states of a bare car of a scene of handling against "
-            "those of one written for its springs, bars, mounts and brush tyres alone",
+            "MuJoCo: largest difference of the states of a bare car of handling from a hand-written "
+            "car with its springs, bars, mounts and brush tyres alone",
             gap,
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same equations, sums in another order", "native"),
         slower(
             "effect_prices.ratio.handling",
-            "MuJoCo: time of a bare car of a scene of handling by that of the "
-            "written one, whose path passes the same guard",
+            "MuJoCo: ratio of the time of a bare car of handling to that of the "
+            "hand-written car, whose path passes the same guard",
             ratio,
             "what walking through any vehicle's tree costs where no effect is named",
         ),
@@ -211,14 +212,14 @@ def _stops(quick: bool) -> list[Row]:
         Observed(
             "effect_prices.same.braking",
             SYSTEM,
-            "states, wheels, forces and brakes of a bare stop against those "
-            "of one written for a truck of fixed loads on one surface alone",
+            "largest difference of the states, wheels, forces and brakes of a bare stop from a "
+            "hand-written truck of fixed loads on one surface",
             gap,
             "m, rad, m/s, rad/s, shares",
         ).at_most(1e-11, "the same equations, sums in another order", "none"),
         slower(
             "effect_prices.ratio.braking",
-            "time of a bare stop by that of the written one",
+            "ratio of the time of a bare stop to that of the hand-written truck",
             ratio,
             "what a step of any braked vehicle in the plane costs where no effect is named",
         ),
@@ -233,13 +234,14 @@ def _contact(quick: bool) -> list[Row]:
         Observed(
             "effect_prices.same.contact",
             SYSTEM,
-            "forces of FASTSIM on a bare ellipse, by friction times load, against one written out for that alone",
+            "largest difference of FASTSIM's forces on a bare ellipse from a hand-written FASTSIM, "
+            "over friction times load",
             gap,
             "",
         ).at_most(1e-13, "the same cells, sums in another order", "none"),
         slower(
             "effect_prices.ratio.contact",
-            "time of a call of FASTSIM on a bare ellipse by that of the written one",
+            "ratio of the time of a call of FASTSIM on a bare ellipse to that of the hand-written FASTSIM",
             ratio,
             "what spin, other shapes, marches and friction cost where nothing asks for them",
         ),

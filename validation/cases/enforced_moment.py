@@ -97,7 +97,7 @@ def _manoeuvre(folder: Path, vehicles: tuple[str, ...], duration: float) -> list
                 Observed(
                     f"moment.{engine}.{parameters}",
                     SYSTEM,
-                    f"enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
+                    f"error of the enforced moment at 1 ms, {engine} {settings.integrator} ({route}), {parameters}",
                     relative(moment(scene, engine, settings), true),
                     "of its rms",
                 ).at_most(
@@ -116,7 +116,7 @@ def _uncertainty(scene: Scene, true: np.ndarray) -> Row:
     return Observed(
         "moment.reference",
         SYSTEM,
-        "uncertainty of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
+        "uncertainty of the moment of the eliminated form: Runge-Kutta at 1/16 ms against Dormand-Prince 8 at 1e-11",
         relative(other, true),
         "of its rms",
     ).at_most(BOUND / 100, "a hundredth of the bound that it has to judge", "shared kernel")
@@ -139,8 +139,9 @@ def _ringing(folder: Path) -> CaseAnswer:
         Observed(
             "moment.ringing",
             SYSTEM,
-            "largest error of Exudyn's multiplier in the first 0.1 s, left to its own initial accelerations, "
-            f"spectral radius 0.6 (0.9: {peak['inconsistent start, spectral radius 0.9']:.0f} N m)",
+            "largest error of Exudyn's multiplier in the first 0.1 s from its own initial "
+            "accelerations, spectral radius 0.6 (0.9: "
+            f"{peak['inconsistent start, spectral radius 0.9']:.0f} N m)",
             peak["inconsistent start, spectral radius 0.6"],
             "N m",
         ).beside(
@@ -151,7 +152,7 @@ def _ringing(folder: Path) -> CaseAnswer:
         Observed(
             "moment.consistent",
             SYSTEM,
-            "the same with the accelerations that belong to the pitch",
+            "largest error of Exudyn's multiplier in the first 0.1 s from the accelerations that belong to the pitch",
             peak["consistent start, spectral radius 0.6"],
             "N m",
         ).at_most(2.221, "a thousandth of the moment that the start demands", "native"),
@@ -184,7 +185,7 @@ def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list
         Observed(
             f"moment.rough.{engine}",
             SYSTEM,
-            f"the same on the study road at 1 ms, {engine}, perturbed model",
+            f"error of the enforced moment on the study road at 1 ms, {engine}, perturbed model",
             next(row[3] for row in table if row[0] == engine and row[2] == STEP),
             "of its rms",
         ).beside(

@@ -55,7 +55,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         with processes(2) as pool:
             again, half = pool.submit(run_paths, job, SOME), pool.submit(_half_step_row, forces)
             killed = _killed_row(job, found, forces / "killed")
-            rows += [_same_row("workers", f"{SOME} paths by 1 worker and by 2", found, again.result()), killed]
+            rows += [
+                _same_row(
+                    "workers", f"{SOME} paths have the same bits with 1 worker and with 2", found, again.result()
+                ),
+                killed,
+            ]
             halved = half.result()  # nothing else runs while the engines are timed
             engines, prices = _engines(scene, truth, times, found, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
@@ -76,7 +81,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
     engines, _ = _engines(scene, job.truth, times, found, 2, None)
     return [
         _path_row(forces, 1.0, found),
-        _same_row("workers", "12 paths by 1 and by 2 workers", found, two),
+        _same_row("workers", "12 paths have the same bits with 1 worker and with 2", found, two),
         _interrupted_row(job, found, forces / "stopped"),
         *engines,
     ]
@@ -89,7 +94,7 @@ def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
     return Observed(
         "ensemble.path",
         SYSTEM,
-        "path 7 of the ensemble against the scene with path = 7, any state",
+        "largest difference in any state between path 7 of the ensemble and the scene with path = 7",
         worst,
         "m, rad, m/s, rad/s",
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
@@ -119,7 +124,9 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
         run_paths(job, 12, blocks, blocks=Blocks(3), progress=stop)
     except KeyboardInterrupt:
         again = run_paths(job, 12, blocks, blocks=Blocks(3))
-        return _same_row("resumed", "12 paths, interrupted half-way and resumed", found, again)
+        return _same_row(
+            "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", found, again
+        )
     raise AssertionError("the interrupt was lost")
 
 
@@ -245,7 +252,9 @@ def _engines(
         start = time.perf_counter()
         paths = job()
         prices[way] = (time.perf_counter() - start) / (count * (len(truth) - 1))
-        what = f"{count} of the reference's paths in {way}: any state before drift-off, by the largest"
+        what = (
+            f"largest difference of {count} paths in {way} from the reference before drift-off, over the largest state"
+        )
         rows.append(
             Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(found, paths, times), "").at_most(
                 1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native"
@@ -257,7 +266,11 @@ def _engines(
 def _price_rows(prices: dict[str, float]) -> list[Row]:
     return [
         Observed(
-            f"ensemble.price.{_slug(way)}", SYSTEM, f"wall time by paths and steps, {way}, once", 1e9 * price, "ns"
+            f"ensemble.price.{_slug(way)}",
+            SYSTEM,
+            f"wall time per path and step, {way}, measured once",
+            1e9 * price,
+            "ns",
         ).beside("", "seconds are reported", "none")
         for way, price in prices.items()
     ]
@@ -277,7 +290,7 @@ def _half_step_row(forces: Path) -> Row:
     return Observed(
         "ensemble.half-step",
         SYSTEM,
-        "100 paths, pitch at 10 s with steps of 1 and 0.5 ms: largest difference by the standard deviation",
+        "largest difference of 100 paths' pitch at 10 s between steps of 1 and 0.5 ms, over the standard deviation",
         change,
         "",
     ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")

@@ -116,7 +116,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
                 Observed(
                     f"fastsim.cells.{bound}",
                     SYSTEM,
-                    f"largest error at 21 cells per strip, {bound} bound, {len(truth)} cases",
+                    f"largest error of the force at 21 cells per strip, {bound} bound, {len(truth)} cases",
                     float(errors[1].max()),
                     "mu N",
                 ).at_most(0.004, WHY, "none")
@@ -128,7 +128,7 @@ def _discretisation() -> tuple[list[Row], dict[str, Any]]:
                     Observed(
                         "fastsim.order",
                         SYSTEM,
-                        "2 less the observed order, 11 to 81 cells per strip",
+                        "shortfall of the observed order from 2, 11 to 81 cells per strip",
                         max(0.0, 2.0 - order),
                         "",
                     ).at_most(
@@ -154,11 +154,11 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
         "bound": "|F| beyond mu N",
         "moment": "moment beyond the sum of the traction's bound times the distance from the centre, "
         "by the longer semi-axis",
-        "limit": "power that friction takes beyond that of sliding all over, by creepage",
+        "limit": "power that friction takes beyond that of full sliding, over the creepage",
         "reversal": "F(-creepage) + F",
         "mirror": "mirrored in y",
-        "power": "power that friction would give, by creepage",
-        "power coarse": "power that friction would give, by creepage, on 9 to 12 cells per strip",
+        "power": "power that friction would give, over the creepage",
+        "power coarse": "power that friction would give, over the creepage, 9 to 12 cells per strip",
         "zero": "force without load or creepage",
         "similarity": "eight times the load, twice the size",
         "stick": "share of stick outside 0 to 1",
@@ -197,20 +197,21 @@ def _limits() -> list[Row]:
         Observed(
             "fastsim.slope",
             SYSTEM,
-            "forces at a millionth of the linear scale against the linear theory",
+            "largest difference of the forces at a millionth of the linear scale from the linear theory",
             float(slope.max()),
             "of them",
         ).at_most(0.004, "error of 21 cells: strips of finite width", "closed form"),
         Observed(
             "fastsim.sliding.direction",
             SYSTEM,
-            f"angle from the force to minus the slip, all sliding, {slides.sum()} cases from where that begins",
+            "angle between the force and the direction against the slip while all slides, "
+            f"{slides.sum()} cases from where that begins",
             float(off),
             "deg",
         ).at_most(0.3, "one flexibility in full sliding makes it rounding; 0.3 asked for", "closed form"),
-        Observed("fastsim.sliding.size", SYSTEM, "force in full sliding less mu N", float(short), "mu N").at_most(
-            ROUNDING, "pressures of the cells sum up to the load", "closed form"
-        ),
+        Observed(
+            "fastsim.sliding.size", SYSTEM, "difference of the force in full sliding from mu N", float(short), "mu N"
+        ).at_most(ROUNDING, "pressures of the cells sum up to the load", "closed form"),
     ]
 
 
@@ -254,7 +255,8 @@ def _derivatives() -> list[Row]:
         Observed(
             "fastsim.derivatives",
             SYSTEM,
-            f"derivatives to creepages, spin and load against differences, 98 % of {len(known.forces)} cases",
+            "difference of the derivatives to creepages, spin and load from finite differences, 98 % "
+            f"of {len(known.forces)} cases",
             float(share),
             "mu N, mu N c",
         ).at_most(

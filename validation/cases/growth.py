@@ -146,7 +146,7 @@ def _spread_rows(spread: Saved) -> list[Row]:
         Observed(
             f"growth.spread.pitch.{t}s",
             SYSTEM,
-            f"standard deviation of the pitch at {t} s, {by}, by the closed law",
+            f"ratio of the pitch's standard deviation at {t} s, {by}, to the closed law",
             found / expected,
             "",
         ).within(1.0, 0.05, why, "closed form")
@@ -157,7 +157,7 @@ def _spread_rows(spread: Saved) -> list[Row]:
         Observed(
             "growth.spread.linear",
             SYSTEM,
-            f"the same at {spread['time'][-1]} s by t^1.5, the law without growth",
+            f"ratio of the pitch's standard deviation at {spread['time'][-1]} s to t^1.5, the law without growth",
             miss,
             "",
         ).within(4.0, 0.5, "what the paper's law leaves out", "closed form")
@@ -167,7 +167,7 @@ def _spread_rows(spread: Saved) -> list[Row]:
         Observed(
             "growth.spread.heave",
             SYSTEM,
-            "standard deviation of the heave by t^1.5, 1 to 10 s, worst",
+            "ratio of the heave's standard deviation to the law t^1.5, worst from 1 to 10 s",
             float(heave[np.abs(heave - 1).argmax()]),
             "",
         ).within(1.0, 0.05, "momentum alone moves the heave; 3.3 times the chance of 1.3 %", "closed form")
@@ -178,7 +178,8 @@ def _spread_rows(spread: Saved) -> list[Row]:
         Observed(
             "growth.spread.forces",
             SYSTEM,
-            "covariance along the path by the closed law from the wheel forces alone, 1 to 10 s, worst",
+            "ratio of the covariance along the path to the closed law from the wheel forces alone, "
+            "worst from 1 to 10 s",
             float(alone[np.abs(alone - 1).argmax()]),
             "",
         ).within(
@@ -195,19 +196,25 @@ def _growth_rows(roads: Saved) -> list[Row]:
             Observed(
                 f"growth.rate.{key}",
                 SYSTEM,
-                f"growth rate along the true path, {name}, by the rms of the fast pitch rate",
+                f"ratio of the growth rate along the true path to the rms of the fast pitch rate, {name}",
                 road["measured"] / road["run"],
                 "",
             ).within(1.0, 0.03, LAW, "closed form"),
             Observed(
                 f"growth.forces.{key}",
                 SYSTEM,
-                f"growth rate from the wheel forces alone, {name}, by the same",
+                f"ratio of the growth rate from the wheel forces alone to the rms of the fast pitch rate, {name}",
                 road["forces"] / road["run"],
                 "",
             ).within(1.0, 0.03, "struts that give way are left out: 1 %", "closed form"),
             _body_row(f"growth.body.{key}", f"growth rate with body-fixed forces, {name}", road),
-            Observed(f"growth.swing.{key}", SYSTEM, f"frequency of that swing, {name}", road["swing"], "rad/s").beside(
+            Observed(
+                f"growth.swing.{key}",
+                SYSTEM,
+                f"frequency of the swing with body-fixed forces, {name}",
+                road["swing"],
+                "rad/s",
+            ).beside(
                 f"{road['swing law']:.3g}", "sqrt(J / (I + J)) times the rms of the fast pitch rate", "closed form"
             ),
         ]
@@ -217,7 +224,7 @@ def _growth_rows(roads: Saved) -> list[Row]:
         Observed(
             "growth.cut-off",
             SYSTEM,
-            f"change of the growth rate by half or twice the cut-off of {CUTOFF} Hz, largest",
+            f"largest change of the growth rate if the cut-off of {CUTOFF} Hz is halved or doubled",
             worst,
             "",
         ).at_most(0.05, "the choice must not matter", "none"),
@@ -246,7 +253,10 @@ def _twin_row(folder: Path) -> Row:
     q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
     found = covariance(assembly, DEVIATION).deviation("pitch")[at]
-    what, why = "asymmetric twin: covariance along the path at 5 s by the closed law", "as for the published vehicle"
+    what, why = (
+        "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",
+        "as for the published vehicle",
+    )
     return Observed("growth.twin", SYSTEM, what, float(found / expected), "").within(1.0, 0.05, why, "closed form")
 
 
@@ -263,8 +273,8 @@ def _engine_rows(folder: Path) -> list[Row]:
         Observed(
             f"growth.engines.{engine}",
             SYSTEM,
-            f"{engine} and the reference on the same noise file before "
-            f"drift-off at {base.times[before.stop - 1]:.2f} s, by the largest state",
+            f"difference of {engine} from the reference on the same noise file before drift-off at "
+            f"{base.times[before.stop - 1]:.2f} s, over the largest state",
             gap / size,
             "",
         ).at_most(1e-9, "the same method; only rounding grows", "native")
@@ -280,7 +290,10 @@ def _step_row(folder: Path) -> Row:
         for step in (5e-4, 2.5e-4)
     }
     gap = float(np.abs(runs[5e-4][:, 3] - runs[2.5e-4][:, 3]).max() / runs[5e-4][:, 3].std())
-    what = "pitch at 10 s by steps of 0.5 and 0.25 ms on the same noise, 20 paths, largest difference by their spread"
+    what = (
+        "largest difference of the pitch at 10 s between steps of 0.5 and 0.25 ms, "
+        "same noise, 20 paths, over their spread"
+    )
     return Observed("growth.step", SYSTEM, what, gap, "").at_most(1e-4, "noise belongs to the samples", "closed form")
 
 

@@ -119,12 +119,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         rows += _unstable_rows(engine, endings, quick)
         rows += _input_rows(engine)
     for name, found in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
-        how = "" if name == "refused" else ", past the check"
+        how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
             behaves(
                 f"guards.constraint.exudyn.{name}",
                 SYSTEM,
-                f"an integrator that ignores the active constraint, exudyn, all {len(found)}{how}",
+                f"an integrator that ignores the active constraint, Exudyn, all {len(found)}{how}",
                 _all(found, name),
                 name,
                 "Exudyn's explicit solvers freeze or free the pitch without a word",
@@ -142,14 +142,14 @@ def _outside_rows() -> list[Row]:
         Observed(
             "guards.outside.silent",
             SYSTEM,
-            f"wrong integrators from outside the tree that run without a word, of {names}",
+            f"wrong integrators from outside the project that run without a warning, of {names}",
             len(silent),
             "",
         ).at_most(0.0, "every such run is held against the reference", "native"),
         behaves(
             "guards.outside.right",
             SYSTEM,
-            "a right integrator from outside the tree, in the same comparison",
+            "a right integrator from outside the project passes the same comparison",
             "answered" if right else "raised",
             "answered",
             "a check that refuses everything is no check",
@@ -162,7 +162,7 @@ def _disk_row(folder: Path) -> Row:
     return Observed(
         "guards.full_disk",
         SYSTEM,
-        f"moments, of {full_disk.MOMENTS}, at which a full disk leaves a file that is not whole, or goes unnoticed",
+        f"moments, of {full_disk.MOMENTS}, at which a full disk leaves an incomplete file or goes unnoticed",
         full_disk.damage(folder),
         "",
     ).at_most(0.0, "files are written whole or not at all", "none")
@@ -178,14 +178,14 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
         Observed(
             f"guards.unstable.{engine}",
             SYSTEM,
-            f"silent answers of {total} runs at 2 to 10 ms, every fixed-step integrator, {engine}",
+            f"silent wrong answers of {total} runs at 2 to 10 ms with every fixed-step integrator, {engine}",
             checked["SILENT"],
             "runs",
         ).at_most(0.0, "a step beyond the stability limit is refused with the limit named", "native"),
         behaves(
             f"guards.unstable.{engine}.unchecked",
             SYSTEM,
-            f"RK4 at 5 ms over 2 s past the check, {engine}",
+            f"RK4 at 5 ms over 2 s with the step check bypassed, {engine}",
             ending(lambda: setups.unchecked(engine, road(), 5e-3, 2.0)),
             "raised",
             "finite, size and time are checked after every run",
@@ -202,7 +202,7 @@ def _input_rows(engine: str) -> list[Row]:
         behaves(
             f"guards.nan-file.{engine}",
             SYSTEM,
-            f"NaN in a force file, {engine}",
+            f"a force file that holds NaN, {engine}",
             file,
             "refused",
             "the reader names the line",
@@ -210,7 +210,7 @@ def _input_rows(engine: str) -> list[Row]:
         behaves(
             f"guards.nan.{engine}",
             SYSTEM,
-            f"NaN past the reader, all {len(numbers)} integrators and rules, {engine}",
+            f"NaN in forces that the reader has not checked, all {len(numbers)} integrators and rules, {engine}",
             _all(caught, "caught"),
             "caught",
             "Exudyn's explicit solvers return True with NaN",
@@ -218,7 +218,7 @@ def _input_rows(engine: str) -> list[Row]:
         behaves(
             f"guards.step-sampling.{engine}",
             SYSTEM,
-            f"step that does not divide the sampling period, {engine}",
+            f"a step that does not divide the sampling period, {engine}",
             ending(lambda: sampled_input.uneven(engine, Path())),
             "refused",
             "a held sample would change in a step",
@@ -226,7 +226,7 @@ def _input_rows(engine: str) -> list[Row]:
         behaves(
             f"guards.step-duration.{engine}",
             SYSTEM,
-            f"step that does not divide the duration, {engine}",
+            f"a step that does not divide the duration, {engine}",
             ending(lambda: setups.run(engine, setups.vehicle(), 3e-4, 1.0)),
             "refused",
             "the run would end elsewhere",
@@ -240,7 +240,7 @@ def _reduced_row(engine: str) -> Row:
     return Observed(
         f"guards.constraint.{engine}",
         SYSTEM,
-        f"enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
+        f"error of the enforced moment by an explicit solver, {engine}: the pitch is an input, no constraint is active",
         error,
         "of its rms",
     ).at_most(1e-4, "the project's bound at 1 ms", "closed form")

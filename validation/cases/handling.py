@@ -87,7 +87,7 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
     return Observed(
         "handling.engines",
         SYSTEM,
-        "lane change on a rough road: positions and rates of the two engines",
+        "largest difference of positions and rates between the two engines in a lane change on a rough road",
         _gap(drives["mujoco"], drives["exudyn"]),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
@@ -138,14 +138,14 @@ def _tyre_rows() -> list[Row]:
         Observed(
             "handling.cornering",
             SYSTEM,
-            "cornering stiffness at small slip, by the ride vehicle's, less 1",
+            "relative difference of the cornering stiffness at small slip from that of the ride vehicle",
             cornering_error(Handling(R19)),
             "",
         ).at_most(1e-3, "the bristles are those of the ride vehicle's tyres", "closed form"),
         Observed(
             "handling.locked",
             SYSTEM,
-            "force on a wheel that does not turn, beside mu N against its sliding, by mu N",
+            "difference of the force on a wheel that does not turn from mu N against its sliding, over mu N",
             locked_error(),
             "",
         ).at_most(1e-9, "all bristles slide one way", "closed form"),
@@ -156,7 +156,7 @@ def _power_row(drive: Drive) -> Row:
     return behaves(
         "handling.power",
         SYSTEM,
-        "power of each tyre's contact at every step of the lane change",
+        "sign of the power of each tyre's contact in every step of the lane change",
         "never positive" if drive["power"].max() <= 0.0 else "positive",
         "never positive",
         "friction takes energy out",
@@ -177,7 +177,8 @@ def _mirror_row(duration: float) -> Row:
     return Observed(
         "handling.mirror",
         SYSTEM,
-        "step steer to the left beside the mirror image of one to the right, with inclined wheels",
+        "largest difference of a step steer to the left from the mirror image of a step steer to the "
+        "right, inclined wheels",
         mirror_gap(inclined, duration),
         "m, rad",
     ).at_most(1e-10, "a symmetric vehicle", "none")
@@ -199,13 +200,18 @@ def _turn_rows() -> list[Row]:
         Observed(
             "handling.turn",
             SYSTEM,
-            "yaw gain of a steady turn of small slip at 20 m/s, by the single-track vehicle's, less 1",
+            "relative difference of the yaw gain of a steady turn at 20 m/s and small slip from the "
+            "single-track vehicle",
             turn_error(),
             "",
         ).at_most(1e-3, "linear tyres, with trail and turning slip", "closed form"),
-        Observed("handling.understeer", SYSTEM, "its understeer gradient", turn.understeer, "s^2/m").beside(
-            "positive: understeering", "closed form at the static loads"
-        ),
+        Observed(
+            "handling.understeer",
+            SYSTEM,
+            "relative difference of the understeer gradient of a steady turn from the single-track vehicle",
+            turn.understeer,
+            "s^2/m",
+        ).beside("positive: understeering", "closed form at the static loads"),
     ]
 
 
@@ -220,14 +226,14 @@ def _stop_rows() -> list[Row]:
         Observed(
             "handling.slide",
             SYSTEM,
-            "braking force of four locked wheels beside mu N, by mu N",
+            "difference of the braking force of four locked wheels from mu N, over mu N",
             float(np.abs(left / drive.grip()).max()),
             "",
         ).at_most(1e-9, "at every step of a stop", "closed form"),
         Observed(
             "handling.stop",
             SYSTEM,
-            "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), less 1",
+            "relative difference of the distance of a stop with locked wheels from 15 m/s from (v0^2 - v^2) / (2 mu g)",
             float(drive.path[-1, 0] / stopped - 1.0),
             "",
         ).at_most(1e-2, "wheel loads swing about the weight when the body dives", "closed form"),
@@ -244,15 +250,16 @@ def _transfer_rows() -> list[Row]:
             Observed(
                 f"handling.transfer.{name}",
                 SYSTEM,
-                f"load transfer of the {name} between its axles, wheels "
-                f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1",
+                f"relative difference of the {name}'s load transfer between its axles from m_total a "
+                f"h / L and the leaning weight, wheels locked at mu = {GENTLE:g}",
                 braking,
                 "",
             ).at_most(5e-3, "first order in the pitch angle; 2 s of settling", "closed form"),
             Observed(
                 f"handling.transfer_aside.{name}",
                 SYSTEM,
-                f"the same of the {name} between its sides in a steady turn of 0.4 m/s^2, by m_total a h / t",
+                f"relative difference of the {name}'s load transfer between its sides from m_total a "
+                "h / t, steady turn of 0.4 m/s^2",
                 turn,
                 "",
             ).at_most(1e-3, "first order in the roll angle", "closed form"),
@@ -282,7 +289,7 @@ def _energy_rows() -> list[Row]:
         Observed(
             "handling.ledger",
             SYSTEM,
-            "energy of the lane change that nothing accounts for, by all of it",
+            "share of the energy of the lane change that nothing accounts for",
             gaps["sliding", 1e-3] / whole,
             "",
         ).at_most(
@@ -294,7 +301,8 @@ def _energy_rows() -> list[Row]:
         behaves(
             "handling.ledger_order",
             SYSTEM,
-            "its order in the step where friction holds the bristles and no wheel lifts",
+            "observed order of the unaccounted energy in the step, where friction holds the bristles "
+            "and no wheel lifts",
             "at least 3.5" if order >= 3.5 else f"{order:.2f}",
             "at least 3.5",
             "that of Runge and Kutta is 4",
@@ -350,8 +358,8 @@ def _price_row() -> Row:
     return Observed(
         "handling.price",
         SYSTEM,
-        "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
-        f"and what the kernel takes alone, less 1, 95 % interval {low:.3g} to {high:.3g}",
+        "relative difference of a step of MuJoCo with four tyres (22 x 21 cells) from a step without "
+        f"them plus the kernel alone, 95 % interval {low:.3g} to {high:.3g}",
         ratio,
         "",
     ).aim(0.3, "seconds of the processor, median of interleaved rounds")
@@ -369,7 +377,7 @@ def _threads_row() -> Row:
     return behaves(
         "handling.threads",
         SYSTEM,
-        "three lane changes marched by MuJoCo in two threads beside one, to the last bit",
+        "three lane changes in MuJoCo give the same bits in two threads as in one",
         said,
         "identical",
         "the callback writes nothing but its own run's forces",

@@ -42,7 +42,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "hard.silent",
             SYSTEM,
-            f"silent wrong answers in {share} cases, {sum(map(len, words))} outcomes",
+            f"silent wrong answers in {share} hard cases, {sum(map(len, words))} outcomes",
             sum(own.count("SILENT") for own in words),
             "",
         ).at_most(0.0, "a finite wrong answer without a word is never accepted", "none"),
@@ -56,7 +56,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "hard.count",
             SYSTEM,
-            "by how much fewer than 80 there are, all measurement files counted as one",
+            "shortfall of the number of hard cases from 80, all measurement files counted once",
             max(0, LEAST - counted - 1),
             "cases",
         ).at_most(0.0, f"{counted} cases without measurement files", "none"),

@@ -104,7 +104,7 @@ def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:
             behaves(
                 key,
                 SYSTEM,
-                f"{factor} of the predicted {measured.law:.1f} N m/rad, {one}, {engine}",
+                f"spring of {factor} of the predicted {measured.law:.1f} N m/rad, {one}, {engine}",
                 "holds" if off <= HELD else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed",
@@ -126,7 +126,10 @@ def _smallest(one: Setting, measured: FreeRuns) -> float:
 
 
 def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
-    key, what = f"holding_spring.found.{index + 1}", f"predicted stiffness by the smallest found by bisection, {name}"
+    key, what = (
+        f"holding_spring.found.{index + 1}",
+        f"ratio of the predicted stiffness to the smallest that holds, which bisection gives, {name}",
+    )
     if index >= len(JUDGED):
         return Observed(key, SYSTEM, what, law / stiffness, "").beside(
             "1 for little damping and no noise", "said, not judged"

@@ -76,14 +76,16 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
         Observed(
             f"hub_forces.accelerations_{name}",
             SYSTEM,
-            "accelerations of Exudyn and MuJoCo beside the written-out equations at random states, relative",
+            "relative difference of the accelerations in Exudyn and MuJoCo from the written-out "
+            "equations at random states",
             worst,
             "1",
         ).at_most(1e-10, "one callback, three mass matrices", "shared kernel"),
         Observed(
             f"hub_forces.free_fall_{name}",
             SYSTEM,
-            "accelerations of the freely falling, turning tree beside a second set of equations",
+            "relative difference of the accelerations of the freely falling, turning tree from a "
+            "second set of equations",
             float(np.abs(written - expected).max()),
             "m/s^2, rad/s^2",
         ).at_most(1e-9, "written separately; gravity moves all alike", "native"),
@@ -104,7 +106,7 @@ def _wrenches(vehicle: CutVehicle) -> Row:
     return Observed(
         "hub_forces.wrenches",
         SYSTEM,
-        "joint forces of six components per hub in two frames beside MuJoCo's own Jacobians, relative",
+        "relative difference of six force components per hub, as joint forces in two frames, from MuJoCo's Jacobians",
         worst,
         "1",
     ).at_most(1e-12, "places, axes, frames", "native")
@@ -125,15 +127,15 @@ def _gravity(vehicle: CutVehicle) -> list[Row]:
         Observed(
             "hub_forces.gravity_error",
             SYSTEM,
-            "position of the chassis on body-fixed forces at a roll of 0.1 rad "
-            "beside -g sin(roll) t^2/2 and -g (1 - cos(roll)) t^2/2 over 1 s",
+            "difference of the chassis' position at a roll of 0.1 rad, body-fixed forces, from -g "
+            "sin(roll) t^2/2 and -g (1 - cos(roll)) t^2/2 over 1 s",
             float(np.abs(run.states[:, [Y, Z]] - fall).max()),
             "m",
         ).at_most(1e-9, "forces turn with it, gravity does not", "closed form"),
         Observed(
             "hub_forces.equivalence",
             SYSTEM,
-            "change of any section force by that tilt, of the weight",
+            "largest change of a section force by a roll of 0.1 rad, over the weight",
             float(np.abs(run.elements - preloads).max() / vehicle.loads.sum()),
             "1",
         ).at_most(
@@ -151,7 +153,8 @@ def _toppling(vehicle: CutVehicle) -> Row:
     return Observed(
         "hub_forces.toppling",
         SYSTEM,
-        "growth rate of a roll error on forces of the inertial frame beside sqrt(m g h / I) of the rigid car",
+        "relative difference of the growth rate of a roll error, forces in the inertial frame, from "
+        "sqrt(m g h / I) of the rigid car",
         float(np.log(late[1] / late[0])),
         "1/s",
     ).within(expected, 0.02 * expected, "springs that give change it by less than one per cent", "closed form")
@@ -166,7 +169,8 @@ def _together(vehicle: CutVehicle, duration: float) -> Row:
     return Observed(
         "hub_forces.engines_on_noise",
         SYSTEM,
-        f"coordinates and rates of three implementations on noise of 50 N and 5 N m, {duration:g} s",
+        "largest difference between the coordinates and rates of three implementations, noise of 50 "
+        f"N and 5 N m, {duration:g} s",
         max(float(np.abs(p - paths[0]).max()) for p in paths[1:]),
         "m, rad, 1/s",
     ).at_most(1e-9, "same tableau, same step", "shared kernel")
@@ -194,14 +198,14 @@ def _reproduced(vehicle: CutVehicle) -> list[Row]:
         Observed(
             "hub_forces.hold",
             SYSTEM,
-            "order in the sampling period of roll and pitch on linear samples of hub forces, 250 and 500 Hz",
+            "observed order of roll and pitch in the sampling period of linear samples of hub forces, 250 and 500 Hz",
             float(order),
             "1",
         ).within(2.0, 0.5, "linear interpolation errs by the square", "closed form"),
         Observed(
             "hub_forces.reproduced",
             SYSTEM,
-            "error of roll and pitch on a cubic spline through samples at 500 Hz, 2 s of a class C road",
+            "error of roll and pitch with a cubic spline through samples at 500 Hz, 2 s of a class C road",
             off["smooth", 2],
             "rad",
         ).at_most(1e-5, "the cut vehicle is the one on the road", "shared kernel"),
@@ -228,7 +232,7 @@ def _growth(vehicle: CutVehicle) -> list[Row]:
         Observed(
             f"hub_forces.growth_{name}",
             SYSTEM,
-            f"mean square of {name} after {LASTING:g} s on white noise by its law, {COPIES} paths",
+            f"ratio of the mean square of {name} after {LASTING:g} s of white noise to its law, {COPIES} paths",
             float(np.mean(ends[:, i] ** 2) / variance),
             "1",
         ).within(
@@ -254,7 +258,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
         Observed(
             f"hub_forces.engines_{frame}",
             SYSTEM,
-            f"engines apart before drift-off, noisy road run of 8 s, frame {frame!r}",
+            f"largest difference between the engines before drift-off, noisy road run of 8 s, frame {frame!r}",
             comparison.engines_apart(),
             "m, rad, 1/s",
         ).at_most(1e-9, "same tableau, same step", "shared kernel"),
@@ -271,7 +275,7 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
         Observed(
             f"hub_forces.drift_off_{frame}",
             SYSTEM,
-            f"free run leaves the true roll or pitch by 0.05 rad; 8 s: never, frame {frame!r}",
+            f"time at which the free run leaves the true roll or pitch by 0.05 rad (8 s: never), frame {frame!r}",
             min(comparison.drift_off(comparison.runs["free, mujoco"]), 8.0),
             "s",
         ).beside("", "stated"),
@@ -279,7 +283,10 @@ def _stabilised(frame: str, comparison: Comparison) -> list[Row]:
     for name in (name for name in comparison.runs if "exudyn" not in name):
         ratios = comparison.damages(comparison.runs[name]["section_force"]).values()
         for end, value in (("least", min(ratios)), ("most", max(ratios))):
-            what = f"{end} damage of {len(ratios)} springs, mounts and bars by the true one; {name}, frame {frame!r}"
+            what = (
+                f"{end} ratio of the damage of {len(ratios)} springs, mounts and bars to the "
+                f"true damage; {name}, frame {frame!r}"
+            )
             rows.append(
                 Observed(f"hub_forces.damage_{end}_{name.split(',')[0]}_{frame}", SYSTEM, what, value, "1").beside(
                     1.0, "body-frame section forces, slope 5"
@@ -299,7 +306,7 @@ def _exact(frame: str, comparison: Comparison) -> Row:
     return Observed(
         f"hub_forces.prescribed_{frame}",
         SYSTEM,
-        f"largest deviation from 1 of a damage ratio, true roll and pitch prescribed, frame {frame!r}",
+        f"largest deviation of a damage ratio from 1 with the true roll and pitch prescribed, frame {frame!r}",
         float(np.abs(ratios - 1).max()),
         "1",
     ).at_most(0.1, "force noise of 0.2 % alone changes lightly loaded bushes by some per cent", "none")

@@ -43,8 +43,8 @@ LACKING = (
         "has no formulation on the level of accelerations; its explicit solvers leave "
         "constraints out without a word, which the adapter refuses",
     ),
-    ("exudyn.baumgarte", "Exudyn with Baumgarte's stabilisation", "has none: its index 3 needs none"),
-    ("exudyn.projection", "Exudyn with projection", "has none between steps"),
+    ("exudyn.baumgarte", "Exudyn is asked for Baumgarte's stabilisation", "has none: its index 3 needs none"),
+    ("exudyn.projection", "Exudyn is asked for projection", "has none between steps"),
     (
         "mujoco",
         "MuJoCo at index 3, 2 or 1",
@@ -157,7 +157,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
         Observed(
             f"index_reduction.law.{_id(name)}",
             SYSTEM,
-            f"{name}: gap {start} against its law",
+            f"{name}: difference of the gap {start} from its law",
             float(np.abs(gaps[name] - law).max() / OFF),
             "of the start's",
         ).at_most(1e-3, why, "closed form")
@@ -173,7 +173,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
         Observed(
             f"index_reduction.none.{_id(name)}",
             SYSTEM,
-            f"{name}: gap after the first step, {start}",
+            f"{name}: gap after the first step {start}",
             float(np.abs(gaps[name][1:]).max()),
             "rad",
         ).at_most(1e-12, why, "closed form")
@@ -183,7 +183,7 @@ def _gap_rows(gaps: dict[str, np.ndarray], laws: dict[str, tuple[np.ndarray, str
         Observed(
             "index_reduction.gain",
             SYSTEM,
-            f"index 1: gap after {duration:g} s by that of the start",
+            f"index 1: ratio of the gap after {duration:g} s to the gap at the start",
             float(gaps["index 1"][-1] / OFF),
             "",
         ).beside(1 + RATE_OFF / OFF * duration, "it never stops", "none")
@@ -218,7 +218,7 @@ def _index_two_refused() -> Row:
     return behaves(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
-        "Exudyn's generalised-alpha with its flag for index 2",
+        "Exudyn's generalised-alpha solver with its flag for index 2",
         found,
         "refused",
         "index 2 is there with the trapezoidal rule alone",
@@ -235,7 +235,7 @@ def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> 
         paths = np.array(list(errors.values()))
         size = float(np.sqrt(np.mean(paths[-1] ** 2)))
         rows.append(
-            Observed(f"index_reduction.{id}.size", SYSTEM, f"{words}: rms error of the pitch", size, "rad").beside(
+            Observed(f"index_reduction.{id}.size", SYSTEM, f"rms error of the pitch, {words}", size, "rad").beside(
                 "not zero", "noise, integrated once or twice: the data itself drifts", "none"
             )
         )
@@ -244,7 +244,7 @@ def _noise_rows(walked: dict[str, np.ndarray], loose: dict[str, np.ndarray]) -> 
             Observed(
                 f"index_reduction.{id}",
                 SYSTEM,
-                f"{words}: largest difference of the error between {len(paths)} formulations, by its rms",
+                f"largest difference of the pitch error between {len(paths)} formulations, over its rms, {words}",
                 apart,
                 "",
             ).at_most(0.05, why, "native")

@@ -91,7 +91,7 @@ def _one_axis(paths: int) -> list[Row]:
                 Observed(
                     f"inertial_unit.one_axis.{axis + 1}",
                     SYSTEM,
-                    f"mean square angle, axis {axis + 1} noisy",
+                    f"mean square angle with noise about axis {axis + 1}",
                     float(np.mean(turns[:, axis] ** 2)),
                     "rad^2",
                 ),
@@ -149,14 +149,14 @@ def _three_axes(paths: int) -> list[Row]:
         ),
         _small(
             "matrix.equal",
-            "matrix law with equal noise against 3 exp(-s^2 t)",
+            "difference of the matrix law with equal noise from 3 exp(-s^2 t)",
             abs(same - mean_trace(EQUAL, SPAN)),
             "",
             "both are exact",
         ),
         _small(
             "matrix",
-            "mean rotation matrix, unequal noise, turning body: worst entry by its standard error",
+            "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
             standard_errors(found, exact),
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
@@ -166,7 +166,8 @@ def _three_axes(paths: int) -> list[Row]:
         Observed(
             "inertial_unit.matrix.resting",
             SYSTEM,
-            "the same against the law of a body at rest",
+            "difference of the mean rotation matrix of a turning body from the law of a body at "
+            "rest, worst entry over its standard error",
             standard_errors(found, resting),
             "",
         ).beside(f"far beyond {LEVEL}", "the rows above can tell the laws apart", "closed form"),
@@ -189,15 +190,27 @@ def _norms(paths: int) -> list[Row]:
         scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
         means = (
             ("norm", f"E[|q|^2] of explicit Euler, {noisy}, not normalised", square, law, "(1 + k s^2 D / 4)^n"),
-            ("mean", f"E[q1] of the same, {noisy}", true, 1.0, "after Ito the mean is the true quaternion"),
-            ("direction", f"E[q1] once it is normalised, {noisy}", true / square**0.5, scalar, STRATONOVICH),
+            (
+                "mean",
+                f"E[q1] of explicit Euler, {noisy}, not normalised",
+                true,
+                1.0,
+                "after Ito the mean is the true quaternion",
+            ),
+            (
+                "direction",
+                f"E[q1] of explicit Euler, normalised at the end, {noisy}",
+                true / square**0.5,
+                scalar,
+                STRATONOVICH,
+            ),
         )
         rows += [
             *(_mean(f"{id}.{axes}", *figures) for id, *figures in means),
             Observed(
                 f"inertial_unit.growth.{axes}",
                 SYSTEM,
-                f"root of the Euler law at 4e6 steps, {axes} noisy axes",
+                f"root of the explicit Euler law at 4e6 steps, {axes} noisy axes",
                 euler_mean_square(EQUAL, axes, 1e-6, 4_000_000) ** 0.5,
                 "",
             ).within(ito_norm(np.full(axes, EQUAL), span), 1e-6, "exp(k s^2 t / 8), eq. (28)", "closed form"),
@@ -212,15 +225,25 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     why = "s = 0.1 sqrt(1e-3) rad; the fraction that the print garbles is 180 / pi"
     rows = [
         Observed(
-            "inertial_unit.walk", SYSTEM, "random walk of the ten-minute example", math.degrees(walk), "deg per sqrt(s)"
+            "inertial_unit.walk",
+            SYSTEM,
+            "angle random walk of the ten-minute example",
+            math.degrees(walk),
+            "deg per sqrt(s)",
         ).within(0.1812, 5e-5, why, "published"),
         *(
             Observed(f"inertial_unit.ten_minutes.{id}", SYSTEM, what, angle, "deg").within(
                 law, 5e-3, why, "closed form"
             )
             for id, what, angle, law, why in (
-                ("axis", "its rms angle per axis at 600 s", axis, 4.44, "s sqrt(t)"),
-                ("total", "its rms angle in all at 600 s", axis * 3**0.5, 7.69, "s sqrt(3 t)"),
+                ("axis", "rms angle per axis of the ten-minute example at 600 s", axis, 4.44, "s sqrt(t)"),
+                (
+                    "total",
+                    "rms angle about all axes of the ten-minute example at 600 s",
+                    axis * 3**0.5,
+                    7.69,
+                    "s sqrt(3 t)",
+                ),
             )
         ),
     ]
@@ -236,7 +259,7 @@ def _ten_minutes(paths: int) -> CaseAnswer:
             Observed(
                 "inertial_unit.ten_minutes",
                 SYSTEM,
-                "its mean square angle per axis by Monte Carlo",
+                "mean square angle per axis of the ten-minute example by Monte Carlo",
                 float(np.mean(found[:, -1] ** 2)),
                 "deg^2",
             ),
@@ -298,8 +321,8 @@ def _section_forces() -> list[Row]:
     return [
         _small(
             f"section.{name}",
-            f"{name} of a run guided by a pitch that goes wrong by {size} rad in 10 s, against "
-            "the true force turned by that angle, by the change",
+            f"difference of {name} of a run guided by a pitch that goes wrong by {size} rad in 10 s from "
+            "the true force turned by that angle, over the change",
             rms(found[name] - turned[name]) / rms(turned[name] - before[name]),
             "",
             "f3 and f4 are those of the true run: a slow angle error leaves no inertia force",
@@ -328,14 +351,14 @@ def _recording(paths: int) -> CaseAnswer:
         Observed(
             "inertial_unit.recording",
             SYSTEM,
-            f"a minute in a real car: attitude of the gyro alone against the "
-            f"camera's after {recording.PERIOD * (len(off) - 1):.0f} s, own bias taken off",
+            "a minute in a real car: difference of the gyro's attitude from the camera's after "
+            f"{recording.PERIOD * (len(off) - 1):.0f} s, gyro alone, its bias removed",
             float(off[-1]),
             "deg",
         ).beside("nothing published", f"as of a bias of {off[-1] / 60 * 3600:.0f} deg/h: a telephone's grade", "none"),
         _small(
             "recording.law",
-            "mean rotation matrix of noise on its motion: worst entry by its standard error",
+            "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
             standard_errors(found, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",

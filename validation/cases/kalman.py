@@ -102,13 +102,13 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     }
     stated = f"of {count} runs; stated level {ALARMS:g} of all runs"
     rows = [
-        Observed("kalman.alarms", SYSTEM, "right filters called inconsistent", alarms, "").at_most(
+        Observed("kalman.alarms", SYSTEM, "right filters that are called inconsistent", alarms, "").at_most(
             1, stated, "closed form"
         )
     ]
     for words, plant in planted.items():
         silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
-        id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words}, not named"
+        id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words} and that are not named"
         rows.append(Observed(id, SYSTEM, what, silent, "").at_most(0, f"of {count} runs", "closed form"))
     return rows
 
@@ -152,7 +152,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     for name in sensors:
         found = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
         held = f"{LOST:.0%} of the samples lost" + (f", none from {outage[0]:g} to {outage[1]:g} s" if outage else "")
-        id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest pitch error by its stated deviation"
+        id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest ratio of the pitch error to its stated deviation"
         why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {found['deviation']:.2g} rad"
         rows.append(
             Observed(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "").at_most(
@@ -161,7 +161,7 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
         )
         rows.append(
             Observed(
-                f"{id}.count", SYSTEM, f"cells without a number that were not counted, {name}", found["miscounted"], ""
+                f"{id}.count", SYSTEM, f"cells that hold no number and are not counted, {name}", found["miscounted"], ""
             ).at_most(0.0, f"{found['missed']:.0f} were written", "closed form")
         )
     return rows
@@ -190,7 +190,8 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
             Observed(
                 f"kalman.covariance.{who}.{i % 6}",
                 SYSTEM,
-                f"variance of the {who}'s error in {what}: filter and run by discrete Lyapunov equation",
+                f"difference of the variance of the {who}'s error in {what} between filter and run, "
+                "by the discrete Lyapunov equation",
                 squares[i] / covariance[i, i],
                 "",
             ).within(1.0, 3.29 * spread[i], why, "closed form")
@@ -204,12 +205,16 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
     why = "the instability makes the pitch visible in its rate; lambda from the true run is good to 5 %"
     return [
         Observed(
-            "kalman.gyro", SYSTEM, f"{words}, by the averaged Riccati equation", found["stated"] / found["law"], ""
+            "kalman.gyro",
+            SYSTEM,
+            f"ratio of {words} to the averaged Riccati equation",
+            found["stated"] / found["law"],
+            "",
         ).within(1.0, 0.1, why, "closed form"),
         Observed(
             "kalman.gyro.error",
             SYSTEM,
-            "its actual error, rms from 100 s on, by the stated deviation",
+            "ratio of the filter's actual error, rms from 100 s on, to the stated deviation",
             found["error"] / found["stated"],
             "",
         ).within(
@@ -220,7 +225,11 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
             "closed form",
         ),
         Observed(
-            "kalman.gyro.level", SYSTEM, "the same about a level vehicle, A(0): a random walk", found["walk"], "rad"
+            "kalman.gyro.level",
+            SYSTEM,
+            "pitch deviation after 600 s of a filter linearised about a level vehicle, A(0): a random walk",
+            found["walk"],
+            "rad",
         ).beside(found["stated"], "nothing in A(0) shows the pitch", "closed form"),
     ]
 
@@ -234,7 +243,7 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
                 f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
             )
-            words = f"mean pseudo-damage of {name} by the true one, {engine}"
+            words = f"ratio of the mean pseudo-damage of {name} to the true one, {engine}"
             rows.append(
                 Observed(f"kalman.damage.{name}.{engine}", SYSTEM, words, float(ratios.mean()), "").within(
                     1.0, 0.02, why, "native"
@@ -244,7 +253,7 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
 
 
 LACKS = "the model lacks 5 % of the inertia"
-ESTIMATED = "share by which 1/I is estimated above the model's, mean"
+ESTIMATED = "mean share by which the estimated 1/I is above the model's"
 
 
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
@@ -260,7 +269,7 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
                 Observed(
                     f"kalman.moment.{name}{band.replace(', ', '.')}",
                     SYSTEM,
-                    f"{words}, rms by that of I beta'', {range_}",
+                    f"ratio of {words} to the rms of I beta'', {range_}",
                     max(one[key + band] for one in some),
                     "",
                 ).at_most(0.02, "largest of all samples; 0.4 % were seen when the settings were chosen", "none")

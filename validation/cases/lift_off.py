@@ -85,7 +85,8 @@ def _accelerations(parameters: str) -> list[Row]:
                 Observed(
                     f"lift_off.audit.{engine}.{parameters}.{geometry}",
                     SYSTEM,
-                    f"{what}, {engine} against the written equations, {parameters}, {geometry} geometry",
+                    f"largest difference of the {what} in {engine} from the written equations, "
+                    f"{parameters}, {geometry} geometry",
                     error,
                     "of the largest",
                 ).at_most(1e-12, "a dozen products of doubles; the law stands in each by itself", "native")
@@ -101,7 +102,8 @@ def _paths(parameters: str, duration: float) -> list[Row]:
         Observed(
             f"lift_off.path.{engine}.{parameters}",
             SYSTEM,
-            f"states over {duration:g} s of the study road, {engine} against reference, {parameters}",
+            f"largest difference of the states in {engine} from the reference over {duration:g} s of "
+            f"the study road, {parameters}",
             gap(runs[engine], runs["reference"]),
             STATES,
         ).at_most(1e-11, f"{ROUNDING}; each landing makes the difference some times as large", "native")
@@ -111,7 +113,11 @@ def _paths(parameters: str, duration: float) -> list[Row]:
     return [
         *rows,
         Observed(
-            f"lift_off.least.{parameters}", SYSTEM, f"least wheel load of these runs, {parameters}", float(least), "N"
+            f"lift_off.least.{parameters}",
+            SYSTEM,
+            f"least wheel load over the study road, {parameters}",
+            float(least),
+            "N",
         ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
     ]
 
@@ -140,8 +146,8 @@ def _exact(duration: float) -> list[Row]:
                 Observed(
                     name,
                     SYSTEM,
-                    f"vehicle dropped from 0.3 m, tyre dampers {what}: states beside matrix "
-                    f"exponentials between the switches, {engine} at 0.1 ms",
+                    f"largest difference of a vehicle dropped from 0.3 m in {engine} at 0.1 ms from "
+                    f"matrix exponentials between the switches, tyre dampers {what}",
                     error,
                     STATES,
                 ).at_most(2e-4, "a corner within a step costs its square, at every landing", "closed form")
@@ -198,7 +204,7 @@ def _energy(duration: float) -> list[Row]:
             Observed(
                 f"lift_off.gain.{engine}",
                 SYSTEM,
-                f"the same with dampers in the tyres alone: gain of energy, {engine}",
+                f"gain of energy of a bouncing vehicle with dampers in the tyres alone, {engine}",
                 gain,
                 "of the fall's",
             ).at_most(1e-4, "the damper takes energy and never gives any", "closed form")
@@ -215,8 +221,8 @@ def _pulls(quick: bool) -> list[Row]:
     deviations = [rms(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
     what = f"the paper's vehicle and tyre on the study road, {own.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
-    words = "rms of the dynamic wheel loads with tyres that lift, by that of linear ones"
-    pulls = "the same: share of time in which one or the other wheel pulls"
+    words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
+    pulls = "share of time in which a wheel pulls on the road, the paper's vehicle and tyre on the study road, 4 s"
     shown = (
         (
             "pull",
@@ -266,7 +272,8 @@ def _in_space(quick: bool) -> list[Row]:
             Observed(
                 f"lift_off.space.{engine}",
                 "ride",
-                f"R19-ride, tyres in the air, pressed and hit: accelerations, {engine} against the written ones",
+                f"largest difference of R19-ride's accelerations in {engine} from the written "
+                "equations, tyres in the air, pressed and hit",
                 worst[engine],
                 "of the largest",
             ).at_most(1e-12, "each has the law in its code", "native")
@@ -275,7 +282,7 @@ def _in_space(quick: bool) -> list[Row]:
         Observed(
             "lift_off.ride",
             "ride",
-            "R19-ride on 20 times the paper's road: states, exudyn against mujoco",
+            "largest difference of R19-ride's states between Exudyn and MuJoCo on 20 times the paper's road",
             float(apart),
             STATES,
         ).at_most(1e-10, ROUNDING, "native"),
@@ -294,11 +301,16 @@ def _above_a_cut() -> list[Row]:
         Observed(
             "lift_off.hubs",
             "drift",
-            f"R19-free on a class E road, {duration:g} s: states of exudyn and mujoco against the reference",
+            "largest difference of R19-free's states in Exudyn and MuJoCo from the reference, class "
+            f"E road, {duration:g} s",
             apart,
             STATES,
         ).at_most(1e-10, "one law, three mass matrices", "shared kernel"),
         Observed(
-            "lift_off.hubs.least", "drift", "the same: least force of the road on a hub", float(loads.min()), "N"
+            "lift_off.hubs.least",
+            "drift",
+            "least force of the road on a hub of R19-free, class E road",
+            float(loads.min()),
+            "N",
         ).within(0.0, 0.0, "wheels leave the road, and no tyre pulls", "none"),
     ]

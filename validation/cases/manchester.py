@@ -49,7 +49,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             "manchester.two_patches",
             SYSTEM,
-            "patches on the right wheel at 5 mm, case A-1",
+            "patches on the right wheel at a shift of 5 mm, case A-1",
             float(len(placed_at("A-1", 5e-3).right)),
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
@@ -85,22 +85,28 @@ def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> 
         Observed(
             f"manchester.places.{wheel}",
             SYSTEM,
-            f"mean place of contact of the {wheel} wheel, largest difference",
+            f"largest difference of the {wheel} wheel's mean place of contact",
             place,
             "mm",
         ).at_most(PLACE, PUBLISHED, "published"),
         Observed(
-            f"manchester.forces.{wheel}", SYSTEM, f"normal force of the {wheel} wheel, largest difference", force, "%"
+            f"manchester.forces.{wheel}", SYSTEM, f"largest difference of the {wheel} wheel's normal force", force, "%"
         ).at_most(FORCE, PUBLISHED, "published"),
         Observed(
-            f"manchester.peaks.{wheel}", SYSTEM, f"largest pressure of the {wheel} wheel, largest difference", peak, "%"
+            f"manchester.peaks.{wheel}",
+            SYSTEM,
+            f"largest difference of the {wheel} wheel's largest pressure",
+            peak,
+            "%",
         ).beside(0.0, "CONTACT's cells of 0.2 mm; a flange's patch has four of them"),
     ]
     if wheel == "right":
         why = "CONTACT's input, which another code found; on the flange its wheels do not stand equally low"
         roll = np.abs(np.array([1e3 * position.roll for position in placed]) - published[:, 1])
         rows.append(
-            Observed("manchester.roll", SYSTEM, "roll, largest difference", float(roll.max()), "mrad").beside(0.0, why)
+            Observed("manchester.roll", SYSTEM, "largest difference of the roll", float(roll.max()), "mrad").beside(
+                0.0, why
+            )
         )
     return rows
 
@@ -129,14 +135,18 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
     )
     return [
         *(
-            Observed(f"manchester.search.{name}", SYSTEM, f"{what}, largest difference", float(gap), unit).at_most(
+            Observed(f"manchester.search.{name}", SYSTEM, f"largest difference of {what}", float(gap), unit).at_most(
                 bound, why, "closed form"
             )
             for (name, what, unit, bound, why), gap in zip(told, np.max(gaps, axis=0), strict=True)
         ),
-        Observed("manchester.mirror", SYSTEM, "shifted and turned the other way, wheels exchanged", mirror, "").at_most(
-            1e-9, "the track is symmetric", "none"
-        ),
+        Observed(
+            "manchester.mirror",
+            SYSTEM,
+            "largest difference if the wheelset is shifted and turned the other way and the wheels are exchanged",
+            mirror,
+            "",
+        ).at_most(1e-9, "the track is symmetric", "none"),
     ]
 
 
@@ -149,7 +159,7 @@ def _axle_row(placed: Placed) -> Row:
     return Observed(
         "manchester.axle",
         SYSTEM,
-        "moment of a wheel's creep forces about the axle, no shift, case A-2",
+        "moment of a wheel's creep forces about the axle without shift, case A-2",
         float(np.abs(moments).max() / most),
         "mu N R",
     ).at_most(
@@ -171,10 +181,18 @@ def _split_rows(placed: Placed) -> list[Row]:
     }
     return [
         Observed(
-            "manchester.split.apart", SYSTEM, "shares of two patches at 5 mm, by the wheel's force", far["apart"], "%"
+            "manchester.split.apart",
+            SYSTEM,
+            "error of the shares of two patches at 5 mm in the wheel's force",
+            far["apart"],
+            "%",
         ).at_most(FORCE, "each on a half-space of its own that the other's resultant sinks", "closed form"),
         Observed(
-            "manchester.split.plane", SYSTEM, "shares of two patches at 5 mm on one plane", far["one plane"], "%"
+            "manchester.split.plane",
+            SYSTEM,
+            "error of the shares of two patches at 5 mm on the same plane",
+            far["one plane"],
+            "%",
         ).at_most(FORCE, "exact theory on CONTACT's plane, lowered as the wheel is", "native"),
         Observed("manchester.split.mean", SYSTEM, "mean place at 5 mm on CONTACT's own plane", mean, "mm").beside(
             float(CONTACT[10, 2]), "CONTACT lays more on the smaller patch; 4 um of shift do the same"
@@ -189,14 +207,18 @@ def _load_row(static: list[Placed]) -> Row:
         for wheel in (one.right, one.left)
     )
     return Observed(
-        "manchester.load", SYSTEM, "vertical sum of a wheel's normal forces less its load, case A-1", off, ""
+        "manchester.load",
+        SYSTEM,
+        "difference of the vertical sum of a wheel's normal forces from its load, case A-1",
+        off,
+        "",
     ).at_most(1e-5, "patches share the load to the precision of the shares", "none")
 
 
 def _file_rows(placed: list[Placed]) -> list[Row]:
     """Built-in profiles against the benchmark's own files, whose rail lies inclined."""
     names = {"places": ("mm", PLACE, 0), "forces": ("%", FORCE, 1)}
-    words = "built-in profiles against the benchmark's files, case A-2"
+    words = "difference between built-in profiles and the benchmark's files, case A-2"
     folder = data_folder()
     if folder is None or not (folder / WHEEL_FILE).is_file():
         reason = "TWINRIG_DATA names no folder with the benchmark's profiles"
@@ -209,7 +231,11 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
         Observed(
-            f"manchester.files.{name}", SYSTEM, f"{name}: {words}, largest difference", max(one[k] for one in off), unit
+            f"manchester.files.{name}",
+            SYSTEM,
+            f"{name}: largest difference of {words}",
+            max(one[k] for one in off),
+            unit,
         ).at_most(bound, "the bound asked for", "published")
         for name, (unit, bound, k) in names.items()
     ]
@@ -221,7 +247,7 @@ def _price_rows(each: dict[str, float]) -> list[Row]:
         Observed(
             f"manchester.price.{name}",
             SYSTEM,
-            f"processor time of one position, both wheels, case {name}, all of them once",
+            f"processor time of a position of both wheels, case {name}, all measured once",
             seconds,
             "s",
         ).beside("-", why)

@@ -155,7 +155,9 @@ def _rows(fault: Planted, found: tuple[Finding, ...]) -> list[Row]:
     alone = all(one.check == fault.check for one in found)
     word = "named" if named and alone else f"{[one.check for one in found]}"
     why = f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else"
-    rows = [behaves(f"measured_checks.{key}.named", SYSTEM, f"{fault.name}: the finding", word, "named", why)]
+    rows = [
+        behaves(f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why)
+    ]
     if fault.check != "swapped":
         size = _size(found, fault.check, fault.place)
         rows.append(_sized(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
@@ -205,7 +207,7 @@ def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     last = [one for one in found if one.check == "shift"][-1:]
     return [
         behaves(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
-        _sized("together.size", "the same: delay", _size(last, "shift"), "s", LATE),
+        _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", LATE),
     ]
 
 
@@ -222,7 +224,9 @@ def _moving_car(folder: Path) -> list[Row]:
     """Inertial checks of a real car's telephone, where the recording is there."""
     path = car.find()
     if path is None:
-        return [not_run("measured_checks.car", SYSTEM, "inertial checks of a moving car", "no recording here")]
+        return [
+            not_run("measured_checks.car", SYSTEM, "what the inertial checks say of a moving car", "no recording here")
+        ]
     own = measured_car.samples(path)
     degrees, down = own.copy(), own.copy()
     degrees[:, 4] *= DEGREES
@@ -234,12 +238,12 @@ def _moving_car(folder: Path) -> list[Row]:
     errors = {name: {one.place: one for one in ones if one.weight == "error"} for name, ones in found.items()}
     turned = [one for place, one in errors["degrees"].items() if place == "q and pitch"]
     size = turned[0].size if turned and turned[0].size is not None else float("nan")
-    what = "the same with axes right and down, taken for left and up: named"
+    what = "moving car with axes right and down, taken for left and up: faults named"
     return [
         behaves(
             "measured_checks.car.errors",
             SYSTEM,
-            "moving car, accelerometers, gyros and pose: errors named",
+            "errors named in a moving car's accelerometers, gyros and pose",
             ", ".join(errors["clean"]) or "none",
             "none",
             "signs and units are right",
@@ -252,11 +256,11 @@ def _moving_car(folder: Path) -> list[Row]:
             "az, q and pitch",
             "gravity and the turning of the pose tell",
         ),
-        _sized("car.degrees", "the same with degrees for radians in pitch: size", size, "1", DEGREES),
+        _sized("car.degrees", "moving car with degrees for radians in pitch: size of the fault", size, "1", DEGREES),
         Observed(
             "measured_checks.car.ratio",
             SYSTEM,
-            "the same: pitch rate of the gyro by that of the camera's pose",
+            "ratio of the gyro's pitch rate to that of the camera's pose, moving car",
             _size(found["clean"], "turning", "pitch"),
             "1",
         ).beside(1.0, "a telephone beside a camera at 20 Hz"),

@@ -107,23 +107,31 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     lost = ", ".join(what for what, good in kept(source).items() if not good)
     key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
-        Observed(f"{key}.values", SYSTEM, f"{form}: values there and back, by block", error, "of the value").at_most(
-            RESOLUTION[extension], why, "closed form"
-        ),
-        Observed(f"{key}.times", SYSTEM, f"{form}: times there and back", off, "s").at_most(
-            1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"
-        ),
+        Observed(
+            f"{key}.values",
+            SYSTEM,
+            f"{form}: largest change of values that are written and read by block",
+            error,
+            "of the value",
+        ).at_most(RESOLUTION[extension], why, "closed form"),
+        Observed(
+            f"{key}.times", SYSTEM, f"{form}: largest change of times that are written and read", off, "s"
+        ).at_most(1e-12, "a thousand millionth of a period; CSV writes times with 15 digits", "closed form"),
         behaves(
             f"{key}.texts",
             SYSTEM,
-            f"{form}: names with umlauts, units, comments of two lines, start",
+            f"{form}: names with umlauts, units, comments of two lines and the start survive writing and reading",
             f"lost: {lost}" if lost else "kept",
             "kept",
             "a file without them cannot be mapped by anybody else",
         ),
-        Observed(f"{key}.library", SYSTEM, f"{form}: values as {library} reads the file", own, "of the value").at_most(
-            RESOLUTION[extension], f"{why}; names and units are compared, too", "native"
-        ),
+        Observed(
+            f"{key}.library",
+            SYSTEM,
+            f"{form}: difference of the values from those that {library} reads",
+            own,
+            "of the value",
+        ).at_most(RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
     ], {
         "format": form,
         "library": library,
@@ -150,7 +158,7 @@ def two_rates(path: Path, extension: str) -> Row:
     return Observed(
         f"measured_formats.{extension[1:]}.rates",
         SYSTEM,
-        f"{FORMATS[extension]}: two groups of 1 kHz and 50 Hz, times and values there and back",
+        f"{FORMATS[extension]}: change of times and values of two groups, 1 kHz and 50 Hz, written and read",
         max(errors),
         "s or N",
     ).at_most(1e-12, "each group has a clock of its own", "closed form")
@@ -170,21 +178,21 @@ def forms(folder: Path) -> list[Row]:
         Observed(
             "measured_formats.forms.values",
             SYSTEM,
-            f"{len(read)} forms of CSV and of names of files: times and values beside those of the plain file",
+            f"difference of times and values of {len(read)} forms of CSV and of file names from the plain file",
             max(errors),
             "s or N",
         ).at_most(1e-16, bits, "closed form"),
         Observed(
             "measured_formats.forms.silent",
             SYSTEM,
-            f"{len(files) - len(read)} forms with two meanings and files of other kinds: read without a word",
+            f"files that are read without a word, of {len(files) - len(read)} with two meanings or of another kind",
             silent,
             "files",
         ).at_most(0.0, f"{why}; each refusal says what to do", "none"),
         behaves(
             "measured_formats.forms.crashes",
             SYSTEM,
-            f"{len(files)} such files: errors that are no refusal, or that say too little",
+            f"errors that are no refusal or that say too little, of {len(files)} such files",
             ", ".join(crashed) or "none",
             "none",
             why,
@@ -222,14 +230,14 @@ def resolution(folder: Path) -> list[Row]:
         Observed(
             "measured_formats.rsp.damage",
             SYSTEM,
-            "RPC III as it is written, 32-bit floating point: damage",
+            "relative change of the damage by RPC III as it is written, 32-bit floating point",
             errors[0],
             "relative",
         ).at_most(1e-5, why, "closed form"),
         Observed(
             "measured_formats.rsp.whole",
             SYSTEM,
-            "RPC III with 16-bit whole numbers instead: damage",
+            "relative change of the damage by RPC III with 16-bit whole numbers",
             errors[1],
             "relative",
         ).beside("not written; read where others have", why, "closed form"),
@@ -259,13 +267,13 @@ def memory(path: Path, extension: str) -> list[Row]:
     size = path.stat().st_size / 1e6
     path.unlink()
     return [
-        Observed(f"{key}.samples", SYSTEM, f"{form}: samples of five minutes read by block", found, "").within(
+        Observed(f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", found, "").within(
             count, 0, "a count: none is lost between blocks", "none"
         ),
         Observed(
             key,
             SYSTEM,
-            f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block, once",
+            f"{form}: peak memory of a process that reads 60 channels of {size:.0f} MB by block, measured once",
             peak / 1e3,
             "MB",
         ).aim(350.0, "libraries included; blocks of 29 MB, the same for a file of an hour"),

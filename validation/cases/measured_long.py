@@ -61,8 +61,8 @@ def _guides(quick: bool) -> list[Row]:
         Observed(
             "measured_long.guides_mujoco",
             SYSTEM,
-            "forces and moments that guides transmit, of a car without "
-            "symmetry that turns, beside MuJoCo's force and torque sensors, relative",
+            "relative difference of the forces and moments that guides transmit from MuJoCo's "
+            "sensors, turning car without symmetry",
             worst,
             "1",
         ).at_most(1e-11, "Newton and Euler along the run; the sensors know nothing of the kernel", "native")
@@ -79,7 +79,8 @@ def _guides(quick: bool) -> list[Row]:
         Observed(
             "measured_long.guides_exudyn",
             SYSTEM,
-            "the same at rest beside the constraints of free bodies in Exudyn, relative",
+            "relative difference of the forces and moments that guides transmit from Exudyn's "
+            "constraints of free bodies, car at rest",
             off,
             "1",
         ).at_most(1e-5, "positions rounded to 1e-16 m over the square of a step of 3e-5 s", "native"),
@@ -124,7 +125,7 @@ def _counting() -> list[Row]:
         behaves(
             "measured_long.levels",
             SYSTEM,
-            "level crossings of the sine at -1.1, -0.5, 0.5, 1.1, and range pairs of at least 0.5 and 1.5",
+            "level crossings of a sine at -1.1, -0.5, 0.5, 1.1, and range pairs of at least 0.5 and 1.5",
             f"{levels} {pairs}",
             "[0, 100, 100, 0] [100.5, 99.5]",
             "a hundred rises; 199 halves of range 2 and two of range 1",
@@ -147,8 +148,7 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     return Observed(
         f"measured_long.blocks_{engine}_{method}",
         SYSTEM,
-        f"answers in {engine}, stabiliser {method}, of "
-        f"which bits change when {seconds:g} s are run in blocks of 0.073 s",
+        f"channels in {engine} whose bits change if {seconds:g} s are run in blocks of 0.073 s, stabiliser {method}",
         changed,
         "1",
     ).at_most(0.0, "state, filter and inputs go from block to block as they are", "closed form")
@@ -170,8 +170,8 @@ def _killed(folder: Path) -> Row:
     return Observed(
         "measured_long.killed",
         SYSTEM,
-        f"answers of which bits change when a run of {seconds:g} s in "
-        f"blocks of 0.25 s is killed twice at moments drawn from seed {SEED}, and goes on",
+        f"channels whose bits change if a run of {seconds:g} s in blocks of 0.25 s is killed twice, "
+        f"at moments drawn from seed {SEED}, and goes on",
         changed,
         "1",
     ).at_most(0.0, "a checkpoint is written whole or not at all", "closed form")
@@ -190,15 +190,15 @@ def _memory(folder: Path) -> list[Row]:
         Observed(
             "measured_long.memory",
             SYSTEM,
-            f"memory for 60 channels at 1 kHz, once: the largest over {LONG:g} s in "
-            "ten blocks, and an hour of its growth over the second half",
+            f"memory for 60 channels at 1 kHz, measured once: the largest over {LONG:g} s in ten "
+            "blocks, and the growth of an hour at the rate of the second half",
             float(last[1] + growth * 3600.0),
             "B",
         ).aim(2e9, "only a block is in memory"),
         Observed(
             "measured_long.speed",
             SYSTEM,
-            "seconds of recording per second of processor, once, MuJoCo, step 2 ms, all sections",
+            "seconds of recording per second of the processor, measured once, MuJoCo, step 2 ms, all sections",
             float((last[0] - lines[1, 0]) / (last[2] - lines[1, 2])),
             "1",
         ).aim(1.0, "how long an hour takes", "at least"),
@@ -227,14 +227,14 @@ def _handed_on(folder: Path) -> list[Row]:
         Observed(
             "measured_long.handed_on",
             SYSTEM,
-            "section forces written as CSV, MDF, RPC III and TDMS and read back, relative",
+            "relative change of section forces that are written as CSV, MDF, RPC III and TDMS and read back",
             worst,
             "1",
         ).at_most(2.0**-24, "RPC III keeps singles, the others every bit", "native"),
         behaves(
             "measured_long.handed_on_names",
             SYSTEM,
-            "names, units and comments of these",
+            "names, units and comments of section forces survive writing and reading",
             str(kept),
             "True",
             "they say axes and signs",
@@ -242,7 +242,7 @@ def _handed_on(folder: Path) -> list[Row]:
         Observed(
             "measured_long.check_channel",
             SYSTEM,
-            "part of the variance of a measured spring force that the stabilised run does not give",
+            "share of a measured spring force's variance that the stabilised run does not explain",
             1.0 - force.explained,
             "1",
         ).at_most(0.01, "noise of 8 N on 100 N, and what the filter adds", "native"),

@@ -179,7 +179,7 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
         Observed(
             f"measured_virtual.values_{proof.name}_{form}",
             SYSTEM,
-            f"change of hub channels by file, map and clock, by their largest value; {what}",
+            f"change of hub channels by file, map and clock, over their largest value; {what}",
             off,
             "1",
         ).at_most(
@@ -190,8 +190,8 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
         Observed(
             f"measured_virtual.damage_{proof.name}_{form}",
             SYSTEM,
-            f"damage (slope 5) of {worst}, the farthest "
-            f"from the truth of {len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
+            f"ratio of the damage (slope 5) of {worst} to the true damage, the farthest of "
+            f"{len(means)} springs, mounts and bars, mean of {SAMPLES} samples of noise; {what}",
             means[worst],
             "1",
         ).within(1.0, DAMAGE, "demanded; body-frame section forces of the run held by the filter", "none"),
@@ -211,14 +211,15 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
         Observed(
             f"measured_virtual.engines_{proof.name}",
             SYSTEM,
-            f"answers of Exudyn and MuJoCo apart, by the largest of each; {proof.name}, held, {first.duration:g} s",
+            "difference between the channels of Exudyn and MuJoCo, over the largest value of each; "
+            f"{proof.name}, stabilised, {first.duration:g} s",
             apart,
             "1",
         ).at_most(1e-6, "same tableau, same step", "shared kernel"),
         behaves(
             f"measured_virtual.verdict_{proof.name}",
             SYSTEM,
-            f"verdict of the held run by itself; {proof.name}",
+            f"verdict of the stabilised run without the truth; {proof.name}",
             blind.word,
             "accepted",
             f"{blind.reason}; beside the truth, 5 % for each damage of this one "
@@ -237,8 +238,8 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
         Observed(
             f"measured_virtual.free_{proof.name}",
             SYSTEM,
-            f"the same forces on the free vehicle, frame "
-            f"{proof.frame!r}: its run ends after (s); verdict: {said.word}, {said.reason}",
+            f"time at which the free vehicle's run ends on these forces, frame {proof.frame!r}; "
+            f"verdict: {said.word}, {said.reason}",
             (run.done - 1) * run.period,
             "s",
         ).beside(first.duration, "stated")
@@ -266,8 +267,8 @@ def _trusted() -> list[Row]:
             Observed(
                 f"measured_virtual.trust_{name}",
                 SYSTEM,
-                f"median time at which roll or pitch is off by "
-                f"0.05 rad, {COPIES} free runs on a rough road, by the predicted one ({name}, {frame!r})",
+                "ratio of the median time at which roll or pitch is off by 0.05 rad to the predicted "
+                f"time, {COPIES} free runs on a rough road ({name}, {frame!r})",
                 found / predicted,
                 "1",
             ).within(1.0, 0.2, "demanded; the median of 16 has a deviation of 3 to 10 %", "closed form")
@@ -296,7 +297,7 @@ def _moving(folder: Path) -> list[Row]:
     """A real car: a telephone's gyro and accelerometers, and its camera's angles, in two files of two clocks."""
     path, what = moving_car.find(), "telephone and camera of a moving car, two files on one clock:"
     if path is None:
-        id, gyro = "measured_virtual.moving_gyro", f"{what} gyro by the camera's angles"
+        id, gyro = "measured_virtual.moving_gyro", f"{what} ratio of the gyro to the camera's angles"
         return [not_run(id, SYSTEM, gyro, f"TWINRIG_DATA does not lead to {moving_car.FILE}")]
     scene = measured_car.scene(path, cut(load_vehicle("r19_free"), "body"), folder)
     recording = read_files(scene, folder)
@@ -304,7 +305,10 @@ def _moving(folder: Path) -> list[Row]:
     ratio = next((f.size for f in said if f.check == "turning" and "pitch_rate" in f.place), None)
     shift = next((f.size for f in said if f.check == "shift" and "roll_rate" in f.place), None)
     up = [recording.samples(recording.find("acceleration", "phone", axis)[0]).mean() for axis in "xyz"]
-    id, gyro = "measured_virtual.moving", f"{what} pitch rate of the gyro by the derivative of the camera's angle"
+    id, gyro = (
+        "measured_virtual.moving",
+        f"{what} ratio of the gyro's pitch rate to the derivative of the camera's angle",
+    )
     late = f"{what} time by which the gyro's roll rate is late against the camera, as the check finds it"
     means, why = f"{what} mean of the accelerations", "a telephone's accelerometers are off by one or two per cent"
     mounted, size = "two devices, each as it was mounted", float(np.linalg.norm(up))
@@ -331,21 +335,21 @@ def _quick(folder: Path) -> list[Row]:
         Observed(
             "measured_virtual.values",
             SYSTEM,
-            "change of hub channels by a CSV file, map and clock, by their largest value",
+            "change of hub channels by a CSV file, map and clock, over their largest value",
             _changed(recording, true, samples),
             "1",
         ).at_most(1e-12, "units cost a rounding", "native"),
         Observed(
             "measured_virtual.damage",
             SYSTEM,
-            "damage (slope 5) of the front left spring, 0.6 s of a rough road, by the true one",
+            "ratio of the damage (slope 5) of the front left spring to the true damage, 0.6 s of a rough road",
             found.damage["front left"],
             "1",
         ).within(1.0, 0.1, "one sample of noise", "none"),
         Observed(
             "measured_virtual.law",
             SYSTEM,
-            "deviation of roll, pitch and heading after 10 s of noise beside q t^3/3",
+            "difference of roll, pitch and heading after 10 s of noise from the law q t^3/3",
             float(np.abs(deviations / np.sqrt(law[0]) - 1).max()),
             "1",
         ).at_most(1e-4, "no growth in the frame of the hubs", "closed form"),

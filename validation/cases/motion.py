@@ -73,8 +73,13 @@ def _exact(name: str) -> list[Row]:
     what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
-        ("alpha", "angular acceleration from clean readings", alpha, "rad/s^2"),
-        ("rates", "rates up to sign from the symmetric part, squares", float(np.abs(squares).max()), "rad^2/s^2"),
+        ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
+        (
+            "rates",
+            "error of the squares of the rates from the symmetric part",
+            float(np.abs(squares).max()),
+            "rad^2/s^2",
+        ),
         ("consistency", "share of the readings that no rigid body explains", quality(array, clean).share, ""),
     )
     return [
@@ -93,7 +98,7 @@ def _plain() -> Row:
     return Observed(
         "motion.plain",
         SYSTEM,
-        "eq. (18) as printed, sensors in a plane: roll acceleration against (alpha1 + w2 w3) / 2",
+        "difference of the roll acceleration by eq. (18) as printed from (alpha1 + w2 w3) / 2, sensors in a plane",
         float(np.abs(plain - half).max()),
         "rad/s^2",
     ).at_most(
@@ -112,7 +117,7 @@ def _order() -> Row:
     return Observed(
         "motion.order",
         SYSTEM,
-        "order of the recovered position in the sampling period, 40 and 20 ms",
+        "observed order of the recovered position in the sampling period, 40 and 20 ms",
         float(np.log2(errors[0] / errors[1])),
         "",
     ).within(4.0, 0.4, "cubics through four neighbours and a fourth-order step of the quaternion", "closed form")
@@ -123,7 +128,10 @@ def _tilt() -> Row:
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
     found = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
-    what = f"false displacement of a tilt error of 1 mrad after 10 s, {law[-1]:.4f} m, against g sin(tilt) t^2 / 2"
+    what = (
+        f"relative difference of the false displacement after 10 s, {law[-1]:.4f} m, from g sin(tilt) t^2 / 2, "
+        "tilt error of 1 mrad"
+    )
     worst = float(np.abs(found - law).max() / law[-1])
     return Observed("motion.tilt", SYSTEM, what, worst, "").at_most(
         1e-10, "a constant is integrated exactly", "closed form"
@@ -163,7 +171,7 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
                 Observed(
                     f"motion.known_gain.{height:g}",
                     SYSTEM,
-                    f"largest noise gain, fifth sensor {height:g} m up, plain formula",
+                    f"largest noise gain of the plain formula, fifth sensor {height:g} m up",
                     line[1],
                     "1/m",
                 ).within(
@@ -205,8 +213,8 @@ def _engine(engine: str, duration: float) -> list[Row]:
         Observed(
             f"motion.pitch_acceleration.{engine}",
             SYSTEM,
-            "pitch acceleration from the readings of "
-            f"{engine}'s run against the paper's equations at its states, by the largest",
+            f"largest difference of the pitch acceleration from {engine}'s readings from the paper's "
+            "equations, over the largest value",
             float(np.abs(found - true).max() / np.abs(true).max()),
             "",
         ).at_most(
@@ -217,7 +225,8 @@ def _engine(engine: str, duration: float) -> list[Row]:
         behaves(
             f"motion.bracket.{engine}",
             SYSTEM,
-            f"six sensors, one on a bracket of 30 Hz, {engine}: {100 * loose.share:.2g} % fits no rigid body",
+            f"six sensors, of which a bracket of 30 Hz carries one, {engine}: {100 * loose.share:.2g} "
+            "% fits no rigid body",
             f"loose: {loose.suspect}" if not loose.rigid else "rigid",
             "loose: battery",
             "more than 5 % is a loose mount; the one without which it passes is named",
@@ -226,7 +235,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
         Observed(
             f"motion.rigid.{engine}",
             SYSTEM,
-            f"share that no rigid body explains, the five rigid mounts, {engine}",
+            f"share of the readings that no rigid body explains, five rigid mounts, {engine}",
             quality(array, felt).share,
             "",
         ).at_most(BOUND, "rounding: far below the 5 % at which a mount is called loose", "closed form"),
@@ -276,7 +285,7 @@ def _walk(paths: int) -> tuple[list[Row], dict[str, list[float]]]:
         Observed(
             "motion.walk",
             SYSTEM,
-            "rate error of integration alone after 60 s, mean square by its gain",
+            "ratio of the rate error's mean square to its gain after 60 s of integration alone",
             float(np.mean((errors[:, -1] / array.gains()) ** 2)),
             "m^2/s^2",
         ),
@@ -307,22 +316,26 @@ def _held(curves: Saved, quick: bool) -> list[Row]:
         Observed(
             "motion.held",
             SYSTEM,
-            "rate error with the symmetric part as a measurement, rms of the last third, by "
-            "that of integration alone at the end",
+            "ratio of the rate error with the symmetric part as a measurement, rms of the last "
+            "third, to that of integration alone at the end",
             late / walked,
             "",
         ).at_most(0.8 if quick else 0.2, why, "closed form"),
         Observed(
             "motion.held.stated",
             SYSTEM,
-            "the same by the standard deviation that the filter states",
+            "ratio of the rate error with the symmetric part as a measurement to the standard "
+            "deviation that the filter states",
             late / rms(stated[-count // 3 :]),
             "",
         ).within(1.0, 0.5 if quick else 0.2, f"{why}; it neglects that the readings are used twice", "closed form"),
     ]
     if quick:  # too short to tell growth from settling
         return rows
-    what, why = "rms of the last third by that of the second sixth", f"{why}; integration alone would grow by 1.8"
+    what, why = (
+        "ratio of the rms rate error in the last third to that in the second sixth",
+        f"{why}; integration alone would grow by 1.8",
+    )
     return [*rows, Observed("motion.held.growth", SYSTEM, what, late / early, "").within(1.0, 0.2, why, "closed form")]
 
 

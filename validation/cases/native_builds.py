@@ -39,7 +39,8 @@ def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
         Observed(
             f"native_builds.equations_{name}",
             SYSTEM,
-            f"accelerations by compiled forces beside written-out equations, no hub forces, {where}",
+            "largest difference of the accelerations by compiled forces from written-out equations, "
+            f"no hub forces, {where}",
             equations_error(car, states),
             "1",
         ).at_most(1e-12, "of each coordinate's largest; rounding of stiff bushes leaves 6e-14", "native")
@@ -49,14 +50,15 @@ def _agreement(name: str, car: CutVehicle, quick: bool) -> list[Row]:
             Observed(
                 f"native_builds.accelerations_{name}_{engine}",
                 SYSTEM,
-                f"accelerations of {engine} with springs of its own beside compiled forces, {where}",
+                f"largest difference of the accelerations with {engine}'s springs from compiled forces, {where}",
                 acceleration_error(engine, car, states),
                 "1",
             ).at_most(1e-12, "of each coordinate's largest; the hub forces alone are shared", "native"),
             Observed(
                 f"native_builds.path_{name}_{engine}",
                 SYSTEM,
-                f"states of {engine} with springs of its own beside compiled forces, {steps} steps of 1 ms, {name}",
+                f"largest difference of the states with {engine}'s springs from compiled forces, "
+                f"{steps} steps of 1 ms, {name}",
                 path_error(engine, car, steps),
                 "m, rad, 1/s",
             ).at_most(1e-10, "same tableau, same step", "native"),
@@ -71,7 +73,7 @@ def _counted(name: str, car: CutVehicle, engine: str) -> Row:
     return Observed(
         f"native_builds.count_{name}_{engine}",
         SYSTEM,
-        f"springs, mounts and bars of {name} that the model in {engine} has as its own",
+        f"number of springs, mounts and bars of {name} that are native elements in {engine}",
         len(share.elements),
         "elements",
     ).within(len(car.elements), 0, f"all have stiffness and damping that every engine has; shared: {shared}", "native")

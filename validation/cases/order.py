@@ -72,9 +72,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         found = errors(engine, integrator, options, truth, duration, steps)
         name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
         rows.append(
-            Observed(f"order.{engine}.{name}", SYSTEM, f"order of {name} in {engine}", fitted(steps, found), "").within(
-                order, band, WHY, "closed form"
-            )
+            Observed(
+                f"order.{engine}.{name}", SYSTEM, f"observed order of {name} in {engine}", fitted(steps, found), ""
+            ).within(order, band, WHY, "closed form")
         )
         table.append([engine, name, *found])
     return rows, {"table": table, "steps": steps, "duration": duration}

@@ -58,7 +58,7 @@ def _enough(data: Saved) -> Row:
     return Observed(
         "planted.count",
         SYSTEM,
-        f"by how many fewer than {LEAST} faults of all systems are caught",
+        f"shortfall of the number of faults that are caught in all systems from {LEAST}",
         max(0, LEAST - caught),
         "faults",
     ).at_most(0, f"{caught} of {len(_lines(data))} are", "native")

@@ -39,7 +39,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             f"point_mass.{name.replace(' ', '_')}.{x:g}",
             SYSTEM,
-            f"covariance, {name}, damping times time {x:g}: worst relative error",
+            f"largest relative error of the covariance, {name}, product of damping and time {x:g}",
             error,
             "",
         ).at_most(BOUND, WHY, "closed form")
@@ -51,7 +51,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "point_mass.order",
             SYSTEM,
-            "discrete by continuous variance of position, no damping, n = 1000",
+            "ratio of the discrete to the continuous variance of the position, no damping, n = 1000",
             1 - differences[2][1],
             "",
         ).within(7.4888 / 7.5, 1e-5, "1 - 3/(2n): 7.4888 against 7.5", "closed form")
@@ -148,7 +148,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
             Observed(
                 f"point_mass.position.{damped:g}",
                 SYSTEM,
-                f"variance of position, damping times time {damped:g}, by Monte Carlo",
+                f"variance of the position by Monte Carlo, product of damping and time {damped:g}",
                 float(np.mean(found[:, 0] ** 2)),
                 "m^2",
             ),
@@ -160,7 +160,8 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
             Observed(
                 f"point_mass.joint.{damped:g}",
                 SYSTEM,
-                f"whole covariance, damping times time {damped:g}, by Monte Carlo: half the mean squared distance",
+                "half the mean squared distance, which tests the whole covariance by Monte Carlo, "
+                f"product of damping and time {damped:g}",
                 distance,
                 "",
             ),

@@ -56,9 +56,9 @@ ROUNDS = {True: 1, False: 15}
 LEAST = {True: 0.004, False: 0.005}
 """A short run is repeated until its turn lasts this long (s), by ``quick``."""
 CALLBACKS = {
-    "all compiled to no forces": "every force in one compiled callback, by the same model without forces",
-    "to no callback": "native springs and a compiled callback for the road, by the same without its callback",
-    "to no forces": "native springs and a compiled callback for the road, by the bodies without any force",
+    "all compiled to no forces": "ratio of every force in a compiled callback to the same model without forces",
+    "to no callback": "ratio of native springs with a compiled callback for the road to the same without callback",
+    "to no forces": "ratio of native springs and a compiled callback for the road to the bodies without any force",
 }
 """Ratios of seconds and what they compare."""
 COUNTED = 0.2
@@ -121,7 +121,7 @@ def _road_rows(saved: Saved) -> list[Row]:
         behaves(
             f"price.road.coincide.{name}",
             SYSTEM,
-            "curves that agree to 1 % at every common setting",
+            "work-precision curves that agree to 1 % at every common setting",
             group if group in found else "; ".join(found),
             group,
             why,
@@ -133,7 +133,7 @@ def _road_rows(saved: Saved) -> list[Row]:
         behaves(
             "price.road.status.DVERK6",
             SYSTEM,
-            "Exudyn DVERK6",
+            "what the solver DVERK6 does in Exudyn",
             p.status,
             "refused",
             "Exudyn names the method but has not implemented it",
@@ -157,7 +157,9 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
             for one in settings
             if one.engine == engine
         ]
-        what = f"force calls counted from outside ({how}) against those reported, {len(pairs)} runs, largest difference"
+        what = (
+            f"largest difference between force calls counted from outside ({how}) and those reported, {len(pairs)} runs"
+        )
         rows.append(
             Observed(
                 f"price.road.counts.{engine}",
@@ -181,7 +183,7 @@ def _speed_rows(data: Saved) -> list[Row]:
         Observed(
             "price.callback.gap",
             SYSTEM,
-            "MuJoCo RK4: every force in one compiled callback against native springs",
+            "MuJoCo RK4: difference between every force in a compiled callback and native springs",
             data["callback"]["RK4"]["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
@@ -190,7 +192,7 @@ def _speed_rows(data: Saved) -> list[Row]:
         for key, words in CALLBACKS.items():
             ratio, low, high = found[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
-            what = f"MuJoCo {integrator}, {words}: paired seconds, 95 % interval {low:.3f} to {high:.3f}"
+            what = f"MuJoCo {integrator}, {words}, paired seconds, 95 % interval {low:.3f} to {high:.3f}"
             rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
     return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
 

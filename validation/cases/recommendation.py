@@ -79,39 +79,42 @@ def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
         Observed(
             "recommendation.met",
             SYSTEM,
-            f"share of {scenes} in which every recommended setting holds its tolerance ({len(every)} settings)",
+            f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
             held / len(found),
             "",
         ).within(1.0, 1.0 - MET, why, "closed form"),
         Observed(
             "recommendation.predicted",
             SYSTEM,
-            "predicted by true error, or its inverse: largest of all",
+            "largest factor between the predicted and the true error",
             max(factors, default=float("inf")),
             "times",
         ).at_most(FACTOR, f"{why}; errors below what is known of the truth count as that", "closed form"),
         Observed(
             "recommendation.refused",
             SYSTEM,
-            f"scenes that were refused with a reason, and drawn anew, beside {scenes}",
+            f"scenes that were refused with a reason and drawn anew, beside {scenes}",
             len(refused),
             "scenes",
         ).at_most((1.0 - MET) * len(found), "; ".join(refused) or "none was: every one got a recommendation", "none"),
         Observed(
-            "recommendation.factor", SYSTEM, "the same, 95 of 100", float(np.quantile(factors, 0.95)), "times"
+            "recommendation.factor",
+            SYSTEM,
+            "factor between the predicted and the true error that 95 of 100 settings keep",
+            float(np.quantile(factors, 0.95)),
+            "times",
         ).beside("1", why, "closed form"),
         Observed(
             "recommendation.slower",
             SYSTEM,
-            "settings recommended by force calls that take more of them than the "
-            "engine's default that meets the tolerance",
+            "settings recommended by force calls that take more calls than the engine's default at the same tolerance",
             _slower(every, "calls"),
             "settings",
         ).at_most(0.0, "exact", "none"),
         Observed(
             "recommendation.slower.seconds",
             SYSTEM,
-            "settings recommended by seconds that take more of them than the engine's default that meets the tolerance",
+            "settings recommended by seconds that take longer than the engine's default at the same tolerance",
             _slower(every, "seconds"),
             "settings",
         ).aim(

@@ -117,7 +117,7 @@ def _closed_rows() -> list[Row]:
         Observed(
             f"ride_covariance.quarter.{key}",
             SYSTEM,
-            f"quarter car, variance of the {key}, corners of the road from 0 to 3 rad/m",
+            f"relative error of the variance of the {key} of a quarter car, corners of the road from 0 to 3 rad/m",
             value,
             "",
         ).at_most(1e-10, "asked; the sums have no cancellation", "closed form")
@@ -142,8 +142,8 @@ def _route_rows(routes: list[dict[str, Any]]) -> list[Row]:
         Observed(
             f"ride_covariance.quadrature.{name.replace(', ', '-').replace(' ', '-')}",
             SYSTEM,
-            f"standard deviations of {name}, {sum(route['values'] for route in group)} values, five cases: "
-            "against quadrature of spectra by dynamic stiffness",
+            f"relative difference of {sum(route['values'] for route in group)} standard deviations of "
+            f"{name} in five cases from quadrature of spectra by dynamic stiffness",
             max(route["worst"] for route in group),
             "",
         ).at_most(1e-6, "asked; both routes claim better than 1e-9", "native")
@@ -164,14 +164,14 @@ def _limit_rows() -> list[Row]:
         Observed(
             "ride_covariance.delay.zero",
             SYSTEM,
-            "three axles at delay 0 against one input, worst output",
+            "difference of three axles at delay 0 from a single input, worst output",
             off(at_once, joined),
             "",
         ).at_most(0.0, "exact: they are the same equation", "closed form"),
         Observed(
             "ride_covariance.delay.long",
             SYSTEM,
-            "delays of 1e6 s against independent axles, worst output",
+            "difference of axles at delays of 1e6 s from independent axles, worst output",
             off(late, apart),
             "",
         ).at_most(1e-14, "exact but for rounding: the response has died out", "closed form"),
@@ -189,7 +189,11 @@ def _inputs_row() -> Row:
         expected = input_covariance(road, vehicle.wheels, *case)
         worst = max(worst, float(np.abs(heights - expected).max() / np.abs(expected).max()))
     return Observed(
-        "ride_covariance.inputs", SYSTEM, "covariances of the heights under six wheels in five cases", worst, ""
+        "ride_covariance.inputs",
+        SYSTEM,
+        "difference of the covariances of the heights under six wheels from their law, five cases",
+        worst,
+        "",
     ).at_most(1e-12, "exact but for rounding", "closed form")
 
 
@@ -206,8 +210,8 @@ def _engine_row(engine: str) -> Row:
     return Observed(
         f"ride_covariance.engine.{engine}",
         SYSTEM,
-        "standard deviations from the linearisation of "
-        f"{engine}, three asymmetric twins, five cases, against quadrature of the analytic vehicles",
+        f"difference of the standard deviations from the linearisation of {engine}, three asymmetric "
+        "twins, five cases, from quadrature of the analytic vehicles",
         worst,
         "",
     ).at_most(1e-6, "asked", "native")
@@ -229,7 +233,8 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             "ride_covariance.fast.equal",
             SYSTEM,
-            "fast route against the direct one, with three weighted seats, variance, worst of all outputs",
+            "difference of the variances by the fast route from the direct route, three weighted "
+            "seats, worst of all outputs",
             off(quick.variance[:, some][told], slow.variance[told]),
             "",
         ).at_most(1e-10, "asked", "none"),
@@ -244,8 +249,8 @@ def _fast(speeds: np.ndarray, source: str) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             "ride_covariance.fast.time",
             SYSTEM,
-            f"five cases times {len(speeds)} speeds with ISO weighting, from "
-            f"the linear vehicle of {source}, one core, once",
+            f"time of five cases at {len(speeds)} speeds with ISO weighting, from the linear vehicle "
+            f"of {source}, single core, measured once",
             seconds,
             "s",
         ).aim(2.0, "asked for 60 speeds; it counts this process's seconds and not other load"),

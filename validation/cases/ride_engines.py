@@ -95,7 +95,7 @@ def _linearised(vehicle: SpatialVehicle, name: str, loaded: str, bounds: dict[st
         Observed(
             f"ride_engines.matrices.{name}.{loaded}.{engine}",
             SYSTEM,
-            f"M, D, K, road columns and outputs of {name}, {loaded}, {engine} against analytic",
+            f"difference of M, D, K, road columns and outputs of {name} in {engine} from the analytic ones, {loaded}",
             difference(build(engine, vehicle, speed=SPEED).linearise(), expected),
             "relative",
         ).at_most(bounds[engine], BY_DIFFERENCES, "native")
@@ -108,7 +108,7 @@ def _frequencies() -> list[Row]:
         Observed(
             f"ride_engines.frequencies.{engine}",
             SYSTEM,
-            f"19 eigenfrequencies of R19-ride, {engine}",
+            f"difference of the 19 eigenfrequencies of R19-ride in {engine} from the published ones",
             off(np.abs(poles(build(engine, of_name("r19_ride")).linearise()))[::2] / (2 * np.pi), R19_FREQUENCIES),
             "relative",
         ).at_most(1e-5, "six decimals of the expected ones are known", "published")
@@ -131,7 +131,7 @@ def _states(name: str) -> list[Row]:
         Observed(
             f"ride_engines.states.{name}.{what}",
             SYSTEM,
-            f"accelerations of {name} at {STATES} random states, {what}",
+            f"difference of the accelerations of {name} at {STATES} random states, {what}",
             float(value),
             "relative",
         ).at_most(1e-12, SAME, "native")
@@ -164,7 +164,7 @@ def _path() -> tuple[list[Row], list[list[str]]]:
             Observed(
                 f"ride_engines.path.{what}",
                 SYSTEM,
-                f"states of R19-ride over 1 s, {what} springs, RK4 at 1 ms, exudyn against mujoco",
+                f"difference of R19-ride's states over 1 s between Exudyn and MuJoCo, {what} springs, RK4 at 1 ms",
                 float(gap),
                 "m, rad, m/s, rad/s",
             ).at_most(1e-12, SAME, "native")
@@ -193,7 +193,7 @@ def _at_rest() -> list[Row]:
             Observed(
                 f"ride_engines.mean.{engine}",
                 SYSTEM,
-                f"mean position over 1 s from there, {engine}",
+                f"largest mean displacement in 1 s from the design position, {engine}",
                 float(mean),
                 "m, rad",
             ).at_most(1e-10, "nothing moves it", "none")
@@ -230,7 +230,7 @@ def _without_curves() -> list[Row]:
         behaves(
             "ride_engines.curves",
             SYSTEM,
-            "curve code of R19-ride, counted",
+            "number of times that R19-ride runs the code of spring curves",
             counts,
             "0 curves, 4 functions more with curves",
             "four springs are bent",

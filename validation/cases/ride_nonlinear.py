@@ -66,22 +66,24 @@ def _gains() -> list[Row]:
         Observed(
             "ride_nonlinear.gains.curves",
             SYSTEM,
-            "mean force and gain of damper and stops, closed form against "
-            "the defining integrals, at 6 motions, relative",
+            "relative difference of the mean force and gain of damper and stops in closed form from "
+            "the defining integrals, 6 motions",
             worst,
             "",
         ).at_most(1e-9, "error functions", "closed form"),
         Observed(
             "ride_nonlinear.gains.friction",
             SYSTEM,
-            "gain of dry friction, likewise, rates 0.1 to 100 times that of friction, relative",
+            "relative difference of the gain of dry friction in closed form from the defining "
+            "integrals, rates 0.1 to 100 times that of friction",
             dry,
             "",
         ).at_most(1e-9, "the trapezoidal rule converges geometrically", "closed form"),
         Observed(
             "ride_nonlinear.gains.coulomb",
             SYSTEM,
-            "the same against friction (2 / pi)^(1/2) / deviation, which Coulomb's law has",
+            "relative difference of the gain of dry friction from friction (2 / pi)^(1/2) / "
+            "deviation, which Coulomb's law has",
             abs(float(coulomb)),
             "",
         ).at_most(1e-9, "rates 1e6 times that of friction", "closed form"),
@@ -108,20 +110,24 @@ def _fixed_point() -> list[Row]:
         Observed(
             "ride_nonlinear.fixed_point",
             SYSTEM,
-            f"{len(one.changes)} iterations, each change at most "
-            f"{one.contraction:.2g} of the last: distance of the gains to the fixed point, relative",
+            f"relative distance of the gains from the fixed point after {len(one.changes)} "
+            f"iterations, each change at most {one.contraction:.2g} of the last",
             one.distance,
             "",
         ).at_most(1e-11, "last change * c / (1 - c), Banach's bound", "none"),
         Observed(
             "ride_nonlinear.start",
             SYSTEM,
-            "standard deviations from first gains of a tenfold motion, relative",
+            "relative difference of the standard deviations if the first gains are those of a tenfold motion",
             apart[0],
             "",
         ).at_most(1e-10, "one fixed point, whatever the start", "none"),
         Observed(
-            "ride_nonlinear.gravity", SYSTEM, "standard deviations without gravity, relative", apart[1], ""
+            "ride_nonlinear.gravity",
+            SYSTEM,
+            "relative difference of the standard deviations with gravity from those without",
+            apart[1],
+            "",
         ).at_most(1e-10, "preloads hold the weights, and nothing turns", "none"),
     ]
 
@@ -142,8 +148,8 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
             Observed(
                 f"ride_nonlinear.level.{level:g}.{name}",
                 SYSTEM,
-                f"{level:g} times the paper's road: "
-                f"deviation of {name} beside {len(copies.moments[0])} copies, {copies.duration:.0f} s",
+                f"relative difference of the deviation of {name} from {len(copies.moments[0])} copies "
+                f"of {copies.duration:.0f} s, {level:g} times the paper's road",
                 abs(error),
                 "",
             ).at_most(
@@ -160,7 +166,8 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
         Observed(
             f"ride_nonlinear.mean.{level:g}",
             SYSTEM,
-            f"the same: mean travel, {1e3 * found.mean[travel]:.2f} mm, beside the copies', by its deviation",
+            f"difference of the mean travel, {1e3 * found.mean[travel]:.2f} mm, from that of the "
+            "copies, over its deviation",
             abs(shift),
             "",
         ).at_most(
@@ -180,7 +187,7 @@ def _linear_copies() -> Row:
     return Observed(
         "ride_nonlinear.linear",
         SYSTEM,
-        f"quarter_car, {COPIES[1]} copies in time: variances against the covariance, largest |z| of 3",
+        f"largest |z| of 3 variances of quarter_car in {COPIES[1]} copies in time against the covariance",
         float(np.abs(copies.z(exact.deviation)).max()),
         "",
     ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none")
@@ -208,8 +215,8 @@ def _alone() -> list[Row]:
             Observed(
                 f"ride_nonlinear.alone.{name.split()[0]}",
                 SYSTEM,
-                f"{name} alone on {level:g} times the "
-                f"paper's road: deviation of {copies.names[worst]}, which keeps its promise worst",
+                f"relative difference of the deviation of {copies.names[worst]}, which keeps its "
+                f"promise worst, {name} alone on {level:g} times the paper's road",
                 float(error[worst]),
                 "",
             ).at_most(

@@ -60,21 +60,21 @@ def _paper_rows() -> list[Row]:
         Observed(
             "ride_road.level",
             SYSTEM,
-            "track spectrum at 10,000 rad/m, times Omega^2, against S0",
+            "relative difference of the track spectrum at 10,000 rad/m, times Omega^2, from S0",
             spectrum / LEVEL - 1.0,
             "",
         ).at_most(1e-7, "two-sided; corners matter by (1.5 / 10,000)^2 / 2 = 1e-8", "closed form"),
         Observed(
             "ride_road.variance",
             SYSTEM,
-            "variance of a track against the integral of its spectrum",
+            "relative difference of the variance of a track from the integral of its spectrum",
             closed / variance - 1.0,
             "",
         ).at_most(1e-9, "the closed form (S0 pi / 2)(1/O1 + 1/O2) by quadrature", "closed form"),
         Observed(
             "ride_road.coherency",
             SYSTEM,
-            "coherency at 0, 1 and 16 rad/m against (O2^2 - O1^2)/(O1^2 + O2^2 + 2 Omega^2)",
+            "difference of the coherency at 0, 1 and 16 rad/m from (O2^2 - O1^2)/(O1^2 + O2^2 + 2 Omega^2)",
             float(np.abs(found - formula).max()),
             "",
         ).at_most(1e-15, "equal shares at short waves", "closed form"),
@@ -95,8 +95,8 @@ def _input_rows() -> list[Row]:
         Observed(
             f"ride_road.inputs.{order}",
             SYSTEM,
-            f"five input covariances, three axles, filters of {order} order: "
-            "filter of delayed noise against delayed output",
+            "difference between a filter of delayed noise and delayed output, five input "
+            f"covariances, three axles, filters of {order} order",
             error,
             "",
         ).at_most(1e-13, why, "closed form")
@@ -129,7 +129,8 @@ def _limit_row() -> Row:
     return Observed(
         "ride_road.limits",
         SYSTEM,
-        "input covariance of axles in one place and 200 m apart, against equal and uncorrelated axles",
+        "difference of the input covariance of axles in a single place and 200 m apart from equal "
+        "and uncorrelated axles",
         max(pairs),
         "",
     ).at_most(1e-14, why, "closed form")
@@ -147,14 +148,15 @@ def _isotropic_rows() -> list[Row]:
         Observed(
             "ride_road.isotropic.fourier",
             SYSTEM,
-            "cross density of an isotropic road: Bessel function against the Fourier integral of R(sqrt(x^2 + d^2))",
+            "difference of the cross density of an isotropic road, Bessel function, from the Fourier "
+            "integral of R(sqrt(x^2 + d^2))",
             off(along, closed),
             "",
         ).at_most(1e-11, "quadrature to 1e-12 of the variance, over a density that falls", "closed form"),
         Observed(
             "ride_road.isotropic.hankel",
             SYSTEM,
-            "the same for waviness 2.6: Bessel function of order 1.3 against "
+            "difference of the cross density for waviness 2.6, Bessel function of order 1.3, from "
             "the integral over the two-dimensional density",
             off(across, hankel),
             "",
@@ -192,7 +194,8 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
         Observed(
             "ride_road.route",
             SYSTEM,
-            f"{len(exact)} accelerations of R19-ride from the densities of the heights, against the covariance",
+            f"relative difference of {len(exact)} accelerations of R19-ride by the densities of the "
+            "heights from the covariance",
             off(by_frequency, exact),
             "",
         ).at_most(
@@ -204,7 +207,8 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
         Observed(
             f"ride_road.isotropic.{name.split()[0]}",
             SYSTEM,
-            f"{name} of R19-ride at {SPEED:g} m/s: isotropic road over two-track road of the same track spectrum",
+            f"ratio of {name} of R19-ride at {SPEED:g} m/s on an isotropic road to a two-track road "
+            "of the same track spectrum",
             float(isotropic[i] / exact[i]),
             "",
         ).beside("", why)
@@ -241,14 +245,14 @@ def _weighting_rows() -> list[Row]:
             Observed(
                 f"ride_road.weighting.{name}.table",
                 SYSTEM,
-                f"{name} from the parameters against the table of ISO 2631-1, {sound.sum()} frequencies",
+                f"largest difference of {name} from the table of ISO 2631-1, {sound.sum()} frequencies",
                 float(np.abs(digits[sound]).max()),
                 "units of the table's last digit",
             ).at_most(1.0, "half a unit of rounding; two entries were cut off, not rounded", "published"),
             Observed(
                 f"ride_road.weighting.{name}.states",
                 SYSTEM,
-                f"{name}: cascade of scaled sections against the formula of its sections",
+                f"relative difference of {name} as a cascade of scaled sections from the formula of its sections",
                 off(by_states, W.response(frequency)),
                 "",
             ).at_most(1e-13, "rounding", "closed form"),
@@ -282,7 +286,8 @@ def _weighted_rows() -> list[Row]:
             Observed(
                 f"ride_road.weighted.{name}",
                 SYSTEM,
-                f"{output} of R19-ride weighted by {name}, {SPEED:g} m/s: Lyapunov against quadrature",
+                f"relative difference of {output} of R19-ride weighted by {name} between Lyapunov "
+                f"equation and quadrature, {SPEED:g} m/s",
                 float(value / expected - 1.0),
                 "",
             ).at_most(1e-8, "0.0001 to 500 rad/m: a weighting leaves nothing beyond", "closed form")

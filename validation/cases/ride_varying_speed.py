@@ -86,28 +86,29 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
         Observed(
             f"ride_varying_speed.settled.{name}",
             SYSTEM,
-            f"{name}, long after a change from 10 to 20 m/s: all outputs against the Lyapunov equation",
+            f"{name}, long after a change from 10 to 20 m/s: difference of all outputs from the Lyapunov equation",
             off(settled[-1], exact),
             "",
         ).at_most(1e-10, "the stationary limit, relative", "closed form"),
         Observed(
             f"ride_varying_speed.even.{name}",
             SYSTEM,
-            f"{name}, at 20 m/s all the time: likewise, worst instant",
+            f"{name}, at 20 m/s all the time: difference of all outputs from the Lyapunov equation, worst instant",
             off(even, exact),
             "",
         ).at_most(1e-10, "nothing may drift", "closed form"),
         Observed(
             f"ride_varying_speed.road.{name}",
             SYSTEM,
-            f"{name}, through 0, 30 and 0 m/s, standing included: variance of the road under each wheel, worst instant",
+            f"{name}, through 0, 30 and 0 m/s with standing: error of the variance of the road under "
+            "each wheel, worst instant",
             off((stopped.height / stopped.height[0]) ** 2, 1.0),
             "",
         ).at_most(1e-10, "the road does not know how fast it is driven over; relative", "closed form"),
         Observed(
             f"ride_varying_speed.step.{name}",
             SYSTEM,
-            f"{name}, the same drive at half the step: change of all variances, by their largest value",
+            f"{name}, through 0, 30 and 0 m/s: change of all variances at half the step, over their largest value",
             float(step.max()),
             "",
         ).at_most(1e-9, "ten times what was seen", "none"),
@@ -122,7 +123,8 @@ def _adjoint() -> Row:
     return Observed(
         "ride_varying_speed.adjoint",
         SYSTEM,
-        "half_car, a stop within its wheelbase and off again: body rear against the adjoint, relative",
+        "half_car, a stop within its wheelbase and off again: relative difference of the body's rear "
+        "acceleration from the adjoint",
         off(found.of("body rear")[-1], exact),
         "",
     ).at_most(1e-8, "the adjoint's solver is good to 1e-10", "closed form")
@@ -174,14 +176,14 @@ def _copies(name: str, found: dict[str, Any]) -> list[Row]:
         Observed(
             f"ride_varying_speed.copies.{name}",
             SYSTEM,
-            f"r19_ride {name}: Monte Carlo of {COPIES} copies at 3 instants in 3 points of the body, largest |z|",
+            f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants in 3 points of the body",
             float(np.abs(found["z"]).max()),
             "",
         ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
         Observed(
             f"ride_varying_speed.outputs.{name}",
             SYSTEM,
-            f"r19_ride {name}: the same for all 16 outputs, largest |z| of 48",
+            f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants for all 16 outputs",
             found["all"],
             "",
         ).beside("below 4", "wheel loads and travels follow the same law", "none"),
@@ -212,25 +214,31 @@ def _constant() -> list[Row]:
         Observed(
             "ride_varying_speed.constant",
             SYSTEM,
-            f"r19_ride at 20 m/s, {STEADY_COPIES} copies of {LASTING:g} s: largest |z| in 3 points of the body",
+            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPIES} Monte Carlo copies of {LASTING:g} s "
+            "in 3 points of the body",
             float(np.abs(z[columns]).max()),
             "",
         ).at_most(4.0, "of 3 normal values one beyond 4 in 5000 times", "none"),
         Observed(
-            "ride_varying_speed.constant.outputs", SYSTEM, "the same for all 16 outputs", float(np.abs(z).max()), ""
+            "ride_varying_speed.constant.outputs",
+            SYSTEM,
+            f"r19_ride at 20 m/s: largest |z| of {STEADY_COPIES} Monte Carlo copies "
+            f"of {LASTING:g} s for all 16 outputs",
+            float(np.abs(z).max()),
+            "",
         ).beside("below 4", "as above", "none"),
         Observed(
             "ride_varying_speed.constant.error",
             SYSTEM,
-            "the same: standard error of these standard deviations, relative",
+            "relative standard error of these Monte Carlo standard deviations, r19_ride at 20 m/s",
             error,
             "",
         ).beside("falls as 1 / sqrt(copies x length)", "what its time buys", "none"),
         Observed(
             "ride_varying_speed.cost",
             SYSTEM,
-            "the same: processor seconds of Monte Carlo for a standard error of "
-            "1e-3, by those of the covariance, which is exact, each once",
+            "ratio of the processor time of Monte Carlo for a standard error of 1e-3 to that of the "
+            "covariance, which is exact, each measured once",
             slow * (error / 1e-3) ** 2 / fast,
             "",
         ).beside("hundreds", "every further digit costs Monte Carlo a hundredfold, the covariance nothing", "none"),

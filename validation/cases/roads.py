@@ -41,7 +41,7 @@ def _round_trips(folder: Path) -> list[Row]:
         Observed(
             f"roads.{kind}.round-trip",
             SYSTEM,
-            f"heights of the study road written to {kind} and read back",
+            f"largest change of the study road's heights, written to {kind} and read back",
             float(np.abs(profile.height_and_slope(station)[0] - true).max()),
             "m",
         ).at_most(1e-14, "both formats keep doubles; only the unit conversion rounds", "closed form")
@@ -62,7 +62,7 @@ def _round_trips(folder: Path) -> list[Row]:
         Observed(
             "roads.same-run",
             SYSTEM,
-            "the vehicle's states over the OpenCRG road against the CSV road",
+            "largest difference of the vehicle's states over the OpenCRG road from those over the CSV road",
             gap(*paths),
             "m, rad, m/s, rad/s",
         ).at_most(1e-11, "the same heights to 1e-14 through the same springs", "shared kernel")
@@ -89,7 +89,11 @@ def _recurrence() -> Row:
     station = 300.0 + 0.01 * np.arange(4000)
     error = np.abs(road.sample_uniform(300.0, 0.01, 4000)[0] - road.height_and_slope(station)[0]).max()
     return Observed(
-        "roads.recurrence", SYSTEM, "study road sampled by rotation against the formula", float(error), "m"
+        "roads.recurrence",
+        SYSTEM,
+        "largest difference of the study road sampled by rotation from the formula",
+        float(error),
+        "m",
     ).at_most(1e-13, "64 rotations of a unit vector lose 64 roundings before they start anew", "closed form")
 
 
@@ -122,14 +126,14 @@ def _measured() -> list[Row]:
         Observed(
             "roads.course.tracks",
             SYSTEM,
-            "measured course: left track against right track",
+            "difference between the left and the right track of the measured course",
             float(np.abs(heights[0] - heights[1]).max()),
             "m",
         ).at_most(0.0, "its owners say that they are identical", "published"),
         Observed(
             "roads.course.rms",
             SYSTEM,
-            "measured course: rms of the undulated part, detrended",
+            "rms of the undulated part of the measured course, detrended",
             float(_detrended(undulated).std()),
             "m",
         ).within(

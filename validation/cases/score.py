@@ -76,8 +76,8 @@ def _conventions() -> list[Row]:
         Observed(
             "score.damage.turning-points",
             SYSTEM,
-            f"damage of a random walk of {SAMPLES:,} samples from its "
-            "turning points alone against all samples, relative",
+            f"relative difference of the damage of a random walk of {SAMPLES:,} samples by its "
+            "turning points alone from all samples",
             abs(pseudo_damage(walk) / whole - 1),
             "",
         ).at_most(1e-12, "rainflow reads turning points only; the sum is in another order", "native"),
@@ -87,7 +87,7 @@ def _conventions() -> list[Row]:
             )
             for name, what, told in (
                 ("walk", "damage of a random walk with its residue closed, difference", 0.34),
-                ("white", "the same for white noise", 0.001),
+                ("white", "damage of white noise with its residue closed, difference", 0.001),
             )
         ),
     ]
@@ -115,7 +115,11 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
                 "m",
             ).within(SINKING * duration, 1e-6, "a large drift, on purpose", "closed form"),
             Observed(
-                f"score.heave.damage.{engine}", SYSTEM, f"{engine}: its damage ratios, worst |ratio - 1|", worst, ""
+                f"score.heave.damage.{engine}",
+                SYSTEM,
+                f"{engine}: largest |damage ratio - 1| of a run that sinks at {SINKING} m/s",
+                worst,
+                "",
             ).at_most(
                 1e-9,
                 "the equations feel neither place nor common speed: a heave drift leaves all four "

@@ -83,8 +83,8 @@ def _missing_mass(parameters: str, p: Parameters, measured: Result, follow: Foll
         Observed(
             f"stabilisers.mass.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean force of a prescribed heave, {MISSING:.0%} of the chassis missing "
-            f"(0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)",
+            f"{engine}, {parameters}: mean force that prescribes the heave, {MISSING:.0%} of the "
+            f"chassis missing (0.05 m3 g = {MISSING * p.m3 * p.g:.1f} N)",
             float(guided(scene, engine)["enforced_force"].mean()),
             "N",
         ).within(
@@ -103,8 +103,8 @@ def _shifted_centre(parameters: str, p: Parameters, measured: Result, follow: Fo
         Observed(
             f"stabilisers.centre.{engine}.{parameters}",
             SYSTEM,
-            f"{engine}, {parameters}: mean moment of a prescribed pitch, centre of mass {SHIFT:g} m too far ahead "
-            f"(m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)",
+            f"{engine}, {parameters}: mean moment that prescribes the pitch, centre of mass {SHIFT:g} "
+            f"m too far ahead (m3 g x = {SHIFT * p.m3 * p.g:.1f} N m)",
             float(guided(scene, engine)["enforced_moment"].mean()),
             "N m",
         ).within(wanted, BOUND * wanted, "x (f3 + f4) cos(pitch) of the true drive, nose up", "closed form")
@@ -126,7 +126,7 @@ def _exact(follow: Follow, duration: float) -> list[Row]:
         Observed(
             f"stabilisers.{name}.{engine}",
             SYSTEM,
-            f"{engine}, {words}: largest difference of any state to the reference",
+            f"{engine}, {words}: largest difference of any state from the reference",
             trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
             "SI",
         ).at_most(1e-12, "the same stages see the same side of the band and the same moment", "native")
@@ -145,8 +145,8 @@ def _high_pass(follow: Follow) -> Row:
     return Observed(
         "stabilisers.high_pass",
         SYSTEM,
-        f"high-pass at {CUT_OFF:g} Hz: distance of the vehicle's slow pole "
-        "from that of s^2 + 2 zeta wc s + wc^2, by wc",
+        f"high-pass at {CUT_OFF:g} Hz: distance of the vehicle's slow pole from that of s^2 + 2 zeta "
+        "wc s + wc^2, over wc",
         off,
         "",
     ).at_most(
@@ -173,7 +173,7 @@ def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
         Observed(
             "stabilisers.bandwidth.raw",
             SYSTEM,
-            "rms moment of a pitch with noise of 0.1 degrees per sample at 1 kHz, used as it is",
+            "rms moment that prescribes a pitch with noise of 0.1 degrees per sample at 1 kHz",
             rms[None],
             "N m",
         ).beside(1e6, "I s sqrt(6) / T^2 and more: differentiated twice", "published")
@@ -184,7 +184,8 @@ def _bandwidth(measured: Result, follow: Follow, folder: Path) -> list[Row]:
             Observed(
                 f"stabilisers.bandwidth.{bandwidth:g}",
                 SYSTEM,
-                f"the same smoothed to {bandwidth:g} Hz; the pitch is then off by at most {off:.4f} rad",
+                f"rms moment that prescribes the noisy pitch smoothed to {bandwidth:g} Hz, which is "
+                f"then off by at most {off:.4f} rad",
                 rms[bandwidth],
                 "N m",
             ).beside(

@@ -95,8 +95,8 @@ def _rows(found: list[Saved], quick: bool) -> list[Row]:
     useless = _share(one["ratio"] < TENTH and not one["rounding"] for one in known)
     silent = [one for one in known if one["ratio"] > FAR and not (one["warned"] or one["rounding"])]
     costs = [_cost(name, found) for name in dict.fromkeys(one["system"] for one in found)]
-    near = f"share of {len(known)} samples whose true error is within {NEAR:g} times the stated one"
-    below = f"share whose true error is below a tenth of the stated one, of {len(known)} samples"
+    near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
+    below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
     asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
     shares = (
         [
@@ -114,21 +114,21 @@ def _rows(found: list[Saved], quick: bool) -> list[Row]:
         Observed(
             "stated_errors.silent",
             SYSTEM,
-            f"samples whose true error is above {FAR:g} times the stated one, without a warning",
+            f"samples whose true error is above {FAR:g} times the stated error, without a warning",
             float(len(silent)),
             "",
         ).at_most(0.0, f"asked: none; a warning stands above {100 * WARNED:g} % of the channel's deviation", "none"),
         Observed(
             "stated_errors.cost",
             SYSTEM,
-            "force evaluations of the estimate by those of the run, median of systems",
+            "ratio of the force evaluations of the error estimate to those of the run, median of systems",
             float(np.median(costs)),
             "",
         ).at_most(COST, "asked: about half the run again", "none"),
         Observed(
             "stated_errors.without",
             SYSTEM,
-            f"of {len(found)} samples: results that say why there is no number",
+            f"results, of {len(found)} samples, that say why there is no number",
             float(len(found) - len(known)),
             "",
         ).beside("few", "what does not repeat has no error of steps", "none"),
@@ -157,8 +157,8 @@ def _of_system(name: str, found: list[Saved]) -> list[Row]:
     why = "all systems are judged together"
     shown = (
         ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
-        ("ratio", "true by stated error, median", middle, 1.0),
-        ("cost", "cost of the estimate by that of the run, median", _cost(name, found), COST),
+        ("ratio", "median ratio of true to stated error", middle, 1.0),
+        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, found), COST),
     )
     return [
         Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "").beside(expected, why, "none")

@@ -27,7 +27,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         Observed(
             "tight.uncertainty",
             SYSTEM,
-            "uncertainty of the tight solution: Dormand-Prince 8 against Adams/BDF",
+            "difference between the tight solutions by Dormand-Prince 8 and by Adams/BDF",
             gap(tight, other),
             "m, rad, m/s, rad/s",
         ).at_most(1e-7, "a tenth of the bound that it has to judge", "shared kernel")
@@ -40,7 +40,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             Observed(
                 f"tight.{engine}",
                 SYSTEM,
-                f"states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
+                f"largest error of the states over {duration:g} s, {engine} {name} at {1e3 * STEP:g} ms",
                 gap(run, tight),
                 "m, rad, m/s, rad/s",
             ).at_most(1e-6, "a thousandth of a millimetre: far below what a road survey resolves", independence)

@@ -73,7 +73,7 @@ def _compare(what: str, scenes: list[Scene]) -> list[Row]:
         Observed(
             f"twin.{engine}.{what}",
             SYSTEM,
-            f"states, {engine} against reference, RK4 at {steps} ms, {what}",
+            f"largest difference of the states in {engine} from the reference, RK4 at {steps} ms, {what}",
             max(gap(simulate(scene, engine), truth) for scene, truth in zip(scenes, truths, strict=True)),
             "m, rad, m/s, rad/s",
         ).at_most(BOUND, WHY, "native")

@@ -73,20 +73,24 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
         Observed(
             "wheelset.wave.closed",
             SYSTEM,
-            f"wavelength {count}: eigenvalues of all motions by the closed form",
+            f"wavelength {count}: relative difference of the eigenvalues of all motions from the closed form",
             max(closed),
             "",
         ).at_most(1e-3, "cones on round heads without slip; inertia and spin creepage are what is left", "closed form"),
         Observed(
             "wheelset.wave.klingel",
             SYSTEM,
-            f"wavelength {count} on rails that are edges: by Klingel's formula",
+            f"wavelength {count} on rails that are edges: relative difference from Klingel's formula",
             max(edges),
             "",
         ).at_most(1e-3, "2 pi sqrt(r b / c), for which rails have no radius", "closed form"),
-        Observed("wheelset.wave.engines", SYSTEM, f"wavelength {count}: three implementations", max(among), "").at_most(
-            1e-6, "each linearises its own equations of motion around the same contact forces", "shared kernel"
-        ),
+        Observed(
+            "wheelset.wave.engines",
+            SYSTEM,
+            f"wavelength {count}: relative difference between three implementations",
+            max(among),
+            "",
+        ).at_most(1e-6, "each linearises its own equations of motion around the same contact forces", "shared kernel"),
     ]
 
 
@@ -103,7 +107,7 @@ def _critical_rows(speeds: Speeds) -> list[Row]:
         Observed(
             "wheelset.critical.engines",
             SYSTEM,
-            f"critical speed of {len(having)} wheelsets: three implementations",
+            f"critical speed of {len(having)} wheelsets: relative difference between three implementations",
             max(map(_spread, having)),
             "",
         ).at_most(1e-6, why, "shared kernel"),
@@ -130,7 +134,7 @@ def _none_row(name: str, wheelset: Wheelset, expected: str) -> Row:
     return behaves(
         f"wheelset.critical.{name}",
         SYSTEM,
-        f"a {name} wheelset at all speeds, in three implementations",
+        f"what three implementations find of a {name} wheelset at all speeds",
         " or ".join(sorted(said)),
         expected,
         "nothing holds it, or more than creep forces can drive",
@@ -150,7 +154,8 @@ def _acceleration_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
             Observed(
                 f"wheelset.accelerations.{engine}",
                 SYSTEM,
-                f"rates of 20 random states of {len(wheelsets)} wheelsets with FASTSIM, by the largest",
+                f"largest difference of the rates at 20 random states of {len(wheelsets)} wheelsets "
+                "with FASTSIM, over the largest rate",
                 worst,
                 "",
             ).at_most(1e-10, "the engine's own equations of motion around the same contact forces", "shared kernel")
@@ -187,19 +192,19 @@ def _path_rows(wheelsets: dict[str, Wheelset], speeds: Speeds, cells: int) -> li
             Observed(
                 f"wheelset.path.{engine}",
                 SYSTEM,
-                f"{of}: {engine} by the equations (m, rad, s)",
+                f"{of}: largest difference of {engine} from the equations (m, rad, s)",
                 pairs["reference", engine],
                 "",
             ).at_most(1e-10, why, "shared kernel")
             for engine in ENGINES
         ),
-        Observed("wheelset.path.between", SYSTEM, f"{of}: both engines", pairs[ENGINES], "").at_most(
-            1e-10, why, "shared kernel"
-        ),
+        Observed(
+            "wheelset.path.between", SYSTEM, f"{of}: largest difference between the two engines", pairs[ENGINES], ""
+        ).at_most(1e-10, why, "shared kernel"),
         Observed(
             "wheelset.power",
             SYSTEM,
-            f"times that a creep force has a power above zero, of {steps:,} at every step of these paths",
+            f"creep forces with a power above zero, of {steps:,}, at every step of these paths",
             positive,
             "",
         ).at_most(0, "friction takes energy and never gives any", "none"),
@@ -242,10 +247,14 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
         of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
         rows += [
             Observed(
-                f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: change by halving the step, relative", errors, ""
+                f"wheelset.cycle.{value}.error", SYSTEM, f"{of}: relative change if the step is halved", errors, ""
             ).at_most(1e-2, "Newton's method closes the orbit at either step", "none"),
             Observed(
-                f"wheelset.cycle.{value}", SYSTEM, f"{of}: {count} implementations, by the error of the step", apart, ""
+                f"wheelset.cycle.{value}",
+                SYSTEM,
+                f"{of}: ratio of the difference between {count} implementations to the error of the step",
+                apart,
+                "",
             ).at_most(1.0, "each closes its own orbit, from a guess that is 1 % off", "shared kernel"),
         ]
     return rows
@@ -279,14 +288,14 @@ def _energy_rows() -> list[Row]:
             Observed(
                 f"wheelset.energy.{law}",
                 SYSTEM,
-                f"energy that the ledger of a path of 0.1 s with {named} leaves open, by what creep takes",
+                f"ratio of the energy that the ledger of a path of 0.1 s leaves open to what creep takes, {named}",
                 left[-1],
                 "",
             ).at_most(1e-8, "steps of 0.125 ms; works by the stages of RK4", "none"),
             Observed(
                 f"wheelset.energy.{law}.order",
                 SYSTEM,
-                f"order at which that falls with the step, {named}",
+                f"observed order at which the ledger's open energy falls with the step, {named}",
                 float(np.log2(left[0] / left[1])),
                 "",
             ).within(4.0, 0.2, "that of the integrator", "none"),
@@ -308,7 +317,7 @@ def _fault_rows() -> list[Row]:
         behaves(
             f"wheelset.fault.{name.split()[-1]}",
             SYSTEM,
-            f"planted in one implementation: {name}",
+            f"a planted fault in a single implementation is noticed: {name}",
             "seen" if caught else "unseen",
             "seen",
             "beyond the bounds of the rows above",

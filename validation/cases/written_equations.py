@@ -42,12 +42,28 @@ def _row(id: str, quantity: str, value: float, unit: str, bound: float) -> Row:
 
 def _laws(states: int) -> list[Row]:
     """The tyre's law, and what holds the design position."""
-    rows = [_row("bristles", f"creep forces of {states} random patches, by the load", bristles_gap(states), "1", LAW)]
+    rows = [
+        _row(
+            "bristles",
+            f"largest difference of the creep forces of {states} random patches, over the load",
+            bristles_gap(states),
+            "1",
+            LAW,
+        )
+    ]
     for name, car in rolling_cars().items():
         held = preloads(car.vehicle)
         plain = held_at_rest(car.vehicle, CARRIER)
         gap = max(off(other, list(known.values())) for known, other in zip(held, plain, strict=True))
-        rows.append(_row(f"preloads.{name}", f"preloads and static loads of {name}, by the largest", gap, "1", LAW))
+        rows.append(
+            _row(
+                f"preloads.{name}",
+                f"largest difference of the preloads and static loads of {name}, over the largest",
+                gap,
+                "1",
+                LAW,
+            )
+        )
     return rows
 
 
@@ -56,12 +72,15 @@ def _hubs(states: int, duration: float) -> list[Row]:
     rows = []
     for name, car in cut_cars().items():
         for engine in ("reference", *ENGINES):
-            what = f"accelerations of {name} on hub forces and on a road at {states} random states, {engine}"
+            what = (
+                f"largest difference of {name}'s accelerations on hub forces and on a road "
+                f"in {engine}, {states} random states"
+            )
             rows.append(_row(f"hubs.{engine}.{name}", what, hub_gap(car, engine, states), "of the largest", INSTANT))
-        what = f"section forces, wrenches and holding moments of {name} at random states"
+        what = f"largest difference of {name}'s section forces, wrenches and holding moments at random states"
         rows.append(_row(f"hubs.inside.{name}", what, inside_gap(car, 4), "of the largest", INSTANT))
         for kind, rough in (("road", True), ("noise", False)):
-            what = f"coordinates and rates of {name}, {duration:g} s of {kind}, mujoco"
+            what = f"largest difference of {name}'s coordinates and rates in MuJoCo, {duration:g} s of {kind}"
             rows.append(
                 _row(f"hubs.{kind}.{name}", what, hub_path_gap(car, "mujoco", duration, rough), "m, rad, 1/s", PATH)
             )
@@ -73,12 +92,14 @@ def _rolling(states: int, duration: float) -> list[Row]:
     rows = []
     for name, car in rolling_cars().items():
         for engine in ENGINES:
-            what = f"accelerations of {name} on tyres at {states} random states, {engine}"
+            what = f"largest difference of {name}'s accelerations on tyres in {engine}, {states} random states"
             gap = rolling_gap(car, engine, states)
             rows.append(_row(f"tyres.{engine}.{name}", what, gap, "of the largest", INSTANT))
-        what = f"reports of the tyres and ledgers of {name} at random states, each by its largest"
+        what = (
+            f"largest difference of the tyre reports and ledgers of {name} at random states, over the largest of each"
+        )
         rows.append(_row(f"tyres.reports.{name}", what, report_gap(car, states), "1", INSTANT))
-        what = f"positions and rates of {name}, {duration:g} s of a turn on a rough road, mujoco"
+        what = f"largest difference of {name}'s positions and rates in MuJoCo, {duration:g} s of a turn on a rough road"
         gap = rolling_path_gap(car, "mujoco", duration)
         rows.append(_row(f"tyres.path.{name}", what, gap, "m, rad, 1/s", PATH))
     return rows

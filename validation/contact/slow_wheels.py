@@ -87,9 +87,8 @@ def rows(quick: bool) -> tuple[list[Row], list[Run]]:
         Observed(
             f"contact_bridges.low-speed.{run.method}",
             SYSTEM,
-            f"Exudyn at 1 m/s, {run.method} with slopes: "
-            f"error after {DURATION:g} s in steps of {1e3 * run.step:.2g} ms ({run.calls} force calls; RK44 "
-            f"needs {explicit.calls})",
+            f"relative error in Exudyn at 1 m/s after {DURATION:g} s, {run.method} with slopes in "
+            f"steps of {1e3 * run.step:.2g} ms ({run.calls} force calls; RK44 needs {explicit.calls})",
             run.error,
             "of what is left",
         ).at_most(

@@ -93,7 +93,7 @@ class Campaign:
             Observed(
                 f"{self.id}.single",
                 SYSTEM,
-                f"faults planted in {self.what} that one check alone catches",
+                f"faults planted in {self.what} that a single check catches",
                 len(single),
                 "faults",
             ).beside("few", "what would pass if that check were dropped: " + (", ".join(single) or "none"), "native"),

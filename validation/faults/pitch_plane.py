@@ -100,7 +100,7 @@ def rows(data: Saved) -> list[Row]:
             "alarms",
         ).within(0, 0, "a check that cries without a fault is no check", "native"),
         *([_hidden(found)] if _both(data) else []),
-        Observed("planted.single", SYSTEM, "planted faults that one check alone catches", len(single), "faults").beside(
+        Observed("planted.single", SYSTEM, "planted faults that a single check catches", len(single), "faults").beside(
             "few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"
         ),
     ]

@@ -154,8 +154,8 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
         Observed(
             f"price.ride.error.{p.name.split(',')[0]}",
             SYSTEM,
-            f"R19-ride at {SPEED:g} m/s, {p.name}: largest "
-            "error of a standard deviation of accelerations and tyre forces",
+            "largest relative error of a standard deviation of R19-ride's accelerations and tyre "
+            f"forces at {SPEED:g} m/s, {p.name}",
             max(p.errors.values()),
             "relative",
         ).at_most(1e-9, f"quadrature knows its variances to {ride.uncertainty:.0e}", "closed form")
@@ -165,14 +165,14 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
         Observed(
             "price.ride.counts.solves",
             SYSTEM,
-            "Lyapunov equations solved for one road at one speed",
+            "number of Lyapunov equations solved for a road at a speed",
             exact[0].count,
             "solves",
         ).within(2, 0, "the first solution and one correction", "none"),
         Observed(
             "price.ride.counts.decompositions",
             SYSTEM,
-            "eigenvectors made for all points of the sweep",
+            "number of eigenvector decompositions for all points of the sweep",
             exact[1].count,
             "decompositions",
         ).within(
@@ -188,7 +188,7 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
         Observed(
             "price.ride.grids",
             SYSTEM,
-            "grids of ten times the frequencies whose error is not smaller",
+            "frequency grids whose tenfold refinement does not have a smaller error",
             sum(ratio <= 1.0 for ratio in falls),
             "",
         ).within(0, 0, "they converge", "none")
@@ -197,7 +197,7 @@ def judged(ride: Ride, points: list[Point]) -> list[Row]:
         Observed(
             f"price.ride.copies.{p.count}",
             SYSTEM,
-            f"{p.name}, {p.count} copies: largest error of a standard deviation, one draw, |z| up to {p.z:.1f}",
+            f"largest error of a standard deviation with {p.count} copies, {p.name}, single draw, |z| up to {p.z:.1f}",
             max(p.errors.values()),
             "relative",
         ).beside(

@@ -64,7 +64,7 @@ def _reference(problem: Problem, measured: Measured) -> Row:
     return Observed(
         f"price.{problem.key}.reference",
         SYSTEM,
-        f"uncertainty of the reference ({problem.reference}), {quantity}",
+        f"uncertainty of the reference ({problem.reference}) in the {quantity}",
         problem.uncertainty[quantity],
         measured.unit,
     ).at_most(
@@ -82,7 +82,7 @@ def _orders(measured: Measured) -> list[Row]:
         Observed(
             f"price.{measured.key}.order.{quantity}.{curve}".replace(" ", "-"),
             SYSTEM,
-            f"observed order of the largest {quantity} error, {named(curve)}",
+            f"observed order of the largest error of the {quantity}, {named(curve)}",
             order,
             "",
         ).within(
@@ -109,7 +109,7 @@ def _promises(problem: Problem, measured: Measured) -> Row:
     return Observed(
         f"price.{problem.key}.cheapest",
         SYSTEM,
-        "error of the table's cheapest settings by their tolerance, each of them run, largest",
+        "largest ratio of the error of a recommended cheapest setting to its tolerance, each of them run",
         worst,
         "",
     ).within(
@@ -169,6 +169,6 @@ def _loss(measured: Measured, owner: str, among: str, words: str, kind: str) -> 
     name = f"price.{measured.key}.default.{whose}.{'own' if among else 'all'}.{kind}".replace(" ", "-")
     told = f"95 % interval {lost.low:.3g} to {lost.high:.3g}" if lost.low <= lost.high else "too few rounds to tell"
     bounds = told if kind == "seconds" else "exact"
-    what = f"{owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, by {words}: {kind}"
+    what = f"ratio of {kind}: {owner}'s default, {p.setting.method}, refined to {target:g} {unit}{how}, to {words}"
     why = f"at its default {p.setting.label()} its error is {measured.error(p):.3g} {unit}"
     return [Observed(name, SYSTEM, what, lost.factor, "times").beside(bounds, why, "none")]

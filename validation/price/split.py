@@ -166,7 +166,7 @@ def rows(data: list[Saved]) -> list[Row]:
         Observed(
             f"price.{saved['problem']}.split.{saved['engine']}",
             SYSTEM,
-            f"{_named(saved)}, {saved['problem']}: the bridge's share of a step",
+            f"share of the bridge in a step, {_named(saved)}, {saved['problem']}",
             middle,
             "%",
         ).beside(f"95 % interval {low:.0f} to {high:.0f}", "seconds are reported and never gated", "none")

@@ -40,7 +40,7 @@ def made(length: float) -> tuple[list[Row], dict[str, Any]]:
         Observed(
             f"ride_road.fit.{name}.{what}",
             SYSTEM,
-            f"{what} of the {name} process fitted to {length / 1e3:g} km of made road over the true one",
+            f"ratio of {what} of the {name} process fitted to {length / 1e3:g} km of made road to the true value",
             getattr(process.filter, what) / getattr(true, what),
             "",
         ).within(

@@ -62,7 +62,8 @@ def bent_in_engines(quick: bool) -> list[Row]:
             Observed(
                 f"ride_nonlinear.mean.{engine}",
                 SYSTEM,
-                f"the same in {engine}: mean travel, predicted {1e3 * linear.mean[travel]:.2f} mm, by its deviation",
+                f"difference of the mean travel in {engine} from the predicted "
+                f"{1e3 * linear.mean[travel]:.2f} mm, over its deviation",
                 float(shift),
                 "",
             ).at_most(
@@ -74,11 +75,7 @@ def bent_in_engines(quick: bool) -> list[Row]:
         mean = abs(run.outputs[:, force].mean()) / error[force]
         rows.append(
             Observed(
-                f"ride_nonlinear.load.{engine}",
-                SYSTEM,
-                "the same: mean of the dynamic tyre force, |z|",
-                float(mean),
-                "",
+                f"ride_nonlinear.load.{engine}", SYSTEM, "|z| of the mean of the dynamic tyre force", float(mean), ""
             ).at_most(4.0, "the tyre bears the weight, however the damper pulls", "none")
         )
     return rows
@@ -90,7 +87,7 @@ def _apart(id: str, what: str, runs: dict[str, Ride]) -> Row:
     return Observed(
         f"ride_nonlinear.path.{id}",
         SYSTEM,
-        f"{what} on one random road: exudyn against mujoco, all states",
+        f"largest difference of all states between Exudyn and MuJoCo, {what} on the same random road",
         float(gap),
         "m, rad, m/s, rad/s",
     ).at_most(1e-12, SAME, "native")
@@ -113,15 +110,15 @@ def linear_in_engines() -> tuple[list[Row], dict[str, Any]]:
             Observed(
                 f"ride_nonlinear.variance.{engine}",
                 SYSTEM,
-                f"r19_ride in {engine}, {DRIVEN - SKIPPED:g} s: "
-                f"variances of 16 outputs against the covariance (deviations to {100 * share:.1f} %), largest |z|",
+                f"largest |z| of the variances of 16 outputs of r19_ride in {engine} against the "
+                f"covariance, {DRIVEN - SKIPPED:g} s (deviations to {100 * share:.1f} %)",
                 float(np.abs(square).max()),
                 "",
             ).at_most(4.0, "standard errors by the densities: samples of a path know of each other", "none"),
             Observed(
                 f"ride_nonlinear.zero.{engine}",
                 SYSTEM,
-                "the same: means about the equilibrium, largest |z| of 16",
+                "largest |z| of the means of 16 outputs of r19_ride about the equilibrium",
                 float(np.abs(mean).max()),
                 "",
             ).at_most(4.0, "the road has no mean, and gravity is carried", "none"),

@@ -31,7 +31,8 @@ def weighting_rows(seed: int) -> list[Row]:
             Observed(
                 f"ride_covariance.weighting.{name}",
                 SYSTEM,
-                f"{name} of a seat as states behind the vehicle, against its frequency response in the quadrature",
+                f"difference of {name} of a seat, as states behind the vehicle, from its frequency "
+                "response in the quadrature",
                 deviation / integrals.variance[at] ** 0.5 - 1,
                 "",
             ).at_most(1e-8, "asked of the cascade; as one polynomial it is 2e-4 off", "native")
@@ -69,7 +70,7 @@ def _white_rows() -> list[Row]:
         Observed(
             "ride_covariance.white.value",
             SYSTEM,
-            "the outputs that stay finite, against quadrature",
+            "difference of the outputs that stay finite from quadrature",
             off(covariance.variance[:4], other.variance[:4]),
             "",
         ).at_most(1e-10, "both routes at their best", "native"),
@@ -95,12 +96,12 @@ def _free_rows() -> list[Row]:
     density = spectra(turning, road, 20.0, np.array([omega]))[0, side]
     return [
         Observed(
-            "ride_covariance.free.zeros", SYSTEM, "zero eigenvalues that are found in R19-free", split.zeros, ""
+            "ride_covariance.free.zeros", SYSTEM, "number of zero eigenvalues of R19-free", split.zeros, ""
         ).within(3, 0, "place along and across, heading", "closed form"),
         behaves(
             "ride_covariance.free.status",
             SYSTEM,
-            "all outputs of R19-free",
+            "variance of all outputs of R19-free",
             " and ".join(set(covariance.status)),
             FINITE,
             covariance.reason[0],
@@ -108,7 +109,7 @@ def _free_rows() -> list[Row]:
         behaves(
             "ride_covariance.free.slycot",
             SYSTEM,
-            "R19-free where slycot seems installed, bit by bit",
+            "R19-free gives the same bits where slycot seems installed",
             "same" if same else "different",
             "same",
             "the method is named; its routines would raise here",
@@ -116,18 +117,23 @@ def _free_rows() -> list[Row]:
         behaves(
             "ride_covariance.free.steered",
             SYSTEM,
-            "front roll steer 0.05: lateral position",
+            "front roll steer 0.05: variance of the lateral position",
             walking.status[side] if others == {FINITE} else "others too",
             "diffusing",
             walking.reason[side],
         ),
-        Observed("ride_covariance.free.walk", SYSTEM, "its standard deviation after 100 s", after, "m").within(
-            7.0, 0.5, "known to one digit, from the same law worked out beforehand", "closed form"
-        ),
+        Observed(
+            "ride_covariance.free.walk",
+            SYSTEM,
+            "standard deviation of the lateral position after 100 s, front roll steer 0.05",
+            after,
+            "m",
+        ).within(7.0, 0.5, "known to one digit, from the same law worked out beforehand", "closed form"),
         Observed(
             "ride_covariance.free.rate",
             SYSTEM,
-            "growth of its variance, rate t^3, against 2 pi w^4 / 3 times its density at 0.001 rad/s",
+            "ratio of the growth of the lateral position's variance, rate t^3, to 2 pi w^4 / 3 times "
+            "its density at 0.001 rad/s",
             float(rate) / (2 * np.pi * omega**4 * density / 3) - 1,
             "",
         ).at_most(1e-4, "the next term is smaller by the square of frequency over the slowest pole", "native"),
