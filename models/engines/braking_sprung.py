@@ -22,11 +22,11 @@ from models.brake.sprung_step import (
     Held,
     OnEngine,
     advance,
-    fill,
     held,
     held_forces,
     hold,
     meet,
+    set_held,
 )
 from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
@@ -67,9 +67,8 @@ class OnSprings:
     @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
-        own, table = self.vehicle.handling, self._table
-        driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
-        return free_model(self.engine, driven)
+        own = self.vehicle.handling
+        return free_model(self.engine, Driven(own.vehicle, own.gravity, self._table, held, set_held))
 
     @cached_property
     def _parts(self) -> tuple[OnEngine, Any, Any]:

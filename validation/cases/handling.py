@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from models.contact.fastsim_many import LOAD, MU, A, B
-from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle_mujoco import FreeMujoco
-from models.engines.mujoco_callback import installed
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from models.machine.compiled import njit
 from models.machine.timing import interleave, median
 from models.multibody import forces as at
