@@ -11,10 +11,12 @@ from models.contact.fastsim import RollingEllipse, fastsim
 from models.contact.hertz import by_approach
 from models.contact.undeformed_distance import from_function
 from models.core.errors import InputError, Refused, RunFailed
-from models.engines.contact_bridge import Wheels, add_forces, slopes
+from models.engines.contact_bridge import Wheels, add_forces, forces, slopes
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
-from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
-from models.engines.mujoco_callback import installed
+from models.engines.contact_bridge_mujoco import empty_law, model, python_law
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from validation.cases.contact_bridges import plain
 
 STEP, STEPS = 1e-4, 60
@@ -25,7 +27,7 @@ def exudyn(wheels: Wheels, of, route=ROUTES[0], solver="RK44") -> np.ndarray:
 
 
 def native(wheels: Wheels, states: np.ndarray, integrator="RK4", threads=1) -> np.ndarray:
-    with installed(native_law()):
+    with installed(kernel_law(forces)):
         return Marcher(model(wheels, STEP, integrator), threads).run(states, STEPS)
 
 

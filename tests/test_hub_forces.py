@@ -49,7 +49,7 @@ def test_small_motion_on_tyres_is_that_of_the_linear_vehicle():
     )
     model = build("reference", bare, Drive(np.zeros((3, 8)), speed=20.0), 1e-3, 1e-3)
     small = 1e-6 * np.random.default_rng(1).uniform(-1, 1, (2, n))
-    found = model.accelerations(0.0, *small)
+    found = model.acceleration(0.0, *small)
     q, v = np.zeros((2, n))
     q[order], v[order] = small
     expected = np.linalg.solve(linear.mass, -linear.damping @ v - linear.stiffness @ q)[order]
@@ -140,7 +140,7 @@ def test_inputs_of_a_wrong_length_are_refused_and_a_vehicle_that_tumbles_is_told
     start = np.zeros(38)
     start[19 + PITCH] = 3.0
     with pytest.raises(RunFailed, match="pitches by more than"):
-        build("mujoco", car, static(car, 1201), 1e-3, 0.6).run(start)
+        build("mujoco", car, static(car, 1201), 1e-3, 0.6).run(*np.split(start, 2))
 
 
 def test_steps_that_the_road_is_too_fast_for_are_told():

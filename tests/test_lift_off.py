@@ -181,9 +181,11 @@ def test_a_tyre_that_pulls_in_one_implementation_is_seen(monkeypatch):
 
         monkeypatch.setattr(reference, "derivative_of", lambda *key, wrong=wrong: wrong)
         states = checks.random_states(100)
-        found = np.array([model.acceleration(1.0, y) for y in states])
+        found = np.array([model.acceleration(1.0, *np.split(y, 2)) for y in states])
         monkeypatch.undo()
-        right = np.array([build("exudyn", assembly, settings_of(own, "exudyn")).acceleration(1.0, y) for y in states])
+        right = np.array(
+            [build("exudyn", assembly, settings_of(own, "exudyn")).acceleration(1.0, *np.split(y, 2)) for y in states]
+        )
         assert checks.relative(found, right) > 1e-3
     assert forces(truth).min() == 0.0
 
@@ -244,9 +246,9 @@ def test_vehicles_in_space_agree_with_the_written_equations_where_tyres_lift(nam
     for _ in range(30):
         q, v = random.uniform(-0.08, 0.08, n), random.uniform(-3.0, 3.0, n)
         road = np.concatenate([random.uniform(-0.1, 0.1, w), random.uniform(-3.0, 3.0, w)])
-        wanted = written.acceleration(q, v, road)
+        wanted = written.acceleration(0.0, q, v, road)
         for model in built:
-            assert np.abs(model.acceleration(q, v, road) - wanted).max() < 1e-12 * np.abs(wanted).max()
+            assert np.abs(model.acceleration(0.0, q, v, road) - wanted).max() < 1e-12 * np.abs(wanted).max()
 
 
 def test_a_ride_lifts_in_both_engines_and_in_copies():

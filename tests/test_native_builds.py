@@ -70,7 +70,7 @@ def test_the_first_evaluation_reads_no_stale_law():
         for car in (r19(), rough_car()):
             built = HubModel(engine, car, static(car, 3), 1e-3, 1e-3, "native")
             rest = np.zeros(car.size)
-            assert np.abs(built.accelerations(0.0, rest, rest)).max() < 1e-9
+            assert np.abs(built.acceleration(0.0, rest, rest)).max() < 1e-9
 
 
 def test_an_axis_fixed_in_what_does_not_carry_the_other_end_stays_shared():

@@ -119,7 +119,7 @@ def test_a_fault_lives_only_while_its_model_works():
         for engine in own.engines:
             model = planted(own, engine)(bench.road, bench.settings(engine))
             assert [getattr(owner, name) for owner, name in watched] == before, own.name
-            model.acceleration(0.01, np.zeros(8))
+            model.acceleration(0.01, np.zeros(4), np.zeros(4))
     assert [getattr(owner, name) for owner, name in watched] == before
 
 

@@ -58,9 +58,9 @@ def test_accelerations_agree_with_the_equations_by_hand():
     )
     for path in range(5):
         state = random_state(vehicle, path)
-        expected = reference.acceleration(*state)
-        assert relative(exudyn.acceleration(*state), expected) < 1e-12
-        assert relative(mujoco_.acceleration(*state), expected) < 1e-12
+        expected = reference.acceleration(0.0, *state)
+        assert relative(exudyn.acceleration(0.0, *state), expected) < 1e-12
+        assert relative(mujoco_.acceleration(0.0, *state), expected) < 1e-12
 
 
 def test_a_wheel_that_only_slides_is_linearised_wherever_its_spring_and_its_tyre_are():
@@ -97,7 +97,7 @@ def test_equations_by_hand_keep_energy():
     )
     model = SpatialReference(vehicle)
     q, v, _ = random_state(vehicle, 0)
-    a = model.acceleration(q, v)
+    a = model.acceleration(0.0, q, v)
 
     def energy(t):
         at, rate = q + t[0] * v + t[0] ** 2 / 2 * a, v + t[0] * a
@@ -113,7 +113,7 @@ def test_equations_by_hand_keep_energy():
         return [(body, motions[body.name]) for body in vehicle.bodies]
 
     gained = jacobian(energy, 1, 1e-4)[0, 0]
-    model.acceleration(q, v)  # leaves the motion at (q, v) behind
+    model.acceleration(0.0, q, v)  # leaves the motion at (q, v) behind
     weights = sum(-body.mass * GRAVITY * (m.shift @ v)[2] for body, m in motions_of(vehicle, model.motions))
     given = float(model._forces(np.zeros(2 * len(vehicle.tyres))) @ v) + weights
     assert gained == pytest.approx(given, rel=1e-7)
@@ -160,7 +160,7 @@ def test_road_is_read_at_half_steps(engine):
 def test_design_position_is_an_equilibrium(engine):
     vehicle = of_name("spatial twin", GRAVITY)
     zero = np.zeros(len(vehicle.coordinates()))
-    assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(zero, zero)).max() < 1e-10
+    assert np.abs(build(engine, vehicle, speed=SPEED).acceleration(0.0, zero, zero)).max() < 1e-10
 
 
 def test_no_curve_code_without_curves():
@@ -221,7 +221,7 @@ def test_other_callback_is_not_overruled():
     mujoco.set_mjcb_passive(lambda model, data: None)
     try:
         with pytest.raises(RunFailed, match="another callback"):
-            model.acceleration(np.zeros(2), np.zeros(2))
+            model.acceleration(0.0, np.zeros(2), np.zeros(2))
     finally:
         mujoco.set_mjcb_passive(None)
 
@@ -235,7 +235,7 @@ def test_answers_do_not_depend_on_what_was_asked_before(engine):
     start = random_state(vehicle, 2)
     first = model.run(*start[:2])
     model.linearise()
-    model.acceleration(*start)
+    model.acceleration(0.0, *start)
     assert np.array_equal(model.run(*start[:2]).positions, first.positions)
 
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError, RunFailed
-from models.engines.contact_bridge_mujoco import Marcher
-from models.engines.mujoco_callback import installed
-from models.engines.wheelset_exudyn import ExudynWheelset
-from models.engines.wheelset_mujoco import MujocoWheelset, rail_law
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
+from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail.eigenvalues import growth, wavelength
 from models.rail.equations import Equations
-from models.rail.joint_forces import from_joints, to_joints
+from models.rail.joint_forces import from_joints, joint_forces, to_joints
 from models.rail.limit_cycle import attained, refined, solved
 from models.rail.linear import critical_speed
 from models.rail.wheelset import CHOSEN
@@ -77,10 +77,11 @@ def test_wheels_that_lift_off_come_back_as_in_the_equations(engine):
 
 def test_threads_agree_to_the_last_bit():
     built = MujocoWheelset(CHOSEN, 60.0, cells=11)
-    built.model.opt.timestep = 5e-4
+    model = built.model.model
+    model.opt.timestep = 5e-4
     starts = np.array([to_joints(built.displaced(shift)) for shift in (1e-3, 3e-3, 5e-3)])
-    with installed(rail_law()):
-        one, two = (Marcher(built.model, threads).run(starts, 50) for threads in (1, 2))
+    with installed(kernel_law(joint_forces)):
+        one, two = (Marcher(model, threads).run(starts, 50) for threads in (1, 2))
     assert one.tobytes() == two.tobytes()
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from models.core.errors import InputError
-from models.engines.wheelset_exudyn import ExudynWheelset
-from models.engines.wheelset_mujoco import MujocoWheelset
+from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 from models.rail import equations as eq
 from models.rail import wheel_forces as wf
 from models.rail.energy import ledger

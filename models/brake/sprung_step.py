@@ -132,11 +132,11 @@ def held(numbers, time, q, v, f):
 
 
 @lean
-def fill(block, n, numbers):
-    """``held`` in a block of doubles at an address: f, q and v (n,), of which f is cleared before."""
+def set_held(block, t, n):
+    """``held`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
     f = at(block)
     array(f, (n,))[:] = 0.0
-    forces(numbers, array(beyond(f, n), (n,)), array(beyond(f, 2 * n), (n,)), array(f, (n,)))
+    held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 @lean

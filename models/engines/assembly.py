@@ -1,13 +1,12 @@
 """What engines are given of the pitch-plane vehicle, bodies, struts, input and settings, and what they give: a path."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
 from models.core.assumptions import Assumption
 from models.core.signals import Signal
-from models.core.trajectory import Trajectory
 from models.vehicles import pitch_plane
 from models.vehicles.description import PitchSpring, Vehicle
 
@@ -89,19 +88,3 @@ class Settings:
     def steps(self) -> int:
         """Number of fixed steps that cover the duration."""
         return round(self.duration / self.step)
-
-
-class Model(Protocol):
-    """A vehicle built in one engine."""
-
-    def run(self) -> Trajectory:
-        """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
-        ...
-
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
-        ...
-
-    def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks."""
-        ...

@@ -18,7 +18,7 @@ from models.brake.samples import moved
 from models.brake.surfaces import OnRoad
 from models.engines.free_vehicle import Driven, FreeModel, free_model
 from models.machine.compiled import lean
-from models.machine.stack import array, at, beyond, start
+from models.machine.stack import array, at, beyond
 from models.vehicles.spatial import Body, SpatialVehicle
 
 HEADER, HELD = 2, 6
@@ -66,12 +66,11 @@ def held(numbers, time, q, v, f):
 
 
 @lean
-def fill(block, n, numbers):
-    """``held`` in a block of doubles at an address: f, q and v (n,), of which f is cleared before."""
+def set_held(block, t, n):
+    """``held`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
     f = at(block)
-    force = array(f, (n,))
-    force[:] = 0.0
-    held(start(numbers), 0.0, beyond(f, n), beyond(f, 2 * n), f)
+    array(f, (n,))[:] = 0.0
+    held(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 def bodies(plane: Plane) -> SpatialVehicle:
@@ -98,11 +97,10 @@ class Carried:
     def __init__(self, engine: str, plane: Plane) -> None:
         units, none = plane.masses.size, np.zeros((3, plane.wheels))
         wheels = np.vstack((plane.unit, plane.place.T, none))
-        self.numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
-        self._held = Held(*self.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
-        table = self.numbers
-        driven = Driven(bodies(plane), np.zeros(3), table, held, lambda block, t, n: fill(block, n, table))
+        numbers = np.concatenate(([units, plane.wheels], plane.reach.ravel(), wheels.ravel()))
+        driven = Driven(bodies(plane), np.zeros(3), numbers, held, set_held)
         self._model: FreeModel = free_model(engine, driven)
+        self._held = Held(*self._model.numbers[HEADER + units * units :].reshape(HELD, plane.wheels))
 
     def advance(
         self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
@@ -131,8 +129,6 @@ class Carried:
         """Positions and rates (2, 2 + U) after a step of the engine."""
         own = before.copy()
         own[:, 3:] = np.diff(before[:, 2:], axis=1)
-        if hasattr(self._model, "model"):
-            self._model.model.numeric_data[:] = self.numbers
         after = self._model.march(own[0], own[1], 1, step)[-1].reshape(2, -1)
         after[:, 2:] = np.cumsum(after[:, 2:], axis=1)
         return after

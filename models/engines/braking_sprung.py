@@ -23,11 +23,11 @@ from models.brake.sprung_step import (
     OnEngine,
     advance,
     advance_with,
-    fill,
     held,
     held_forces,
     hold,
     meet,
+    set_held,
 )
 from models.brake.surfaces import OnRoad, surfaces, under_wheels
 from models.core.errors import RunFailed
@@ -72,9 +72,8 @@ class OnSprings:
     @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
-        own, table = self.vehicle.handling, self._table
-        driven = Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table))
-        return free_model(self.engine, driven)
+        own = self.vehicle.handling
+        return free_model(self.engine, Driven(own.vehicle, own.gravity, self._table, held, set_held))
 
     def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called

@@ -139,8 +139,8 @@ class Wheels:
 
 
 @njit(cache=True, error_model="numpy")
-def forces(numbers, q, v, f):
-    """Add the forces (N, N m) on all wheels to ``f``; all four are pointers to doubles.
+def forces(numbers, t, q, v, f):
+    """Add the forces (N, N m) on all wheels to ``f``, for callbacks: all but the time are pointers to doubles.
 
     Not a number where a contact is none that the kernel can answer: the engines stop at that, and say so.
     """
@@ -173,18 +173,18 @@ def forces(numbers, q, v, f):
 @njit(cache=True, error_model="numpy")
 def add_forces(numbers, q, v, f):
     """``forces`` of arrays, for a callback that a Python function makes."""
-    forces(start(numbers), start(q), start(v), start(f))
+    forces(start(numbers), 0.0, start(q), start(v), start(f))
 
 
 @njit(cache=True, error_model="numpy")
-def set_forces(block, size):
+def set_forces(block, t, size):
     """``forces`` in one block of doubles at an address, the least that Python can hand over.
 
     It holds f, q and v (size,) and the numbers; f is cleared before.
     """
     f = at(block)
     array(f, (size,))[:] = 0.0
-    forces(beyond(f, 3 * size), beyond(f, size), beyond(f, 2 * size), f)
+    forces(beyond(f, 3 * size), t, beyond(f, size), beyond(f, 2 * size), f)
 
 
 @njit(cache=True, error_model="numpy")

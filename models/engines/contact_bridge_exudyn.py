@@ -13,13 +13,21 @@ import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
+from models.engines.assembly import Settings
 from models.engines.contact_bridge import FREEDOMS, Wheels, check_step, set_forces, slopes
-from models.engines.exudyn_coordinates import Listed, add_node, compiled_forces, solve
-from models.engines.exudyn_system import items, quiet_settings, start
+from models.engines.exudyn_system import add_node, items, packed_forces, quiet_settings, solve, start
 
 Law = Callable[[Array, Array, Array, Array], Any]
+Listed = Callable[[Any, Any], Any]
+"""Forces of lists of positions and rates, as a list."""
 CONTRACTIVITY, ITERATIONS = 0.99999, 1000
 ROUTES = ("generic object", "loads", "before each step")
+
+
+def listed(size: int, numbers: Array, fill: Callable[[int, float, int], Any]) -> Listed:
+    """``packed_forces`` of a compiled law that knows no time, behind a block with a table of numbers."""
+    packed = packed_forces(size, np.concatenate((np.zeros(3 * size), numbers)), fill)
+    return lambda positions, rates: packed(None, 0.0, 0, positions, rates)
 
 
 class Forces:
@@ -43,7 +51,7 @@ class Forces:
             slopes(sticking, np.array(positions), np.array(rates), by_q, by_v, jacobian)
             return jacobian
 
-        self.of = by_law if law is not None else compiled_forces(size, numbers, set_forces, size)
+        self.of = by_law if law is not None else listed(size, numbers, set_forces)
         self.slopes = moved
 
 
@@ -139,8 +147,8 @@ class Rolling:
         if self._slopes is not None:  # steep slopes converge slowly but surely: keep the matrix, go on for longer
             ti.newton.useModifiedNewton, ti.newton.modifiedNewtonContractivity = True, CONTRACTIVITY
             ti.newton.maxIterations = ITERATIONS
-        done = solve(self.mbs, options, steps, step, solver)
+        note = solve(self.mbs, Settings(solver, step, steps * step), options)
         state = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
-        if not done or not np.isfinite(state).all():
-            raise RunFailed("exudyn", "the engine gave up")
+        if note or not np.isfinite(state).all():
+            raise RunFailed("exudyn", f"the engine gave up{note}")
         return state

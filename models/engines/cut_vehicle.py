@@ -54,12 +54,16 @@ class Written(FreeModel):
     ENGINE = "reference"
 
     def __init__(self, driven: Driven) -> None:
-        self.driven = driven
+        self.driven, self.size, self.settings = driven, driven.size, None
 
-    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def plan(self) -> dict[str, int]:
+        """What was built: equations alone."""
+        return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
+
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) from the mass matrix of ``models.multibody.cut_mechanics``."""
         rates = np.empty(len(q))
-        accelerate(self.numbers, t, np.ascontiguousarray(q), np.ascontiguousarray(v), rates)
+        accelerate(self.numbers, time, np.ascontiguousarray(q), np.ascontiguousarray(v), rates)
         return rates
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
@@ -104,10 +108,10 @@ class HubModel:
 
     def _in_engine(self, driven: Driven) -> FreeModel:
         if self.plain:
-            return Plain(self.engine, self.plain.acceleration)
+            return Plain(self.engine, self.plain.acceleration, self.size)
         return Written(driven) if self.engine == "reference" else free_model(self.engine, driven)
 
-    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), coordinates and rates (n,)."""
         return self.model.acceleration(time, q, v)
 
@@ -115,10 +119,14 @@ class HubModel:
         """Coordinates and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where it stops."""
         return self.model.march(q, v, self.steps, self.step)
 
-    def run(self, start: np.ndarray | None = None) -> HubRun:
-        """March from coordinates and rates (2 n,), or from rest; RunFailed unless the vehicle stays upright."""
-        first = np.zeros(2 * self.size) if start is None else start
-        states = self.marched(*np.split(first, 2))
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        return self.model.plan()
+
+    def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> HubRun:
+        """March from coordinates and rates (n,), or from rest; RunFailed unless the vehicle stays upright."""
+        rest = np.zeros(self.size)
+        states = self.marched(rest if q is None else q, rest if v is None else v)
         times = self.step * np.arange(len(states))
         guard(self.engine, times, states, self.steps * self.step)
         tumbled = np.abs(states[:, PITCH]) > UPRIGHT

@@ -10,20 +10,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as typed_items
 import numpy as np
 
 from models.core.trajectory import Trajectory
-from models.core.waiting import marching
 from models.engines.assembly import Assembly, Settings
-from models.engines.catalogue import CATALOGUE
 from models.engines.exudyn_clock import Clock
+from models.engines.exudyn_system import KINDS, counted, items, march_settings, mass_and_force, recorders, solve, start
 from models.engines.protocol import balanced, guard, landings_followed
 from models.vehicles.description import PitchSpring, Point, Strut, Vehicle, matrices
 
-exu.config.printToConsole = False
-items: Any = typed_items
-"""Its type hints do not know that a function is a user function."""
 Reader = Callable[[Any, float, float], float]
 """What Exudyn asks at a stage's time: (system, s, constant load) -> value."""
 
@@ -198,10 +193,10 @@ def _load(built: Build, place: tuple[str, str], function: Any) -> None:
 
 def _body_fixed(built: Build, wheel: str, x: float, force: Reader) -> None:
     """A force along the chassis' vertical axis: f cos on the wheel, f x sin^2 on the chassis."""
-    node, coordinates = built.nodes["chassis"], exu.OutputVariableType.Coordinates
+    node = built.nodes["chassis"]
 
     def pitch(mbs: Any) -> float:
-        return mbs.GetNodeOutput(node, coordinates)[2]
+        return mbs.GetNodeOutput(node, KINDS.Coordinates)[2]
 
     _load(built, (wheel, "z"), lambda mbs, t, load: -force(mbs, t, load) * np.cos(pitch(mbs)))
     _load(built, ("chassis", "pitch"), lambda mbs, t, load: x * force(mbs, t, load) * np.sin(pitch(mbs)) ** 2)
@@ -247,30 +242,24 @@ class ExudynModel:
         self.constraints = _prescribe(self.built, assembly, settings)
         p = assembly.parameters
         self._inertia = np.array([p.m1, p.m2, p.m3, p.I])[list(assembly.guided)]
-        kinds, kept = exu.OutputVariableType, {"storeInternal": True, "writeToFile": False}
-        mbs, nodes = self.built.mbs, self.built.nodes.values()
-        self._sensors = [
-            [mbs.AddSensor(items.SensorNode(nodeNumber=node, outputVariableType=kind, **kept)) for node in nodes]
-            for kind in (kinds.Coordinates, kinds.Coordinates_t)
-        ]
+        mbs, kept = self.built.mbs, {"storeInternal": True, "writeToFile": False}
+        self._sensors = recorders(mbs, self.built.nodes.values())
         self._multipliers = [
-            mbs.AddSensor(items.SensorObject(objectNumber=constraint, outputVariableType=kinds.Force, **kept))
+            mbs.AddSensor(items.SensorObject(objectNumber=constraint, outputVariableType=KINDS.Force, **kept))
             for constraint in self.constraints
         ]
         mbs.Assemble()
         self._columns = columns(self.built, assembly.vehicle)
-        self._set_state(assembly.initial)
+        self._set_state(*np.split(assembly.initial, 2))
 
-    def _set_state(self, state: np.ndarray) -> None:
-        data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
-        q, v = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-        q[self._columns], v[self._columns] = state[:4], state[4:]
-        data.SetODE2Coordinates(q, initial)
-        data.SetODE2Coordinates_t(v, initial)
+    def _set_state(self, q: np.ndarray, v: np.ndarray) -> None:
+        whole = np.zeros((2, self.built.mbs.systemData.ODE2Size()))
+        whole[:, self._columns] = q, v
+        start(self.built.mbs, *whole)
 
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,), from Exudyn's own residual and mass matrix."""
-        found = self._free_acceleration(time, state)
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
+        found = self._free_acceleration(time, q, v)
         found[list(self.assembly.guided)] = self._wanted(time)
         return found
 
@@ -279,23 +268,14 @@ class ExudynModel:
         signal, count = self.assembly.input, len(self.assembly.guided)
         return np.empty(0) if not count or signal is None else signal.at(time)[-count:]
 
-    def _free_acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+    def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The same with nothing enforced on prescribed coordinates."""
-        self._set_state(state)
+        self._set_state(q, v)
         if self.assembly.input is not None:
             self.clock.step = min(int(time / self.settings.step + 1e-6), self.settings.steps - 1)
-        solver: Any = exu.MainSolverImplicitSecondOrder()
-        options = self._options()
-        options.timeIntegration.startTime = time
-        solver.InitializeSolver(self.built.mbs, options)
-        solver.ComputeMassMatrix(self.built.mbs)
-        solver.ComputeODE2RHS(self.built.mbs)
-        count = solver.GetODE2size()
-        mass = np.asarray(solver.GetSystemMassMatrix(), dtype=float)[:count, :count]
-        residual = np.asarray(solver.GetSystemResidual(), dtype=float)[:count]
-        solver.FinalizeSolver(self.built.mbs, options)
-        self._set_state(self.assembly.initial)
-        return np.linalg.solve(mass, residual)[self._columns]
+        mass_force = mass_and_force(self.built.mbs, time)
+        self._set_state(*np.split(self.assembly.initial, 2))
+        return np.linalg.solve(*mass_force)[self._columns]
 
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks."""
@@ -306,39 +286,14 @@ class ExudynModel:
             "callbacks": self.built.callbacks,
         }
 
-    def _options(self) -> Any:
-        """Exudyn's settings for this run; nothing is written to files."""
-        own, options = self.settings, exu.SimulationSettings()
-        options.solution.file.write = False
-        options.solution.sensors.active = True
-        options.solution.sensors.writePeriod = own.step
-        ti = options.timeIntegration
-        ti.numberOfSteps, ti.endTime, ti.verboseMode = own.steps, own.duration, 0
-        ti.adaptiveStep = False
-        ti.automaticStepSize = CATALOGUE["exudyn"][own.integrator].adaptive
-        ti.relativeTolerance, ti.absoluteTolerance = own.tolerance, own.tolerance * 1e-2
-        ti.generalizedAlpha.spectralRadius = own.spectral_radius
-        ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
-        ti.explicit.computeEndOfStepAccelerations = False
-        return options
-
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
-        options = self._options()
+        options = march_settings(self.settings)
         if self.assembly.input is not None:
             self.clock.step = 0  # a run before this one has left it at its own last sample
         if self.constraints:
             self._consistent_start(options)
-        note = ""
-        try:
-            solver = getattr(exu.DynamicSolverType, self.settings.integrator)
-            with marching(lambda: self.built.mbs.systemData.GetTime() / self.settings.duration):
-                done = self.built.mbs.SolveDynamic(options, solverType=solver)
-            note = "" if done else "; the solver reported failure"
-        except (exu.ExudynError, RuntimeError, ValueError) as error:
-            if "KeyboardInterrupt" in str(error):
-                raise KeyboardInterrupt from error
-            note = f"; the solver stopped: {str(error).strip().splitlines()[0]}"
+        note = solve(self.built.mbs, self.settings, options)
         times, states = self._recorded()
         enforced = self._enforced()
         guard("exudyn", times, states, self.settings.duration, note, enforced)
@@ -350,7 +305,10 @@ class ExudynModel:
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the prescribed coordinates take at one row of a run, and their inertia terms (N, N m)."""
-        wanted, free = self._wanted(time), self._free_acceleration(time, state)[list(self.assembly.guided)]
+        wanted, free = (
+            self._wanted(time),
+            self._free_acceleration(time, *np.split(state, 2))[list(self.assembly.guided)],
+        )
         return self._inertia * (wanted - free), self._inertia * wanted
 
     def _consistent_start(self, options: Any) -> None:
@@ -362,7 +320,7 @@ class ExudynModel:
         self._first = self._balance(0.0, self.assembly.initial)[0]
         data, initial = self.built.mbs.systemData, exu.ConfigurationType.Initial
         all_of_them = np.zeros(data.ODE2Size())
-        all_of_them[self._columns] = self.acceleration(0.0, self.assembly.initial)
+        all_of_them[self._columns] = self.acceleration(0.0, *np.split(self.assembly.initial, 2))
         data.SetODE2Coordinates_tt(all_of_them, initial)
         options.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
         options.timeIntegration.generalizedAlpha.resetAccelerations = False
@@ -390,16 +348,6 @@ class ExudynModel:
         enforced = -np.column_stack([read(sensor)[:, 1] for sensor in self._multipliers])
         enforced[0] = self._first
         return enforced
-
-
-def counted(mbs: Any) -> dict[str, int]:
-    """Steps, evaluations of the forces and Jacobians of a system's last run, from the solver's own counters."""
-    solver = mbs.sys["dynamicSolver"]
-    steps = solver.it.currentStepIndex - 1
-    tried = steps + solver.it.rejectedAutomaticStepSizeSteps
-    explicit = hasattr(solver, "GetNumberOfStages")
-    calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
-    return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
 
 
 def build(assembly: Assembly, settings: Settings) -> ExudynModel:

@@ -1,20 +1,52 @@
-"""What models in Exudyn share: items, states, mass matrix and residual, and the march by one of its solvers."""
+"""What models in Exudyn share: items, states, mass matrix and residual, packed forces, and marches by its solvers."""
 
-from collections.abc import Collection
+import struct
+from collections.abc import Callable, Collection
 from typing import Any
 
 import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
+from models.core.errors import RunFailed
 from models.core.waiting import marching
 from models.engines.assembly import Settings
+from models.engines.catalogue import CATALOGUE
 
 exu.config.printToConsole = False
 KINDS = exu.OutputVariableType
 lists: Any = exu
 items: Any = typed_items
 """Exudyn's type hints know neither how its lists are made nor that a function is a user function."""
+UserFunction = Callable[[Any, float, int, Any, Any], Any]
+"""Forces as Exudyn asks for them: of system, time (s), item, lists of positions and of rates, as a list."""
+
+
+def packed_forces(size: int, block: np.ndarray, fill: Callable[[int, float, int], Any]) -> UserFunction:
+    """``fill(address, time, size)`` of a block of doubles: forces, positions, rates (size,), then a table.
+
+    Exudyn calls Python and nothing else, and hands a user function lists: to pack both into one block, to let a
+    compiled kernel work on its address and to return a list costs least.
+    """
+    pack, raw = struct.Struct(f"{2 * size}d").pack_into, block.data.cast("B")[8 * size :]
+    answer, address = block[:size].data.tolist, block.ctypes.data
+
+    def forces(mbs: Any, time: float, item: int, positions: Any, rates: Any) -> Any:
+        pack(raw, 0, *positions, *rates)
+        fill(address, time, size)
+        return answer()
+
+    return forces
+
+
+def add_node(mbs: Any, size: int) -> Any:
+    """A node of so many coordinates, all zero."""
+    zero = [0.0] * size
+    return mbs.AddNode(
+        items.NodeGenericODE2(
+            numberOfODE2Coordinates=size, referenceCoordinates=zero, initialCoordinates=zero, initialCoordinates_t=zero
+        )
+    )
 
 
 def quiet_settings() -> Any:
@@ -45,27 +77,38 @@ def start(mbs: Any, q: np.ndarray, v: np.ndarray) -> None:
 
 
 def mass_and_force(mbs: Any, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Exudyn's own mass matrix (n, n) and residual (n,) at its initial state and a time (s)."""
+    """Exudyn's own mass matrix (n, n) and residual (n,) at its initial state and a time (s), without multipliers."""
     solver: Any = exu.MainSolverImplicitSecondOrder()
     options = quiet_settings()
     options.timeIntegration.startTime = time
     solver.InitializeSolver(mbs, options)
     solver.ComputeMassMatrix(mbs)
     solver.ComputeODE2RHS(mbs)
-    mass, force = np.array(solver.GetSystemMassMatrix(), float), np.array(solver.GetSystemResidual(), float)
+    n = solver.GetODE2size()
+    mass, force = np.array(solver.GetSystemMassMatrix(), float)[:n, :n], np.array(solver.GetSystemResidual(), float)[:n]
     solver.FinalizeSolver(mbs, options)
     return mass, force
 
 
-def solve(mbs: Any, settings: Settings) -> str:
-    """March by fixed steps, all of which the sensors store; a phrase on what the solver reported, empty if nothing."""
+def march_settings(settings: Settings) -> Any:
+    """Exudyn's settings of a march all of whose steps the sensors store."""
     options = quiet_settings()
     options.solution.sensors.active, options.solution.sensors.writePeriod = True, settings.step
     ti = options.timeIntegration
-    ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
-    ti.adaptiveStep = ti.automaticStepSize = ti.explicit.computeEndOfStepAccelerations = False
+    ti.automaticStepSize = CATALOGUE["exudyn"][settings.integrator].adaptive
+    ti.relativeTolerance, ti.absoluteTolerance = settings.tolerance, settings.tolerance * 1e-2
     ti.generalizedAlpha.spectralRadius = settings.spectral_radius
     ti.newton.relativeTolerance, ti.newton.absoluteTolerance = 1e-8, 1e-10
+    return options
+
+
+def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
+    """March by an integrator, with Exudyn's ``options`` or those of ``march_settings``; a phrase on what the solver
+    reported, empty if nothing."""
+    options = options or march_settings(settings)
+    ti = options.timeIntegration
+    ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
+    ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
     try:
         with marching(lambda: mbs.systemData.GetTime() / settings.duration):
             done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, settings.integrator))
@@ -74,3 +117,19 @@ def solve(mbs: Any, settings: Settings) -> str:
             raise KeyboardInterrupt from error
         return f"; the solver stopped: {str(error).strip().splitlines()[0]}"
     return "" if done else "; the solver reported failure"
+
+
+def counted(mbs: Any) -> dict[str, int]:
+    """Steps, evaluations of the forces and Jacobians of a system's last run, from the solver's own counters."""
+    solver = mbs.sys["dynamicSolver"]
+    steps = solver.it.currentStepIndex - 1
+    tried = steps + solver.it.rejectedAutomaticStepSizeSteps
+    explicit = hasattr(solver, "GetNumberOfStages")
+    calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
+    return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
+
+
+def solve_or_fail(mbs: Any, settings: Settings, options: Any = None) -> None:
+    """``solve``; RunFailed where the solver stops or reports failure."""
+    if note := solve(mbs, settings, options):
+        raise RunFailed("exudyn", note.lstrip("; "))

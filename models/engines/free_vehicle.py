@@ -17,8 +17,9 @@ import numpy as np
 
 from models.core.errors import InputError
 from models.core.trajectory import Trajectory
-from models.engines.native_parts import NativePart
-from models.engines.protocol import guard
+from models.engines.assembly import Settings
+from models.engines.native_parts import GroundSpring, NativePart
+from models.engines.protocol import guard, timed
 from models.vehicles.spatial import SpatialVehicle
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class Driven:
 
     numbers : table of doubles that the kernel reads; kernel : compiled function that adds to the forces; block :
     compiled function of (address, time, n) that clears and fills the forces of a block f, q, v (n,) and numbers;
-    parts : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
+    parts, ground_springs : springs, dampers, mounts and bars that the engine has as its own beside the kernel's forces.
     """
 
     vehicle: SpatialVehicle
@@ -42,6 +43,7 @@ class Driven:
     kernel: Any
     block: Any
     parts: tuple[NativePart, ...] = ()
+    ground_springs: tuple[GroundSpring, ...] = ()
 
     @property
     def size(self) -> int:
@@ -50,11 +52,13 @@ class Driven:
 
 
 class FreeModel(ABC):
-    """A free vehicle built in one engine."""
+    """A free vehicle built in one engine; ``settings`` are those of ``run``."""
 
     ENGINE: ClassVar[str]
 
     driven: Driven
+    size: int
+    settings: Settings | None
     step: float
 
     @property
@@ -73,17 +77,26 @@ class FreeModel(ABC):
         return None
 
     @abstractmethod
-    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), positions and rates (n,)."""
+
+    @abstractmethod
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
 
     @abstractmethod
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; RunFailed where the engine stops."""
 
-    def run(self, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> Trajectory:
-        """March from positions and rates (n,); states at every step. RunFailed unless all of it is finite and sane."""
-        steps = round(duration / step)
-        states, times = self.march(q, v, steps, step), step * np.arange(steps + 1)
+    def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
+        """March from positions and rates (n,), or from rest in the design position; states at every step.
+
+        RunFailed unless all of it is finite and sane.
+        """
+        settings, rest = timed(self.ENGINE, self.settings), np.zeros(self.size)
+        steps, step = settings.steps, settings.step
+        states = self.march(rest if q is None else q, rest if v is None else v, steps, step)
+        times = step * np.arange(steps + 1)
         guard(self.ENGINE, times, states, steps * step)
         return Trajectory(times, states, counts={"steps": steps, "force calls": 4 * steps})
 
@@ -91,13 +104,17 @@ class FreeModel(ABC):
 class Plain(FreeModel):
     """The independent reference: plain equations of a vehicle, marched in plain numpy; it has no table."""
 
-    def __init__(self, engine: str, equations: "Acceleration") -> None:
+    def __init__(self, engine: str, equations: "Acceleration", size: int, settings: Settings | None = None) -> None:
         """equations : accelerations (n,) at a time (s), positions and rates (n,); engine : what a run is called."""
-        self.ENGINE, self.equations = engine, equations  # type: ignore[misc]
+        self.ENGINE, self.equations, self.size, self.settings = engine, equations, size, settings  # type: ignore[misc]
 
-    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) at a time (s), positions and rates (n,)."""
-        return self.equations(t, q, v)
+        return self.equations(time, q, v)
+
+    def plan(self) -> dict[str, int]:
+        """What was built: equations alone."""
+        return {"degrees of freedom": self.size, "native items": 0, "callbacks": 0}
 
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) from those at the start, (n,) each; not finite from where it fails."""
@@ -106,11 +123,11 @@ class Plain(FreeModel):
         return march(self.equations, q, v, steps, step)
 
 
-def free_model(engine: str, driven: Driven) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco"."""
+def free_model(engine: str, driven: Driven, settings: Settings | None = None) -> FreeModel:
+    """The vehicle in "exudyn" or "mujoco"; settings : wanted for runs, not for single steps."""
     if engine not in ENGINES:
         raise InputError("", "engine", engine, "no such engine", ENGINES)
-    model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven)
+    model: FreeModel = getattr(_module(engine), f"Free{engine.capitalize()}")(driven, settings)
     return model
 
 

@@ -2,41 +2,21 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
-from typing import Any
 
 import mujoco
 import numpy as np
-from numba import cfunc
 
 from models.core.errors import RunFailed
-from models.engines.contact_bridge_mujoco import Marcher
+from models.engines.assembly import Settings
 from models.engines.free_vehicle import Driven, FreeModel
-from models.engines.mujoco_callback import CALLBACK, installed
-from models.engines.mujoco_layout import check, offsets
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_layout import check
+from models.engines.mujoco_march import Marcher
 from models.engines.mujoco_native import Native, native
+from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
-from models.engines.native_mujoco import add_parts, built_elements, ends, set_laws
-from models.machine.stack import array_at, double_at
+from models.engines.native_mujoco import add_ground_spring, add_parts, built_elements, ends, set_laws
 from models.vehicles.spatial import SpatialVehicle
-
-
-@cache
-def timed_law(kernel: Any) -> Any:
-    """Compiled callback: a shell about a compiled kernel of (numbers, time, positions, rates, forces)."""
-    numbers, time, position, rate, force = offsets("numeric_data", "time", "qpos", "qvel", "qfrc_passive")
-
-    @cfunc(CALLBACK)
-    def law(model, data):
-        kernel(
-            array_at(model, numbers),
-            double_at(data, time)[0],
-            array_at(data, position),
-            array_at(data, rate),
-            array_at(data, force),
-        )
-
-    return law
 
 
 def carriers(vehicle: SpatialVehicle) -> dict[str, str]:
@@ -61,6 +41,8 @@ def specified(driven: Driven) -> mujoco.MjSpec:
     """Bodies, joints, springs and room for the callback's numbers, which ``compiled`` fills."""
     spec = spec_of(driven.vehicle, 1e-3, _merged(driven))
     add_parts(spec, driven.vehicle, driven.parts)
+    for spring in driven.ground_springs:
+        add_ground_spring(spec, driven.vehicle, spring)
     spec.option.gravity = driven.gravity
     spec.add_numeric(name="vehicle", size=driven.numbers.size, data=[0.0])
     return spec
@@ -99,10 +81,11 @@ class FreeMujoco(FreeModel):
 
     ENGINE = "mujoco"
 
-    def __init__(self, driven: Driven) -> None:
-        self.driven, self.model = driven, compiled_model(driven)
+    def __init__(self, driven: Driven, settings: Settings | None = None) -> None:
+        self.driven, self.size, self.settings = driven, driven.size, settings
+        self.model = compiled_model(driven)
         self.data = mujoco.MjData(self.model)
-        self.law = timed_law(driven.kernel)
+        self.law = kernel_law(driven.kernel)
         self._marcher = Marcher(self.model)
         check(self.model, self.data)
 
@@ -122,9 +105,15 @@ class FreeMujoco(FreeModel):
         """MuJoCo's own functions and arrays."""
         return native(self.model, self.data)
 
-    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        m = self.model
+        native = m.nbody - 1 + m.njnt + m.ntendon + m.nu
+        return {"degrees of freedom": m.nv, "native items": native, "callbacks": 1}
+
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by ``mj_forward``."""
-        self.data.time, self.data.qpos[:], self.data.qvel[:] = t, q, v
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q, v
         with installed(self.law):
             mujoco.mj_forward(self.model, self.data)
         return self.data.qacc.copy()

@@ -8,19 +8,17 @@ without that joint, and inverse dynamics of the full one for the moment.
 """
 
 from collections.abc import Collection
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import rollout
 
 from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
-from models.core.waiting import marching
 from models.engines.assembly import Assembly, Settings
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_march import FORCE_CALLS, march
+from models.engines.mujoco_quiet import installed
 from models.engines.protocol import guard, landings_followed
 from models.vehicles.description import Strut, Vehicle
 
@@ -31,9 +29,6 @@ INTEGRATORS = {
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
     "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
-STAGES = {"RK4": 4}
-CHUNK = 4096
-"""Steps between two looks at the guard."""
 
 
 def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] = ()) -> mujoco.MjSpec:
@@ -223,75 +218,39 @@ class MujocoModel:
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""
         n = self.settings.steps
-        states = np.empty((n + 1, 8))
-        states[0] = self.assembly.initial
-        with self.callback(), quiet(), marching(lambda: self.data.time / self.settings.duration):
-            self._advance(states, [*self.free, *(4 + i for i in self.free)])
+        states, free = np.empty((n + 1, 8)), [*self.free, *(4 + i for i in self.free)]
+        with installed(self.drive.law):
+            states[:, free] = march(self.model, self.data, self.assembly.initial[free], self.controls())
         times = self.settings.step * np.arange(n + 1)
         if self.guided:
             inputs = self.signal.sample(0.0, self.settings.step, n + 1)
             states[:, [*self.guided, *(4 + i for i in self.guided)]] = inputs[:, 2 : 2 + 2 * len(self.guided)]
-        guard("mujoco", times, states, self.settings.duration, self.warnings())
+        guard("mujoco", times, states, self.settings.duration)
         landings_followed("mujoco", self.assembly, self.settings, times, states)
         enforced = self._enforced(times, states) if self.guided else None
         guard("mujoco", times, states, self.settings.duration, enforced=enforced)
-        calls = n * STAGES.get(self.settings.integrator, 1)
+        calls = n * FORCE_CALLS.get(self.settings.integrator, 1)
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
-    def _advance(self, states: np.ndarray, free: list[int]) -> None:
-        """March in chunks, so that a run that has failed is not carried to its end."""
-        n, size = self.settings.steps, self.model.nq + self.model.nv + 1
-        state = np.concatenate(([0.0], states[0, free]))
-        for first in range(0, n, CHUNK):
-            count = min(CHUNK, n - first)
-            controls = None if self.drive.controls is None else self.padded(self.drive.controls[first : first + count])
-            path, _ = rollout.rollout(self.model, self.data, state[None, :], control=controls, nstep=count)
-            path = path[0, :, :size]
-            states[first + 1 : first + 1 + count, free] = path[:, 1:]
-            expected = self.settings.step * (first + 1 + np.arange(count))
-            late = np.abs(path[:, 0] - expected) > 1e-6 * self.settings.step * n
-            if late.any() or self.warnings():
-                self._fail(states, first + int(np.argmax(late)) if late.any() else first + count)
-            state = path[-1]
-
-    def _fail(self, states: np.ndarray, last: int) -> None:
-        """Raise for a run that MuJoCo stopped or reset; the guard names a worse reason if there is one."""
-        guard("mujoco", self.settings.step * np.arange(last + 1), states[: last + 1], last * self.settings.step)
-        raise RunFailed("mujoco", f"the engine gave up{self.warnings()}", last * self.settings.step, states[last])
-
-    def padded(self, controls: np.ndarray) -> np.ndarray:
-        """Controls of all actuators: springs take none, the wheels' motors come last."""
-        padded = np.zeros((1, len(controls), self.model.nu))
-        padded[0, :, self.model.nu - 2 :] = controls
+    def controls(self) -> np.ndarray:
+        """Controls (steps, nu) of all actuators: springs take none, the wheels' motors come last."""
+        padded = np.zeros((self.settings.steps, self.model.nu))
+        if self.drive.controls is not None:
+            padded[:, self.model.nu - 2 :] = self.drive.controls
         return padded
 
-    def warnings(self) -> str:
-        """What MuJoCo itself noticed, as a phrase; empty if nothing."""
-        found = [mujoco.mjtWarning(i).name for i in range(len(self.data.warning)) if self.data.warning[i].number]
-        return f"; MuJoCo warned {', '.join(found)}" if found else ""
-
-    def callback(self):
-        """Context in which the model's law is installed; refused where another callback is."""
-        if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
-            raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
-        if self.drive.law is None:
-            return nullcontext()
-        from models.engines.mujoco_callback import installed
-
-        return installed(self.drive.law)
-
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
         out = np.empty(4)
-        with self.callback():
-            out[self.free] = self._free_acceleration(time, state, round(time / self.settings.step))
+        with installed(self.drive.law):
+            out[self.free] = self._free_acceleration(time, q, v, round(time / self.settings.step))
         if self.guided:
             out[self.guided] = self.signal.at(time)[-len(self.guided) :]
         return out
 
-    def _free_acceleration(self, time: float, state: np.ndarray, step: int) -> np.ndarray:
+    def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
         """Of the coordinates that are not prescribed, within a step of the run."""
-        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, state[:4][self.free], state[4:][self.free]
+        self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]
         mujoco.mj_forward(self.model, self.data)
@@ -305,9 +264,9 @@ class MujocoModel:
         full = _compiled(self.assembly, self.settings, Drive())
         data, enforced = mujoco.MjData(full), np.empty((len(times), len(self.guided)))
         accelerations = np.empty((len(times), 4))
-        with self.callback():
+        with installed(self.drive.law):
             for i, time in enumerate(times):
-                accelerations[i, self.free] = self._free_acceleration(time, states[i], i)
+                accelerations[i, self.free] = self._free_acceleration(time, states[i, :4], states[i, 4:], i)
         signal = self.signal.sample(0.0, self.settings.step, len(times))
         accelerations[:, self.guided] = signal[:, -len(self.guided) :]
         for i, state in enumerate(states):

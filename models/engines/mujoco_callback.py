@@ -1,25 +1,22 @@
-"""Compiled MuJoCo callbacks: input tables added to the passive forces at every stage of a step.
+"""Compiled MuJoCo callbacks, which add to the passive forces at every stage of a step.
 
-The table lives in the model's own numeric data, behind a header: rows per second, columns, rows, place of
-the wheels' motors among the controls (-1: no held forces), the two wheels' arms, and how many numbers of
-pitch springs with a dead band follow (stiffness, damping and band of each); of tyres that only push stiffness and
-damping come behind those, and the table is their road. So one compiled function serves
-every model in the process, adds nothing to a model without a table, survives copies of the model, and holds
-no address that could go stale in numba's cache.
+``kernel_law`` is that of every system whose forces are one compiled kernel. The others are those of the pitch plane,
+where the engine has all but an input table and what goes slack. The table lives in the model's own numeric data, behind
+a header: rows per second, columns, rows, place of the wheels' motors among the controls (-1: no held forces), the two
+wheels' arms, and how many numbers of pitch springs with a dead band follow (stiffness, damping and band of each); of
+tyres that only push stiffness and damping come behind those, and the table is their road. So one compiled function
+serves every model in the process, adds nothing to a model without a table, survives copies of the model, and holds no
+address that could go stale in numba's cache.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-import mujoco
 import numpy as np
 from numba import cfunc, types
 from numba.extending import register_jitable
 
 from models.engines.mujoco_layout import offsets
-from models.engines.mujoco_quiet import quiet
 from models.machine.stack import array_at, double_at
 
 HEADER, PER_ROAD = 7, 4
@@ -27,6 +24,27 @@ HEADER, PER_ROAD = 7, 4
 CALLBACK = types.void(types.voidptr, types.voidptr)
 """Signature of MuJoCo's callbacks: bare pointers to model and data."""
 FIELDS = ("numeric_data", "qfrc_passive", "time", "qpos", "qvel")
+
+
+@cache
+def kernel_law(kernel: Any) -> Any:
+    """Callback: a shell about a compiled kernel of (numbers, time, positions, rates, forces).
+
+    All but the time (s) are pointers to doubles, the numbers those of the model.
+    """
+    numbers, passive, time, position, rate = offsets(*FIELDS)
+
+    @cfunc(CALLBACK)
+    def law(model, data):
+        kernel(
+            array_at(model, numbers),
+            double_at(data, time)[0],
+            array_at(data, position),
+            array_at(data, rate),
+            array_at(data, passive),
+        )
+
+    return law
 
 
 @register_jitable
@@ -107,22 +125,3 @@ def body_fixed_law() -> Any:
         _springs(numbers, force, pitch, array_at(data, velocity))
 
     return law
-
-
-@contextmanager
-def installed(law) -> Iterator[None]:
-    """Install a compiled callback for the block only: MuJoCo's callbacks are global to the process.
-
-    Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it.
-    """
-    if law is None:
-        yield
-        return
-    if mujoco.get_mjcb_passive() is not None:
-        raise RuntimeError("another MuJoCo callback is installed in this process")
-    mujoco.set_mjcb_passive(law.ctypes)
-    try:
-        with quiet():
-            yield
-    finally:
-        mujoco.set_mjcb_passive(None)

@@ -1,9 +1,12 @@
-"""MuJoCo without its own words: what it warns of is told by the guard of every run."""
+"""What is global to a process that runs MuJoCo: its callbacks, and its own words on what it warns of."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import mujoco
+
+from models.core.errors import RunFailed
 
 
 @contextmanager
@@ -15,3 +18,22 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@contextmanager
+def installed(law: Any) -> Iterator[None]:
+    """Install a compiled callback, or none, for the block only: MuJoCo's callbacks are global to the process.
+
+    Meanwhile MuJoCo is quiet: what it would warn of is raised by whoever runs it. RunFailed where another one is.
+    """
+    if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
+        raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
+    if law is None:
+        yield
+        return
+    mujoco.set_mjcb_passive(law.ctypes)
+    try:
+        with quiet():
+            yield
+    finally:
+        mujoco.set_mjcb_passive(None)

@@ -16,7 +16,7 @@ import numpy as np
 
 from models.engines.exudyn_system import items, lists
 from models.engines.exudyn_tree import JOINTS, Build
-from models.engines.native_parts import AxialTravel, CoordinateTravel, NativePart
+from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, NativePart
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.free_vehicle import anchor, joints
 
@@ -37,6 +37,15 @@ def add_parts(built: Build, node: Any, parts: Sequence[NativePart]) -> None:
             axial.append((part.element, part.travel))
     for group in _at_one_place(axial):
         trees.add(group)
+
+
+def add_ground_spring(built: Build, spring: GroundSpring) -> None:
+    """A connector along the axes of space, and a load."""
+    foot, tip = built.marker(None, spring.anchor), built.marker(spring.body, spring.point)
+    if any(spring.stiffness + spring.damping):
+        built.spring(foot, tip, stiffness=spring.stiffness, damping=spring.damping)
+    if np.any(spring.load):
+        built.mbs.AddLoad(items.LoadForceVector(markerNumber=tip, loadVector=spring.load))
 
 
 def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:

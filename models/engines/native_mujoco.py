@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.engines.native_parts import AxialTravel, CoordinateTravel, NativePart
+from models.engines.native_parts import AxialTravel, CoordinateTravel, GroundSpring, NativePart
 from models.vehicles.cut_vehicle import Element
 from models.vehicles.spatial import Curve, SpatialVehicle
 
@@ -60,6 +60,19 @@ def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[Nati
         for k, _ in enumerate(affine_forces(part)):
             actuator = spec.add_actuator(name=f"{i}.{k}{BREAK}{part.element.name}", **of)
             actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+
+
+def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
+    """An actuator along each axis of space on which something acts, between sites on the body and on the ground."""
+    number, name = len(spec.actuators), [body.name for body in vehicle.bodies].index(spring.body)
+    tip, foot = f"ground spring {number}", f"ground {number}"
+    spec.body(str(name)).add_site(name=tip, pos=np.subtract(spring.point, vehicle.body(spring.body).position))
+    spec.worldbody.add_site(name=foot, pos=spring.anchor)
+    for i, load in enumerate(spring.load):
+        if spring.stiffness[i] or spring.damping[i] or load:
+            strut = spec.add_actuator(trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip, refsite=foot)
+            strut.gear[:], strut.gainprm[0], strut.biastype = np.eye(6)[i], 0.0, mujoco.mjtBias.mjBIAS_AFFINE
+            strut.biasprm[:3] = load, -spring.stiffness[i], -spring.damping[i]
 
 
 def set_laws(model: mujoco.MjModel, parts: Sequence[NativePart]) -> None:

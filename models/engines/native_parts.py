@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from models.vehicles.cut_vehicle import CutVehicle, Element
-from models.vehicles.spatial import FREEDOMS, SpatialVehicle
+from models.vehicles.spatial import FREEDOMS, SpatialVehicle, Vector
 
 CURVES = ("mujoco",)
 """Engines whose own elements can have a force that is piecewise linear in travel or rate."""
@@ -56,6 +56,22 @@ class NativePart:
 
     element: Element
     travel: CoordinateTravel | AxialTravel
+
+
+@dataclass(frozen=True)
+class GroundSpring:
+    """Springs and dampers from the ground to a point of a body along the axes of space, and a load on that point.
+
+    point, anchor : places (m) of the body's point and of the ground's in the design position; stiffness (N/m), damping
+    (N s/m), load (N) : along x, y, z; what is 0 is not built.
+    """
+
+    body: str
+    point: Vector
+    anchor: Vector
+    stiffness: Vector
+    damping: Vector
+    load: np.ndarray
 
 
 @dataclass(frozen=True)

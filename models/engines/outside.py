@@ -31,8 +31,9 @@ from scipy.interpolate import CubicSpline
 from models.core.errors import InputError, RunFailed
 from models.core.trajectory import Trajectory
 from models.engines import protocol
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE, RECOMMENDED, Integrator
+from models.engines.model import Model
 from models.engines.protocol import guard
 from models.engines.reference import Reference, derivative_of
 
@@ -184,9 +185,9 @@ class Guarded:
         guard(self.name, times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, dict(getattr(found, "counts", {})))
 
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) at a state (8,)."""
-        found = _asked(self.name, "acceleration", self.model.acceleration, time, state)
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) at a time (s), coordinates and rates (4,), which the class gets as one state (8,)."""
+        found = _asked(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
         return _numbers(self.name, "acceleration", found, (4,))
 
     def plan(self) -> dict[str, int]:

@@ -1,7 +1,6 @@
-"""What an engine is to the rest of twinrig, and the guard that every run passes.
+"""The pitch plane in any engine, what is refused there, and the guard that every run of every system passes.
 
-An engine is a module with ``build(assembly, settings) -> Model``. A model runs once over the asked time
-and can be asked for its acceleration at any state, for the build audit.
+An engine is a module with ``build(assembly, settings) -> Model``.
 """
 
 from collections.abc import Callable
@@ -13,8 +12,9 @@ from models.core.errors import Refused, RunFailed
 from models.core.resolved import check_resolved
 from models.core.signals import Signal
 from models.core.steps import divides, fitting
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, MISSING, OUTSIDE, Integrator
+from models.engines.model import Model
 from models.engines.stability import check_step
 
 BALANCE_ROWS, BALANCE_START, BALANCE_BOUND = 60, 50, 0.05
@@ -100,6 +100,13 @@ def _whole(engine: str, step: float, whole: str, length: float) -> None:
             engine,
             f"the step {step:g} s does not divide {whole} {length:g} s; use for example {fitting(step, length)} s",
         )
+
+
+def timed(engine: str, settings: Settings | None) -> Settings:
+    """Settings of a run; RunFailed where the model was built without."""
+    if settings is None:
+        raise RunFailed(engine, "the model was built without settings: it knows no step and no duration")
+    return settings
 
 
 def guard(

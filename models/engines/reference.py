@@ -101,9 +101,9 @@ class Reference:
         guard("reference", times, states, self.settings.duration, enforced=enforced)
         return Trajectory(times, states, enforced, counts)
 
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
-        """Accelerations (4,) in m/s^2 and rad/s^2 at a state (8,)."""
-        return derivative_of(*self._key)(np.ascontiguousarray(state), self._at(time), self._p)[4:]
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (4,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (4,)."""
+        return derivative_of(*self._key)(np.concatenate((q, v)), self._at(time), self._p)[4:]
 
     def plan(self) -> dict[str, int]:
         """What was built."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
-from models.engines.exudyn import counted
-from models.engines.exudyn_system import KINDS, mass_and_force, quiet_settings, recorders, solve, start
+from models.engines.exudyn_system import KINDS, counted, mass_and_force, quiet_settings, recorders, solve, start
+from models.engines.protocol import timed
 from models.engines.spatial_exudyn_build import RoadTable, assemble
 from models.engines.spatial_protocol import (
     DIFFERENCES,
@@ -17,7 +17,6 @@ from models.engines.spatial_protocol import (
     difference_step,
     linear_vehicle,
     sound,
-    timed,
 )
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
@@ -47,14 +46,17 @@ class SpatialExudyn:
         out[self._columns] = values
         return out
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) from Exudyn's own residual and mass matrix; ``road`` (2 w,) as in the protocol."""
-        return np.linalg.solve(*self._mass_and_force(q, v, self._flat[0] if road is None else road))
-
-    def _mass_and_force(self, q: np.ndarray, v: np.ndarray, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        start(self.mbs, self._all(q), self._all(v))
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) from Exudyn's own residual and mass matrix at a time (s), positions and rates (n,); on
+        this row (2 w,) of a road, if one is given."""
+        if road is None:
+            return np.linalg.solve(*self._mass_and_force(q, v, time))
         with self.road.still(road):
-            mass, force = mass_and_force(self.mbs)
+            return np.linalg.solve(*self._mass_and_force(q, v))
+
+    def _mass_and_force(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        start(self.mbs, self._all(q), self._all(v))
+        mass, force = mass_and_force(self.mbs, time)
         return mass[np.ix_(self._columns, self._columns)], force[self._columns]
 
     def linearise(self) -> LinearVehicle:
@@ -86,10 +88,11 @@ class SpatialExudyn:
 
     def _road_columns(self) -> np.ndarray:
         """Generalised forces (n, 2 w) per metre and per m/s of the road under each tyre: loads are linear in it."""
-        zero = np.zeros(self.size)
-        flat, *loaded = (
-            self._mass_and_force(zero, zero, row)[1] for row in (*self._flat, *np.eye(2 * len(self.vehicle.tyres)))
-        )
+        zero, forces = np.zeros(self.size), list[np.ndarray]()
+        for row in (*self._flat, *np.eye(2 * len(self.vehicle.tyres))):
+            with self.road.still(row):
+                forces.append(self._mass_and_force(zero, zero)[1])
+        flat, *loaded = forces
         return np.column_stack([force - flat for force in loaded])
 
     def _shift(self, body: str, point: Vector) -> np.ndarray:
@@ -107,10 +110,10 @@ class SpatialExudyn:
             columns.append(np.array(self.mbs.GetMarkerOutput(marker, kind)))
         return np.column_stack(columns)
 
-    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
-        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
-        settings = timed("exudyn", self.settings)
-        start(self.mbs, self._all(q), self._all(v))
+    def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
+        """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
+        settings, rest = timed("exudyn", self.settings), np.zeros(self.size)
+        start(self.mbs, self._all(rest if q is None else q), self._all(rest if v is None else v))
         note = solve(self.mbs, settings)
         return sound("exudyn", settings, *self._recorded(settings), note, counted(self.mbs))
 

@@ -6,28 +6,17 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco import rollout
 
-from models.core.errors import RunFailed
 from models.core.trajectory import Trajectory
-from models.core.waiting import marching
 from models.engines.assembly import Settings
-from models.engines.mujoco import CHUNK, INTEGRATORS
-from models.engines.mujoco_callback import installed
+from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_layout import check
-from models.engines.mujoco_quiet import quiet
+from models.engines.mujoco_march import FORCE_CALLS, march
+from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import Numbers, spec_of, weigh
-from models.engines.protocol import guard
+from models.engines.protocol import timed
 from models.engines.spatial_mujoco_callback import HEADER, PER_TIME, ROAD, elements, packed, spatial_law
-from models.engines.spatial_protocol import (
-    EngineKinematics,
-    curves,
-    difference_step,
-    jacobian,
-    linear_vehicle,
-    sound,
-    timed,
-)
+from models.engines.spatial_protocol import EngineKinematics, curves, difference_step, jacobian, linear_vehicle, sound
 from models.vehicles.linear_vehicle import LinearVehicle
 from models.vehicles.spatial import SpatialVehicle, Vector
 
@@ -66,14 +55,6 @@ class SpatialMujoco:
         check(self.model, self.data)
 
     @contextmanager
-    def _forces(self) -> Iterator[None]:
-        """The callback is installed; refused where another one is."""
-        if mujoco.get_mjcb_control() is not None or mujoco.get_mjcb_passive() is not None:
-            raise RunFailed("mujoco", "another callback is installed in this process: its forces would act here, too")
-        with installed(self.law):
-            yield
-
-    @contextmanager
     def _still(self) -> Iterator[np.ndarray]:
         """The callback reads the row (2 w,) of the road that is given here, at every time."""
         numbers = self.model.numeric_data
@@ -82,20 +63,23 @@ class SpatialMujoco:
         before = numbers[PER_TIME], row.copy()
         numbers[PER_TIME] = 0.0
         try:
-            with self._forces():
+            with installed(self.law):
                 yield row
         finally:
             numbers[PER_TIME], row[:] = before
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,) as in the protocol."""
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,) at a time (s), positions and rates (n,); on this row (2 w,) of a road, if one is given."""
+        if road is None:
+            with installed(self.law):
+                return self._acceleration(q, v, time)
         with self._still() as row:
-            row[:] = self._flat if road is None else road
+            row[:] = road
             return self._acceleration(q, v)
 
-    def _acceleration(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def _acceleration(self, q: np.ndarray, v: np.ndarray, time: float = 0.0) -> np.ndarray:
         columns = self.numbers.columns
-        self.data.time, self.data.qpos[columns], self.data.qvel[columns] = 0.0, q, v
+        self.data.time, self.data.qpos[columns], self.data.qvel[columns] = time, q, v
         mujoco.mj_forward(self.model, self.data)
         return self.data.qacc[columns]
 
@@ -134,37 +118,17 @@ class SpatialMujoco:
         mujoco.mj_jac(self.model, self.data, shift, turn, point, self.numbers.bodies[body])
         return shift[:, self.numbers.columns], turn[:, self.numbers.columns]
 
-    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
-        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
-        settings, size = timed("mujoco", self.settings), self.model.nv
-        both = 1 + np.concatenate((self.numbers.columns, size + self.numbers.columns))
-        path = np.empty((settings.steps + 1, 1 + 2 * size))
-        path[0, 0], path[0, both] = 0.0, np.concatenate((q, v))
-        for warning in self.data.warning:
-            warning.number = 0
+    def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
+        """March from positions and rates (n,), or from rest, over the duration; RunFailed as in the protocol."""
+        settings, rest = timed("mujoco", self.settings), np.zeros(self.model.nv)
+        both, start = np.concatenate((self.numbers.columns, rest.size + self.numbers.columns)), np.empty(2 * rest.size)
+        start[both] = np.concatenate((rest if q is None else q, rest if v is None else v))
+        with installed(self.law):
+            path = march(self.model, self.data, start, np.empty((settings.steps, 0)))
         times = settings.step * np.arange(settings.steps + 1)
-        with self._forces(), quiet(), marching(lambda: self.data.time / settings.duration):
-            self._advance(path, times, settings)
-        counts = {"steps": settings.steps, "force calls": (4 if settings.integrator == "RK4" else 1) * settings.steps}
-        states = path[:, 1:] if (np.diff(both) == 1).all() else path[:, both]
-        return sound("mujoco", settings, times, states, self._warned(), counts)
-
-    def _advance(self, path: np.ndarray, times: np.ndarray, settings: Settings) -> None:
-        """March in chunks, so that a run that has failed is not carried to its end; ``path``: time and state."""
-        for first in range(0, settings.steps, CHUNK):
-            after = slice(first + 1, min(first + CHUNK, settings.steps) + 1)
-            rows = path[after]
-            rollout.rollout(self.model, self.data, path[None, first], nstep=len(rows), state=rows[None])
-            late = np.abs(rows[:, 0] - times[after]) > 1e-6 * settings.duration
-            if late.any() or self._warned():
-                last = first + (int(np.argmax(late)) if late.any() else len(rows))
-                guard("mujoco", times[: last + 1], path[: last + 1, 1:], times[last])
-                raise RunFailed("mujoco", f"the engine gave up{self._warned()}", times[last], path[last, 1:])
-
-    def _warned(self) -> str:
-        """What MuJoCo itself noticed, as a phrase; empty if nothing."""
-        names = [mujoco.mjtWarning(i).name for i in range(len(self.data.warning)) if self.data.warning[i].number]
-        return f"; MuJoCo warned {', '.join(names)}" if names else ""
+        counts = {"steps": settings.steps, "force calls": FORCE_CALLS.get(settings.integrator, 1) * settings.steps}
+        states = path if (np.diff(both) == 1).all() else path[:, both]
+        return sound("mujoco", settings, times, states, "", counts)
 
     def plan(self) -> dict[str, int]:
         """What was built: degrees of freedom, native items, callbacks, and curves within them."""

@@ -13,11 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from models.core.errors import InputError, Refused, RunFailed
+from models.core.errors import InputError, Refused
 from models.core.steps import divides, fitting
 from models.core.trajectory import Trajectory
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
+from models.engines.model import Model
 from models.engines.protocol import guard
 from models.engines.stability import GROWTH, growth, limit
 from models.vehicles.linear_vehicle import LinearVehicle
@@ -37,23 +38,19 @@ SMOOTH_STEP, CORNERED_STEP = 4e-3, 1e-5
 curves with corners and friction need the second, which rounding keeps to 1e-11."""
 
 
-class SpatialModel(Protocol):
-    """A vehicle in space built in one engine."""
+class SpatialModel(Model, Protocol):
+    """A vehicle in space, which ride asks for its linear vehicle, too."""
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
-        """Accelerations (n,) at positions and rates (n,) with road heights (m), then their rates, (2 w,)."""
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+        """Accelerations (n,); on a row (2 w,) of road heights (m), then their rates, in place of the road's own."""
+        ...
+
+    def run(self, q: np.ndarray | None = None, v: np.ndarray | None = None) -> Trajectory:
+        """March from positions and rates (n,), or from rest in the design position."""
         ...
 
     def linearise(self) -> LinearVehicle:
         """The engine's own linear vehicle about the design position."""
-        ...
-
-    def run(self, q: np.ndarray, v: np.ndarray) -> Trajectory:
-        """March from positions and rates (n,) over the duration; RunFailed unless all of it is finite and sane."""
-        ...
-
-    def plan(self) -> dict[str, int]:
-        """What was built: degrees of freedom, native items, callbacks, curves."""
         ...
 
 
@@ -233,10 +230,3 @@ def sound(
     """The run, where it passes the guard of all runs."""
     guard(engine, times, states, settings.duration, note)
     return Trajectory(times, states, counts=counts)
-
-
-def timed(engine: str, settings: Settings | None) -> Settings:
-    """Settings of a run; RunFailed where the model was built without."""
-    if settings is None:
-        raise RunFailed(engine, "the model was built without settings: it knows no step and no duration")
-    return settings

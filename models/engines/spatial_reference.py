@@ -52,7 +52,7 @@ class SpatialReference:
         self.index = {place: i for i, place in enumerate(vehicle.coordinates())}
         self.size = len(self.index)
 
-    def acceleration(self, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray, road: np.ndarray | None = None) -> np.ndarray:
         """Accelerations (n,) at positions and rates (n,); ``road`` (2 w,): heights (m), then their rates (m/s)."""
         self.q, self.v, self.motions = q, v, self.motions_of(q, v)
         mass, force = np.zeros((self.size, self.size)), np.zeros(self.size)

@@ -1,46 +1,79 @@
-"""A wheelset on rails whose equations of motion an engine writes: what is the same in every engine.
+"""A wheelset on rails whose equations of motion an engine writes.
 
-The engine has the body, its joints, its weight and the primary suspension as elements of its own; both rails act by a
-callback about the compiled forces. All that follows from accelerations and paths (rest, linearisation, critical speed,
-limit cycle) is that of ``rail.equations``, of which this takes the rates and the march from the engine.
+It is a free vehicle (``free_vehicle``): one body behind five joints, with its weight, the primary suspension as
+elements of the engine, and both rails as the compiled forces. The suspension's ends are points of the axle, which spin
+does not move. All that follows from accelerations and paths (rest, linearisation, critical speed, limit cycle) is that
+of ``rail.equations``, of which this takes the rates and the march from the engine.
 """
 
-from abc import ABC, abstractmethod
+from functools import cached_property
 
 import numpy as np
 
 from models.contact.inputs import Array
 from models.core.errors import RunFailed
-from models.rail.equations import LIMIT, ROLL, YAW, Body, Equations, Y, Z
-from models.rail.joint_forces import JOINTS, from_joints, rates_of, to_joints
+from models.engines.free_vehicle import Driven, FreeModel, free_model
+from models.engines.native_parts import GroundSpring
+from models.rail.equations import LIMIT, ROLL, YAW, Equations, Y, Z
+from models.rail.joint_forces import JOINTS, from_joints, joint_forces, rates_of, set_joint_forces, table, to_joints
+from models.rail.wheelset import GRAVITY
+from models.vehicles.spatial import Body, SpatialVehicle
+
+CENTRE = (0.0, 0.0, 0.0)
 
 
-def leaning(weight: float, body: Body) -> Array:
-    """A weight's parts (3,) along the track's axes by its part square to the track, on the track of these numbers."""
-    return weight * np.array([0.0, body.lean, 1.0])
+def driven_by(equations: Equations) -> Driven:
+    """What an engine builds: bodies in the order of the joints, the suspension of both ends, the table of the rails."""
+    body = equations.body
+    across, along = body.across, body.along
+    inertia = ((across, 0.0, 0.0), (0.0, along, 0.0), (0.0, 0.0, across))
+    track = np.array([0.0, body.lean, 1.0])  # along the track's axes, by a weight's part square to the track
+    bodies = (
+        Body("yaw", 0.0, CENTRE, ("y", "z", "rz")),
+        Body("roll", 0.0, CENTRE, ("rx",), parent="yaw"),
+        Body("wheelset", body.mass, CENTRE, ("ry",), inertia, parent="roll"),
+    )
+    springs = tuple(
+        GroundSpring(
+            "wheelset", (0.0, arm, 0.0), (0.0, arm, body.sunk), body.stiffness, body.damping, body.carried * track
+        )
+        for arm in (body.arm, -body.arm)
+    )
+    numbers = table(float(equations.speed), equations.rails)
+    vehicle = SpatialVehicle("wheelset", bodies, (), (), ())
+    return Driven(vehicle, GRAVITY * track, numbers, joint_forces, set_joint_forces, ground_springs=springs)
 
 
-class EngineWheelset(Equations, ABC):
+class EngineWheelset(Equations):
     """A wheelset that travels at a speed in an engine; parameters and answers as those of ``Equations``."""
 
-    @abstractmethod
-    def accelerations(self, q: Array, v: Array) -> Array:
-        """Accelerations (5,) of the joints by the engine at positions and rates (5,)."""
-
-    @abstractmethod
-    def marched(self, q: Array, v: Array, steps: int, step: float) -> Array:
-        """Positions and rates (steps + 1, 10) by the engine's RK4, start included; RunFailed unless they are finite."""
+    @cached_property
+    def model(self) -> FreeModel:
+        """The wheelset in its engine, by its joints."""
+        return free_model(self.ENGINE, driven_by(self))
 
     def rates(self, state: Array) -> Array:
         """Rates (10,) of a state (10,) by the engine."""
         joints = to_joints(np.asarray(state, float))
-        return rates_of(joints, self.accelerations(joints[:JOINTS], joints[JOINTS:]))
+        return rates_of(joints, self.model.acceleration(0.0, joints[:JOINTS], joints[JOINTS:]))
 
     def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
         """States by the engine's RK4, and the contacts of those that are kept."""
         joints = to_joints(state)
-        states = from_joints(self.marched(joints[:JOINTS], joints[JOINTS:], count, step))
+        states = from_joints(self.model.march(joints[:JOINTS], joints[JOINTS:], count, step))
         away = ~(np.abs(states[:, [Y, Z, ROLL, YAW]]).sum(axis=1) < LIMIT)
         if away.any():
             raise RunFailed(self.ENGINE, "the wheelset leaves the track", (int(np.argmax(away)) - 1) * step)
         return states[::every], self.at(states[::every])[1]
+
+
+class ExudynWheelset(EngineWheelset):
+    """The wheelset in Exudyn."""
+
+    ENGINE = "exudyn"
+
+
+class MujocoWheelset(EngineWheelset):
+    """The wheelset in MuJoCo."""
+
+    ENGINE = "mujoco"

@@ -83,8 +83,8 @@ def rates_of(joints: Array, accelerations: Array) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def joint_forces(numbers, q, v, f):
-    """Add the joints' forces (N, N m) to ``f`` (5,); all four are pointers to doubles.
+def joint_forces(numbers, t, q, v, f):
+    """Add the joints' forces (N, N m) to ``f`` (5,), for callbacks: all but the time are pointers to doubles.
 
     Not a number where the wheelset has left the track: engines do not ask before they go on.
     """
@@ -114,8 +114,8 @@ def joint_forces(numbers, q, v, f):
 
 
 @njit(cache=True, error_model="numpy")
-def set_joint_forces(block):
-    """``joint_forces`` in one block of doubles at an address: f, q and v (5,), and the table; f is cleared before."""
+def set_joint_forces(block, t, n):
+    """``joint_forces`` in one block of doubles at an address: f, q and v (n,), and the table; f is cleared before."""
     f = at(block)
-    array(f, (JOINTS,))[:] = 0.0
-    joint_forces(beyond(f, 3 * JOINTS), beyond(f, JOINTS), beyond(f, 2 * JOINTS), f)
+    array(f, (n,))[:] = 0.0
+    joint_forces(beyond(f, 3 * n), t, beyond(f, n), beyond(f, 2 * n), f)

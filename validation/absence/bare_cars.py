@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from models.engines.assembly import Settings
 from models.engines.protocol import guard
 from models.machine.timing import interleave, paired_ratio
 from models.multibody.numbers import Handling
@@ -29,13 +30,13 @@ def cars(steps: int) -> tuple[Job, Job]:
     """Runs of a bare car and of the written one, which pass the same guard, to positions and rates (steps + 1, 23)."""
     car, q, v = start()
     model, by_hand, times = (
-        build("mujoco", car),
+        build("mujoco", car, Settings("RK4", STEP, steps * STEP)),
         hand_built_handling.run(car, q, v, STEP, steps),
         STEP * np.arange(steps + 1),
     )
 
     def ours() -> tuple[np.ndarray, ...]:
-        path = model.run(q, v, steps * STEP, STEP)
+        path = model.run(q, v)
         return path.positions, path.rates
 
     def theirs() -> tuple[np.ndarray, ...]:

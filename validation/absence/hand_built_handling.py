@@ -16,8 +16,8 @@ from mujoco import rollout
 
 from models.contact.fastsim_many import forces_within
 from models.contact.fastsim_records import BLOCK, CONTACT, FORCES, SLIP, Workspace, cells_in, strips_in
-from models.engines.contact_bridge_mujoco import native_law
-from models.engines.mujoco_callback import installed
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_quiet import installed
 from models.engines.mujoco_tree import principal
 from models.machine.compiled import lean
 from models.machine.records import records, size_of, stacked
@@ -34,8 +34,8 @@ TOUCH = size_of(CONTACT)
 
 
 @lean
-def law(numbers, q, v, f):
-    """Add the forces to ``f`` (23,); all are pointers to doubles: the table, positions, rates."""
+def law(numbers, t, q, v, f):
+    """Add the forces to ``f`` (23,); all but the time are pointers to doubles: the table, positions, rates."""
     head, q, v, f = array(numbers, (HEAD,)), array(q, (SIZE,)), array(v, (SIZE,)), array(f, (SIZE,))
     wheels, mounts = beyond(numbers, HEAD), beyond(numbers, HEAD + 4 * WHEEL)
     cells = beyond(mounts, 3 * MOUNT + 2 * SEAT)
@@ -259,7 +259,7 @@ def model_of(handling: Handling, step: float) -> mujoco.MjModel:
 def run(handling: Handling, q: np.ndarray, v: np.ndarray, step: float, steps: int) -> Callable[[], np.ndarray]:
     """One run from positions and rates (23,) that gives states (steps + 1, 46)."""
     built = model_of(handling, step)
-    data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), native_law(law)
+    data, state, callback = mujoco.MjData(built), np.concatenate(([0.0], q, v)), kernel_law(law)
 
     def marched() -> np.ndarray:
         with installed(callback):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 from unittest import mock
 
-from models.engines.assembly import Model
+from models.engines.model import Model
 
 CALLBACKS = ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor", "time")
 """MuJoCo's callbacks, all global to the process."""

@@ -5,7 +5,7 @@ by one comparison per call: FASTSIM is compiled, or loaded from disk, with the k
 linear law it is never called and none of its numbers is read.
 """
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -66,12 +66,12 @@ def without_net(law: Any) -> str:
 
 def springs(wheelset: Wheelset) -> tuple[int, int]:
     """Spring-dampers of Exudyn's system and actuators of MuJoCo's model."""
-    from models.engines.wheelset_exudyn import ExudynWheelset
-    from models.engines.wheelset_mujoco import MujocoWheelset
+    from models.engines.wheelset import ExudynWheelset, MujocoWheelset
 
-    mbs, _ = ExudynWheelset(wheelset, SPEED).system
+    exudyn, mujoco = (cast(Any, engine(wheelset, SPEED).model) for engine in (ExudynWheelset, MujocoWheelset))
+    mbs = exudyn.mbs
     items = [mbs.GetObject(k)["objectType"] for k in range(mbs.systemData.NumberOfObjects())]
-    return sum("SpringDamper" in kind for kind in items), MujocoWheelset(wheelset, SPEED).model.nu
+    return sum("SpringDamper" in kind for kind in items), mujoco.model.nu
 
 
 def rows() -> list[Row]:

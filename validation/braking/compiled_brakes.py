@@ -11,7 +11,7 @@ from models.brake.plane_vehicle import PAPER, Plane, truck
 from models.brake.relaxation import Lag
 from models.brake.relaxation import lag_on as compiled_lag_on
 from models.brake.sprung import Sprung
-from models.brake.sprung_step import HELD, fill, held
+from models.brake.sprung_step import HELD, held, set_held
 from models.brake.surfaces import EVEN, OnRoad, Road, surfaces
 from models.brake.surfaces import under_wheels as compiled_under_wheels
 from models.brake.wheel_step import StepInput, Wheel
@@ -64,7 +64,7 @@ def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
     hold."""
     own = vehicle.handling
     table = np.concatenate((own.numbers, np.zeros(HELD * len(own.vehicle.tyres))))
-    return free_model(engine, Driven(own.vehicle, own.gravity, table, held, lambda block, t, n: fill(block, n, table)))
+    return free_model(engine, Driven(own.vehicle, own.gravity, table, held, set_held))
 
 
 def held_in(numbers: np.ndarray) -> Held:

@@ -11,7 +11,7 @@ import numpy as np
 from models.core.scene_effects import module_of, names_of, without
 from models.core.systems import DEFAULT
 from models.core.time_series import write_time_series
-from models.engines.assembly import Model
+from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import run
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of

@@ -17,8 +17,10 @@ from models.contact.patches import separate
 from models.contact.simplified_theory import press, roll
 from models.engines.contact_bridge import FREEDOM, FREEDOMS, Theory, Wheels, add_forces, forces
 from models.engines.contact_bridge_exudyn import ROUTES, Forces, Rolling
-from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law, python_law
-from models.engines.mujoco_callback import installed
+from models.engines.contact_bridge_mujoco import empty_law, model, python_law
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from models.machine.compiled import njit
 from models.machine.stack import start
 from models.machine.timing import interleave, median, spelled
@@ -159,7 +161,7 @@ def _kernel_job(law: tuple[str, int], count: int) -> tuple[Callable[[], Any], in
 @njit(cache=True, error_model="numpy")
 def _repeat(numbers, q, v, f, times):
     for _ in range(times):
-        forces(start(numbers), start(q), start(v), start(f))
+        forces(start(numbers), 0.0, start(q), start(v), start(f))
 
 
 def _job(one: Setup) -> tuple[Callable[[int], Any], int]:
@@ -178,7 +180,7 @@ def _mujoco_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     callback = {
         "none": lambda: None,
         "empty": lambda: empty_law().ctypes,
-        "native": lambda: native_law().ctypes,
+        "native": lambda: kernel_law(forces).ctypes,
         "jitted": lambda: python_law(add_forces),
         "plain": lambda: python_law(law),
     }[one.bridge]()
@@ -250,7 +252,7 @@ def _threads_row() -> Row:
     """Two threads beside one, from ten starts."""
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
-    with installed(native_law()):
+    with installed(kernel_law(forces)):
         one, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
     same = "identical" if np.isfinite(one).all() and one.tobytes() == two.tobytes() else "different"
     return behaves(
@@ -267,7 +269,7 @@ def _agreement_row() -> Row:
     """Both engines by Runge-Kutta's method over 0.1 s."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()
-    with installed(native_law()):
+    with installed(kernel_law(forces)):
         path = Marcher(model(wheels, 1e-4, "RK4")).run(np.concatenate((q, v))[None], steps)[0]
     other = Rolling(wheels, Forces(wheels).of).run(q, v, steps, 1e-4, "RK44")
     size = wheels.size

@@ -9,24 +9,15 @@ from typing import Any
 import numpy as np
 
 from models.contact.fastsim_many import LOAD, MU, A, B
-from models.engines.assembly import Settings
-from models.engines.contact_bridge_mujoco import Marcher
 from models.engines.free_vehicle_mujoco import FreeMujoco
-from models.engines.mujoco_callback import installed
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from models.machine.compiled import njit
 from models.machine.timing import interleave, median
 from models.multibody import forces as at
 from models.multibody.numbers import Controls, Handling, Tyres
 from models.road.plane_waves import plane_waves
-from models.systems.handling.run import (
-    Drive,
-    driven,
-    driven_adaptively,
-    driven_by,
-    energy,
-    friction_distance,
-    unaccounted,
-)
+from models.systems.handling.run import Drive, driven, driven_by, energy, friction_distance, unaccounted
 from models.systems.handling.single_track import steady_turn
 from models.tyre.bristles import FIRST, brush, net, tyre_forces
 from models.vehicles.vehicle_file import load_vehicle
@@ -56,21 +47,13 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Tyre, engines and mirror image; in the full run also turns, stops, slopes, energy, planted faults, price."""
     duration = 0.3 if quick else 1.0
     drives = {engine: driven(engine, lane_change(), SPEED, duration) for engine in ("mujoco", "exudyn")}
-    rows = [
-        _engines_row(drives),
-        _adaptive_row(drives["exudyn"]),
-        *_tyre_rows(),
-        _power_row(drives["mujoco"]),
-        _mirror_row(duration),
-        _threads_row(),
-    ]
+    rows = [_engines_row(drives), *_tyre_rows(), _power_row(drives["mujoco"]), _mirror_row(duration), _threads_row()]
     if not quick:
         rows += [
             *_turn_rows(),
             *_stop_rows(),
             *_transfer_rows(),
             _slope_row(),
-            _adaptive_reference_row(),
             *_energy_rows(),
             *_fault_rows(),
             _price_row(),
@@ -87,41 +70,10 @@ def _engines_row(drives: dict[str, Drive]) -> Row:
     return Observed(
         "handling.engines",
         SYSTEM,
-        "largest difference of positions and rates between the two engines in a lane change on a rough road",
+        "lane change on a rough road: positions and rates of the two engines",
         _gap(drives["mujoco"], drives["exudyn"]),
         "m, rad, m/s, rad/s",
     ).at_most(1e-10, "the same tableau, step and forces around two engines' own trees: rounding alone", "shared kernel")
-
-
-def by_tolerance(engine: str, integrator: str, tolerance: float, duration: float) -> Drive:
-    """The lane change by an integrator that picks its own steps, of at most 10 ms."""
-    return driven_adaptively(engine, lane_change(), SPEED, Settings(integrator, 1e-2, duration, tolerance))
-
-
-def _adaptive_row(fixed: Drive) -> Row:
-    own = by_tolerance("exudyn", "DOPRI5", 1e-7, float(fixed.run.times[-1]))
-    return Observed(
-        "handling.adaptive",
-        SYSTEM,
-        "end of the lane change by DOPRI5 of Exudyn, tolerance 1e-7, beside that in steps of 1 ms; "
-        f"{own.run.counts['force calls'] / fixed.run.counts['force calls']:.1f} times as many force calls",
-        float(np.abs(own.run.states[-1] - fixed.run.states[-1]).max()),
-        "m, rad, per s",
-    ).at_most(1e-5, "2e-6 of the fixed steps, beside 2.5e-4 s; adhesion and sliding meet at corners", "shared kernel")
-
-
-def _adaptive_reference_row() -> Row:
-    ends = [
-        by_tolerance(engine, integrator, 1e-8, 0.02).run.states[-1]
-        for engine, integrator in (("exudyn", "DOPRI5"), ("reference", "DOP853"))
-    ]
-    return Observed(
-        "handling.adaptive.reference",
-        SYSTEM,
-        "20 ms of the lane change, DOPRI5 of Exudyn beside DOP853 around the plain equations, tolerance 1e-8",
-        float(np.abs(ends[0] - ends[1]).max()),
-        "m, rad, per s",
-    ).at_most(1e-6, "two codes and two methods; each keeps its tolerance but for corners of the creep", "native")
 
 
 def locked_error() -> float:
@@ -138,14 +90,14 @@ def _tyre_rows() -> list[Row]:
         Observed(
             "handling.cornering",
             SYSTEM,
-            "relative difference of the cornering stiffness at small slip from that of the ride vehicle",
+            "cornering stiffness at small slip, by the ride vehicle's, less 1",
             cornering_error(Handling(R19)),
             "",
         ).at_most(1e-3, "the bristles are those of the ride vehicle's tyres", "closed form"),
         Observed(
             "handling.locked",
             SYSTEM,
-            "difference of the force on a wheel that does not turn from mu N against its sliding, over mu N",
+            "force on a wheel that does not turn, beside mu N against its sliding, by mu N",
             locked_error(),
             "",
         ).at_most(1e-9, "all bristles slide one way", "closed form"),
@@ -156,7 +108,7 @@ def _power_row(drive: Drive) -> Row:
     return behaves(
         "handling.power",
         SYSTEM,
-        "sign of the power of each tyre's contact in every step of the lane change",
+        "power of each tyre's contact at every step of the lane change",
         "never positive" if drive["power"].max() <= 0.0 else "positive",
         "never positive",
         "friction takes energy out",
@@ -177,8 +129,7 @@ def _mirror_row(duration: float) -> Row:
     return Observed(
         "handling.mirror",
         SYSTEM,
-        "largest difference of a step steer to the left from the mirror image of a step steer to the "
-        "right, inclined wheels",
+        "step steer to the left beside the mirror image of one to the right, with inclined wheels",
         mirror_gap(inclined, duration),
         "m, rad",
     ).at_most(1e-10, "a symmetric vehicle", "none")
@@ -200,18 +151,13 @@ def _turn_rows() -> list[Row]:
         Observed(
             "handling.turn",
             SYSTEM,
-            "relative difference of the yaw gain of a steady turn at 20 m/s and small slip from the "
-            "single-track vehicle",
+            "yaw gain of a steady turn of small slip at 20 m/s, by the single-track vehicle's, less 1",
             turn_error(),
             "",
         ).at_most(1e-3, "linear tyres, with trail and turning slip", "closed form"),
-        Observed(
-            "handling.understeer",
-            SYSTEM,
-            "relative difference of the understeer gradient of a steady turn from the single-track vehicle",
-            turn.understeer,
-            "s^2/m",
-        ).beside("positive: understeering", "closed form at the static loads"),
+        Observed("handling.understeer", SYSTEM, "its understeer gradient", turn.understeer, "s^2/m").beside(
+            "positive: understeering", "closed form at the static loads"
+        ),
     ]
 
 
@@ -226,14 +172,14 @@ def _stop_rows() -> list[Row]:
         Observed(
             "handling.slide",
             SYSTEM,
-            "difference of the braking force of four locked wheels from mu N, over mu N",
+            "braking force of four locked wheels beside mu N, by mu N",
             float(np.abs(left / drive.grip()).max()),
             "",
         ).at_most(1e-9, "at every step of a stop", "closed form"),
         Observed(
             "handling.stop",
             SYSTEM,
-            "relative difference of the distance of a stop with locked wheels from 15 m/s from (v0^2 - v^2) / (2 mu g)",
+            "way of a stop with locked wheels from 15 m/s, by (v0^2 - v^2) / (2 mu g), less 1",
             float(drive.path[-1, 0] / stopped - 1.0),
             "",
         ).at_most(1e-2, "wheel loads swing about the weight when the body dives", "closed form"),
@@ -250,16 +196,15 @@ def _transfer_rows() -> list[Row]:
             Observed(
                 f"handling.transfer.{name}",
                 SYSTEM,
-                f"relative difference of the {name}'s load transfer between its axles from m_total a "
-                f"h / L and the leaning weight, wheels locked at mu = {GENTLE:g}",
+                f"load transfer of the {name} between its axles, wheels "
+                f"locked at mu = {GENTLE:g}, by m_total a h / L and weight that leans, less 1",
                 braking,
                 "",
             ).at_most(5e-3, "first order in the pitch angle; 2 s of settling", "closed form"),
             Observed(
                 f"handling.transfer_aside.{name}",
                 SYSTEM,
-                f"relative difference of the {name}'s load transfer between its sides from m_total a "
-                "h / t, steady turn of 0.4 m/s^2",
+                f"the same of the {name} between its sides in a steady turn of 0.4 m/s^2, by m_total a h / t",
                 turn,
                 "",
             ).at_most(1e-3, "first order in the roll angle", "closed form"),
@@ -289,7 +234,7 @@ def _energy_rows() -> list[Row]:
         Observed(
             "handling.ledger",
             SYSTEM,
-            "share of the energy of the lane change that nothing accounts for",
+            "energy of the lane change that nothing accounts for, by all of it",
             gaps["sliding", 1e-3] / whole,
             "",
         ).at_most(
@@ -301,8 +246,7 @@ def _energy_rows() -> list[Row]:
         behaves(
             "handling.ledger_order",
             SYSTEM,
-            "observed order of the unaccounted energy in the step, where friction holds the bristles "
-            "and no wheel lifts",
+            "its order in the step where friction holds the bristles and no wheel lifts",
             "at least 3.5" if order >= 3.5 else f"{order:.2f}",
             "at least 3.5",
             "that of Runge and Kutta is 4",
@@ -358,8 +302,8 @@ def _price_row() -> Row:
     return Observed(
         "handling.price",
         SYSTEM,
-        "relative difference of a step of MuJoCo with four tyres (22 x 21 cells) from a step without "
-        f"them plus the kernel alone, 95 % interval {low:.3g} to {high:.3g}",
+        "step of MuJoCo with four tyres (22 x 21 cells), by a step without them "
+        f"and what the kernel takes alone, less 1, 95 % interval {low:.3g} to {high:.3g}",
         ratio,
         "",
     ).aim(0.3, "seconds of the processor, median of interleaved rounds")
@@ -377,7 +321,7 @@ def _threads_row() -> Row:
     return behaves(
         "handling.threads",
         SYSTEM,
-        "three lane changes in MuJoCo give the same bits in two threads as in one",
+        "three lane changes marched by MuJoCo in two threads beside one, to the last bit",
         said,
         "identical",
         "the callback writes nothing but its own run's forces",

@@ -62,15 +62,15 @@ def _accelerations(name: str, vehicle: CutVehicle) -> list[Row]:
     for i, (frame, guide) in enumerate((("hub", False), ("inertial", True), ("body", True))):
         q, v = anywhere(vehicle, i)
         written, *engines = (
-            build(engine, vehicle, shaken(vehicle, frame, guide), STEP, STEP).accelerations(0.0, q, v)
+            build(engine, vehicle, shaken(vehicle, frame, guide), STEP, STEP).acceleration(0.0, q, v)
             for engine in ENGINES
         )
         worst = max(worst, *(float(np.abs(a - written).max() / np.abs(written).max()) for a in engines))
     q, v = anywhere(vehicle, 7)
     bare = replace(vehicle, elements=(), loads=0 * vehicle.loads)
-    written = build("reference", bare, static(bare, 3), STEP, STEP).accelerations(0.0, q, v)
+    written = build("reference", bare, static(bare, 3), STEP, STEP).acceleration(0.0, q, v)
     slack = SpringDamper("none", vehicle.chassis, vehicle.whole.tyres[0].body, (0, 0, 0), (0, 0, 0), (0, 0, 1), 0, 0)
-    expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(q, v)
+    expected = SpatialReference(replace(vehicle.tree, gravity=0.0, springs=(slack,))).acceleration(0.0, q, v)
     expected -= GRAVITY * np.eye(len(q))[Z]
     return [
         Observed(
@@ -115,7 +115,7 @@ def _wrenches(vehicle: CutVehicle) -> Row:
 def _tilted(vehicle: CutVehicle, frame: str, tilt: float, duration: float) -> HubRun:
     steps, start = round(duration / STEP), np.zeros(2 * vehicle.size)
     start[ROLL] = tilt
-    return build("mujoco", vehicle, static(vehicle, 2 * steps + 1, frame), STEP, duration).run(start)
+    return build("mujoco", vehicle, static(vehicle, 2 * steps + 1, frame), STEP, duration).run(*np.split(start, 2))
 
 
 def _gravity(vehicle: CutVehicle) -> list[Row]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from models.core.noise import normal
+from models.core.runge_kutta import step_on
 from models.core.time_series import write_time_series
 from models.engines.assembly import Assembly, Settings
 from models.engines.protocol import build
@@ -309,14 +310,15 @@ class IndexOne:
         inputs = self.assembly.input.sample(0.0, step / 2, 2 * count + 1)
         states = np.empty((count + 1, 8))
         y = states[0] = self.assembly.initial
+        acting = dict[float, np.ndarray]()
+
+        def rate(time: float, y: np.ndarray) -> np.ndarray:
+            return self._rate(y, acting[time])
+
         for i in range(count):
-            first, middle, last = inputs[2 * i : 2 * i + 3]
-            k1 = self._rate(y, first)
-            k2 = self._rate(y + 0.5 * step * k1, middle)
-            k3 = self._rate(y + 0.5 * step * k2, middle)
-            k4 = self._rate(y + step * k3, last)
-            y = y + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            states[i + 1] = y = self._back(y, last) if self.projected else y
+            acting |= zip((0.0, 0.5 * step, step), inputs[2 * i : 2 * i + 3], strict=True)
+            y = step_on(rate, 0.0, y, step)
+            states[i + 1] = y = self._back(y, acting[step]) if self.projected else y
         return states
 
     def _rate(self, y: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -260,9 +260,9 @@ def _in_space(quick: bool) -> list[Row]:
     for _ in range(30 if quick else 100):
         q, v = random.uniform(-0.08, 0.08, n), random.uniform(-3.0, 3.0, n)
         road = np.concatenate([random.uniform(-0.1, 0.1, w), random.uniform(-3.0, 3.0, w)])
-        wanted = written.acceleration(q, v, road)
+        wanted = written.acceleration(0.0, q, v, road)
         for engine, model in models.items():
-            error = float(np.abs(model.acceleration(q, v, road) - wanted).max() / np.abs(wanted).max())
+            error = float(np.abs(model.acceleration(0.0, q, v, road) - wanted).max() / np.abs(wanted).max())
             worst[engine] = max(worst[engine], error)
     path = road_path(excitation_of(own, wheels(car)), SPEED, 1e-3)
     one, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)

@@ -205,7 +205,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
     found = angular_acceleration(spin(array, felt), turning)[:, 1]
     equations = build("reference", assemble(scene), settings_of(scene, "reference"))  # eq. (38) at every state
-    true = np.array([equations.acceleration(t, y)[3] for t, y in zip(run.times, run.states, strict=True)])
+    true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = quality(sensor_array(p.positions()), readings)
     return [
         *_follows("accelerometers", engine, array, felt, run.states, None),

@@ -123,7 +123,7 @@ def _states(name: str) -> list[Row]:
     models: list[SpatialModel | SpatialReference] = [*built, SpatialReference(vehicle, SPEED)]
     worst = np.zeros(3)
     for path in range(STATES):
-        exudyn, mujoco, reference = (model.acceleration(*random_state(vehicle, path)) for model in models)
+        exudyn, mujoco, reference = (model.acceleration(0.0, *random_state(vehicle, path)) for model in models)
         pairs = ((exudyn, mujoco), (exudyn, reference), (mujoco, reference))
         worst = np.maximum(worst, [relative(*pair) for pair in pairs])
     names = ("exudyn against mujoco", "exudyn against equations", "mujoco against equations")
@@ -184,7 +184,7 @@ def _at_rest() -> list[Row]:
                 f"ride_engines.rest.{engine}",
                 SYSTEM,
                 f"acceleration in the design position, {engine}",
-                float(np.abs(model.acceleration(zero, zero)).max()),
+                float(np.abs(model.acceleration(0.0, zero, zero)).max()),
                 "m/s^2, rad/s^2",
             ).at_most(1e-10, "preloads hold the weights to rounding", "none")
         )

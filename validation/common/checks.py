@@ -13,8 +13,9 @@ import numpy as np
 
 from models.core.errors import InputError, RunFailed
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE, RECOMMENDED
+from models.engines.model import Model
 from models.engines.protocol import build
 from models.vehicles import pitch_plane
 
@@ -39,7 +40,9 @@ def accelerations(make: Make, assembly: Assembly, settings: Settings, states: np
     """Accelerations (n, 4) at states (n, 8), at times spread over the run's steps."""
     model = make(assembly, settings)
     steps = np.rint(np.linspace(0.05, 0.95, len(states)) * settings.steps)
-    return np.array([model.acceleration(i * settings.step, y) for i, y in zip(steps, states, strict=True)])
+    return np.array(
+        [model.acceleration(i * settings.step, *np.split(y, 2)) for i, y in zip(steps, states, strict=True)]
+    )
 
 
 def acceleration_gap(make: Make, assembly: Assembly, settings: Settings, count: int = 100) -> float:

@@ -34,7 +34,7 @@ def _jacobians() -> float:
 def _still() -> float:
     """Accelerations at rest on the static loads (m/s^2, rad/s^2)."""
     rest = np.zeros(r19().size)
-    return float(np.abs(_driven(static(r19(), 3).hubs).accelerations(0.0, rest, rest)).max())
+    return float(np.abs(_driven(static(r19(), 3).hubs).acceleration(0.0, rest, rest)).max())
 
 
 CHECKS = {

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
+from models.engines.model import Model
 from models.engines.protocol import build
 from validation.common.checks import Make
 from validation.faults import changes as change
@@ -51,10 +52,10 @@ class Planted:
         with self.context():
             return self.model.run()
 
-    def acceleration(self, time: float, state: np.ndarray) -> np.ndarray:
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The engine's accelerations (4,), with the fault."""
         with self.context():
-            return self.model.acceleration(time, state)
+            return self.model.acceleration(time, q, v)
 
     def plan(self) -> dict[str, int]:
         """What was built."""
@@ -166,9 +167,7 @@ ADAPTER = (
         inside=attribute("models.engines.mujoco:_guidance", patches.misprinted_row),
     ),
     Fault(
-        "callback never installed",
-        MUJOCO,
-        inside=attribute("models.engines.mujoco_callback:installed", patches.not_installed),
+        "callback never installed", MUJOCO, inside=attribute("models.engines.mujoco:installed", patches.not_installed)
     ),
 )
 """In the code of an engine's adapter."""

@@ -109,7 +109,7 @@ def _whole_inertia() -> float:
 @cache
 def _by_hand(name: str) -> np.ndarray:
     vehicle = vehicle_file.load_vehicle(name)
-    return SpatialReference(vehicle, SPEED).acceleration(*_state(vehicle))
+    return SpatialReference(vehicle, SPEED).acceleration(0.0, *_state(vehicle))
 
 
 def _state(vehicle: SpatialVehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

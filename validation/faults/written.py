@@ -38,9 +38,7 @@ def _on_hubs(choose: Callable[[list[Drive]], Drive]) -> float:
     """Accelerations of the cut twin in MuJoCo and by the plain equations."""
     vehicle = cut_cars()["twin"]
     drive, (q, v) = choose(drives(vehicle)), cut_state(vehicle, 3)
-    return off(
-        *(hub_model(engine, vehicle, drive, STEP, STEP).accelerations(0.0, q, v) for engine in ("mujoco", PLAIN))
-    )
+    return off(*(hub_model(engine, vehicle, drive, STEP, STEP).acceleration(0.0, q, v) for engine in ("mujoco", PLAIN)))
 
 
 CHECKS = {

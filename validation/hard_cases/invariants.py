@@ -55,7 +55,7 @@ def nose_up(engine: str, folder: Path) -> float:
     base, tilt = vehicle("asymmetric_twin", "linear"), 0.01
     p, state = base.parameters, base.initial.copy()
     state[3] += tilt
-    acceleration = build(engine, base, settings(engine, 1e-3, 0.1)).acceleration(0.0, state)
+    acceleration = build(engine, base, settings(engine, 1e-3, 0.1)).acceleration(0.0, *np.split(state, 2))
     front, rear = -p.k3 * p.b * tilt, p.k4 * p.a * tilt  # the front strut is pulled, the rear one pressed
     hand = np.array([front / p.m1, rear / p.m2, -(front + rear) / p.m3, (p.b * front - p.a * rear) / p.I])
     if not (acceleration[0] < 0 < acceleration[1] and acceleration[3] < 0):
@@ -73,7 +73,7 @@ def push(engine: str, folder: Path) -> float:
         model = build(engine, driven(base, forces), settings(engine, 1e-3, 2e-3))
         wanted = np.zeros(4)
         wanted[wheel] = -100.0 / mass
-        worst = max(worst, largest(model.acceleration(0.0, base.initial) - wanted) * mass / 100.0)
+        worst = max(worst, largest(model.acceleration(0.0, *np.split(base.initial, 2)) - wanted) * mass / 100.0)
     return worst
 
 
@@ -112,7 +112,7 @@ def free_heave(engine: str, folder: Path) -> float:
     model = build(engine, driven(base, forces), settings(engine, 1e-3, 0.1))
     masses, worst, size = np.array([p.m1, p.m2, p.m3]), 0.0, 0.0
     for i, state in enumerate(np.random.default_rng(6).uniform(-1, 1, (50, 8)) * [0.5, 0.5, 0.5, 3, 3, 3, 3, 3]):
-        acceleration = model.acceleration(2 * i * 1e-3, state)[:3]
+        acceleration = model.acceleration(2 * i * 1e-3, *np.split(state, 2))[:3]
         wanted = p.g - forces.values[2 * i].sum() / masses.sum()
         worst, size = max(worst, abs(acceleration @ masses / masses.sum() - wanted)), max(size, largest(acceleration))
     return worst / size

@@ -140,15 +140,15 @@ def in_space(engine: str, folder: Path) -> float:
     )
     written = SpatialReference(car)
     if engine == "reference":
-        fall, motion = written.acceleration(start, np.zeros(n)), Kinematics(car)
+        fall, motion = written.acceleration(0.0, start, np.zeros(n)), Kinematics(car)
         pull = sum(body.mass * (motion.shift(body.name, body.position)[2] @ fall + 9.81) for body in car.bodies)
         return float(abs(pull) / (9.81 * sum(body.mass for body in car.bodies)))
     settings = setups.Settings(INTEGRATORS[engine], 5e-4, 0.5)
     model = build_in_space(engine, car, settings)
     run, worst = model.run(start, np.zeros(n)), 0.0
     for q, v in list(zip(run.positions, run.rates, strict=True))[::50]:
-        wanted = written.acceleration(q, v)
-        worst = max(worst, float(np.abs(model.acceleration(q, v) - wanted).max() / np.abs(wanted).max()))
+        wanted = written.acceleration(0.0, q, v)
+        worst = max(worst, float(np.abs(model.acceleration(0.0, q, v) - wanted).max() / np.abs(wanted).max()))
     return worst
 
 

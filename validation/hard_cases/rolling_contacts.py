@@ -15,11 +15,13 @@ import numpy as np
 from scipy.integrate import simpson
 
 from models.core.trajectory import Trajectory
-from models.engines.contact_bridge import Wheels, add_forces, check_step
+from models.engines.contact_bridge import Wheels, add_forces, check_step, forces
 from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.contact_bridge_mujoco import model, native_law
-from models.engines.mujoco_callback import installed
+from models.engines.contact_bridge_mujoco import model
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_quiet import installed
 from models.multibody.numbers import Handling, Tyres
+from models.multibody.plain.march import march
 from models.rail.energy import ledger
 from models.rail.equations import Equations
 from models.rail.laid_profiles import Profiles
@@ -47,7 +49,7 @@ def on_rig(implementation: str, wheels: Wheels, rates: np.ndarray) -> np.ndarray
         rig = model(replace(wheels, stiffness=(0.0,) * 4, damping=(0.0,) * 4), 1e-7)
         data = mujoco.MjData(rig)
         data.qvel[:] = v
-        with installed(native_law()):
+        with installed(kernel_law(forces)):
             mujoco.mj_forward(rig, data)
         f = data.qfrc_passive.copy()
     else:
@@ -117,19 +119,9 @@ def drive(implementation: str, handling: Handling, speed: float, duration: float
     """A run of the car."""
     if implementation != "reference":
         return driven(implementation, handling, speed, duration, step)
-    model, (q, v), n = build("mujoco", handling), handling.straight(speed), len(handling.vehicle.coordinates())
-    states = [np.concatenate((q, v))]
-
-    def rates(x: np.ndarray) -> np.ndarray:
-        return np.concatenate((x[n:], model.acceleration(0.0, x[:n], x[n:])))
-
-    for _ in range(round(duration / step)):
-        x = states[-1]
-        a = rates(x)
-        b = rates(x + 0.5 * step * a)
-        c = rates(x + 0.5 * step * b)
-        states.append(x + step / 6.0 * (a + 2.0 * b + 2.0 * c + rates(x + step * c)))
-    return read(handling, Trajectory(step * np.arange(len(states)), np.array(states)))
+    model, start = build("mujoco", handling), handling.straight(speed)
+    states = march(lambda _, q, v: model.acceleration(0.0, q, v), *start, round(duration / step), step)
+    return read(handling, Trajectory(step * np.arange(len(states)), states))
 
 
 def wrong(run: Drive) -> bool:

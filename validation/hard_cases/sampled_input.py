@@ -224,7 +224,7 @@ def bump_naive(folder: Path) -> str:
     assembly = vehicle().with_input("road", _bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(
-        lambda t, y: np.concatenate((y[4:], model.acceleration(t, y))),
+        lambda t, y: np.concatenate((y[4:], model.acceleration(t, y[:4], y[4:]))),
         (0.0, 10.5),
         assembly.initial,
         "LSODA",

@@ -14,8 +14,8 @@ from numba import carray, cfunc, types
 
 from models.engines import mujoco as adapter
 from models.engines.assembly import Assembly, Settings
-from models.engines.mujoco_callback import installed
 from models.engines.mujoco_layout import offsets
+from models.engines.mujoco_quiet import installed
 from models.machine.stack import array_at, double_at
 
 PARAMETERS = 17

@@ -4,7 +4,6 @@ Three runs tell, which differ in the callback alone: an empty one (the engine), 
 positions and rates and hands back a damper's forces (more than that by the bridge), and the real one (the kernel).
 """
 
-import struct
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -15,9 +14,11 @@ from numba import carray
 from models.drawing.figures import LABELS
 from models.engines.assembly import Settings
 from models.engines.contact_bridge import Wheels, forces
-from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.contact_bridge_mujoco import Marcher, empty_law, model, native_law
-from models.engines.mujoco_callback import installed
+from models.engines.contact_bridge_exudyn import Forces, Rolling, listed
+from models.engines.contact_bridge_mujoco import empty_law, model
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from models.engines.reference import derivative_of
 from models.machine.compiled import njit
 from models.machine.stack import at, beyond
@@ -42,33 +43,19 @@ Of = Callable[[Any, Any], Any]
 
 
 @njit(cache=True, error_model="numpy")
-def damper(numbers, q, v, f):
-    """Add a weak damper's forces on four coordinates to ``f``; all are pointers to doubles."""
+def damper(numbers, t, q, v, f):
+    """Add a weak damper's forces on four coordinates to ``f``; all but the time are pointers to doubles."""
     rate, force = carray(v, (4,)), carray(f, (4,))
     for i in range(4):
         force[i] -= DAMPER * rate[i]
 
 
 @njit(cache=True, error_model="numpy")
-def handed_damper(block):
-    """Set the damper's forces in one block of doubles at an address, f, q and v (4,) each."""
+def handed_damper(block, t, n):
+    """Set the damper's forces in one block of doubles at an address, f, q and v (n,) each."""
     f = at(block)
-    carray(f, (4,))[:] = 0.0
-    damper(f, beyond(f, 4), beyond(f, 8), f)
-
-
-def handed() -> Of:
-    """Forces of lists of positions and rates by ``handed_damper``, the way ``Forces`` hands them over."""
-    block = np.zeros(12)
-    pack, raw, address = struct.Struct("8d").pack_into, block.data.cast("B")[32:], block.ctypes.data
-    answer = block[:4].data.tolist
-
-    def of(positions: Any, rates: Any) -> Any:
-        pack(raw, 0, *positions, *rates)
-        handed_damper(address)
-        return answer()
-
-    return of
+    carray(f, (n,))[:] = 0.0
+    damper(f, t, beyond(f, n), beyond(f, 2 * n), f)
 
 
 ZEROS = [0.0] * 4
@@ -94,21 +81,22 @@ def _road_exudyn() -> Runs:
         return (scale * derivative(y, road, p)[4:]).tolist()
 
     return [
-        partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"]) for law in (nothing, handed(), of)
+        partial(exudyn_marches(masses, law, [METHODS["exudyn"]])[0], STEPS["road"])
+        for law in (nothing, listed(4, np.zeros(0), handed_damper), of)
     ]
 
 
 def _road_mujoco() -> Runs:
     settings = Settings(METHODS["mujoco"], STEP["road"], STEPS["road"] * STEP["road"])
     compiled = CompiledForces(assemble(road_excited.scene()), settings)
-    return [partial(_within, counted, compiled.coast) for counted in (empty_law(), native_law(damper), law())]
+    return [partial(_within, counted, compiled.coast) for counted in (empty_law(), kernel_law(damper), law())]
 
 
 def _wheel_exudyn() -> Runs:
     wheels, steps, step = _wheels()
     return [
         partial(Rolling(wheels, of).run, *wheels.state(), steps, step, METHODS["exudyn"])
-        for of in (nothing, handed(), Forces(wheels).of)
+        for of in (nothing, listed(4, np.zeros(0), handed_damper), Forces(wheels).of)
     ]
 
 
@@ -117,7 +105,7 @@ def _wheel_mujoco() -> Runs:
     marcher, start = Marcher(model(wheels, step, METHODS["mujoco"])), np.concatenate(wheels.state())[None]
     return [
         partial(_within, law, partial(marcher.run, start, steps))
-        for law in (empty_law(), native_law(damper), native_law(forces))
+        for law in (empty_law(), kernel_law(damper), kernel_law(forces))
     ]
 
 

@@ -38,7 +38,7 @@ def model(engine: str, vehicle: CutVehicle, route: Route, steps: int = 1) -> Hub
 def acceleration_error(engine: str, vehicle: CutVehicle, states: list[State]) -> float:
     """Largest difference of a native build's accelerations from compiled forces, by each coordinate's largest."""
     native, compiled = model(engine, vehicle, "native"), model("mujoco", vehicle, "compiled")
-    return _difference([[each.accelerations(0.0, *state) for state in states] for each in (native, compiled)])
+    return _difference([[each.acceleration(0.0, *state) for state in states] for each in (native, compiled)])
 
 
 def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
@@ -46,8 +46,8 @@ def equations_error(vehicle: CutVehicle, states: list[State]) -> float:
     still = Drive(0.0 * static(vehicle, 3).hubs)
     compiled, equations = HubModel("reference", vehicle, still, STEP, STEP), written(vehicle)
     paths = [
-        [compiled.accelerations(0.0, *state) for state in states],
-        [equations.acceleration(*state) for state in states],
+        [compiled.acceleration(0.0, *state) for state in states],
+        [equations.acceleration(0.0, *state) for state in states],
     ]
     return _difference(paths)
 

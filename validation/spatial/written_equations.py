@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.engines.assembly import Settings
 from models.engines.cut_vehicle import PLAIN
 from models.engines.cut_vehicle import build as hub_model
 from models.multibody import forces as at
@@ -96,7 +97,8 @@ def report_gap(car: Handling, count: int) -> float:
 
 def rolling_path_gap(car: Handling, engine: str, duration: float) -> float:
     """Largest difference of positions and rates along a run."""
-    ours, theirs = (build(name, car).run(*car.straight(SPEED), duration, STEP) for name in (engine, REFERENCE))
+    settings = Settings("RK4", STEP, duration)
+    ours, theirs = (build(name, car, settings).run(*car.straight(SPEED)) for name in (engine, REFERENCE))
     return float(max(np.abs(ours.positions - theirs.positions).max(), np.abs(ours.rates - theirs.rates).max()))
 
 
@@ -131,7 +133,7 @@ def hub_gap(vehicle: CutVehicle, engine: str, count: int) -> float:
         for seed in range(i, count, len(all_drives)):
             q, v = cut_state(vehicle, seed)
             time = 0.5 * STEP * (seed % 3)
-            worst = max(worst, off(*(model.accelerations(time, q, v) for model in models)))
+            worst = max(worst, off(*(model.acceleration(time, q, v) for model in models)))
     return worst
 
 

@@ -13,6 +13,7 @@ from models.advice.ride_choice.march import cost
 from models.advice.ride_choice.reduced import Reduced, Whole
 from models.advice.ride_choice.screen import confirmed
 from models.core.errors import InputError
+from models.core.runge_kutta import step_on
 from models.core.scene_effects import absent, beside, listing
 from models.machine.timing import paired_ratio
 from models.systems.ride.of_scene import told_by
@@ -89,10 +90,7 @@ def _timed(A: np.ndarray) -> float:
     x, step = np.ones(len(A)), 1e-6
     begun = time.process_time()
     for _ in range(STEPS):
-        k1 = A @ x
-        k2 = A @ (x + step / 2 * k1)
-        k3 = A @ (x + step / 2 * k2)
-        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + A @ (x + step * k3))
+        x = step_on(lambda _, state: A @ state, 0.0, x, step)
     return 1e6 * (time.process_time() - begun) / STEPS
 
 

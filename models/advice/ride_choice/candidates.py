@@ -9,11 +9,12 @@ from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 
-from models.advice.ride_choice.march import STAGES, Cost, March, cost, longest_step
+from models.advice.ride_choice.march import Cost, March, cost, longest_step
 from models.advice.ride_choice.neighbourhood import Neighbourhood
 from models.advice.ride_choice.reduced import Reduced, Whole
 from models.advice.ride_choice.screen import Screen, confirmed, silent
 from models.core.errors import InputError
+from models.core.runge_kutta import STAGES
 from models.systems.ride.omissions import effects_of
 from models.systems.ride.reduced_scene import Effect, ReducedScene, without
 from models.systems.ride.scene import RideScene

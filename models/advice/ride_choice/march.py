@@ -19,9 +19,8 @@ import numpy as np
 
 from models.advice.ride_choice.reduced import Reduced
 from models.advice.ride_choice.waves import at_axles, filtered, frequencies, weighting_factors
+from models.core.runge_kutta import STAGES
 
-STAGES = 4
-"""Calls of a step of the classical Runge-Kutta method."""
 REACH = np.linspace(0.0, 3.0, 601)[1:]
 """Sizes of step times eigenvalue at which its stability is looked at; on the real axis it ends at 2.785."""
 ALIKE, BEYOND = 6, 6.0

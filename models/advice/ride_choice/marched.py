@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
-from models.advice.ride_choice.march import STAGES, March
+from models.advice.ride_choice.march import March
+from models.core.runge_kutta import STAGES, step_on
 from models.ride.covariance import noise_of
 from models.ride.road_path import RoadPath
 
@@ -74,17 +75,14 @@ def _squares(march: March, road: np.ndarray, step: float) -> tuple[np.ndarray, i
     copies = road.shape[2]
     x, count, sums, calls = _begin(march, road[0]), 0, np.zeros((len(march.rows), copies)), 0
 
-    def rate(x: np.ndarray, force: np.ndarray) -> np.ndarray:
+    def rate(time: float, x: np.ndarray) -> np.ndarray:
         nonlocal calls
         calls += 1
-        return A @ x + force
+        return A @ x + acting[time]
 
     for i in range(len(road) // 2):
-        begin, middle, end = force[2 * i : 2 * i + 3] + noise[i]
-        k1 = rate(x, begin)
-        k2 = rate(x + step / 2 * k1, middle)
-        k3 = rate(x + step / 2 * k2, middle)
-        x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + rate(x + step * k3, end))
+        acting = dict(zip((0.0, 0.5 * step, step), force[2 * i : 2 * i + 3] + noise[i], strict=True))
+        x = step_on(rate, 0.0, x, step)
         if i >= BEGIN * (len(road) // 2):
             count += 1
             sums += march.heard(np.concatenate([x, road[2 * i + 2]])) ** 2

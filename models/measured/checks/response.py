@@ -35,7 +35,7 @@ class Response:
         self.vehicle, self.motion = vehicle, Kinematics(vehicle.tree)
         model, n = _built(vehicle, frame), vehicle.size
         rest, moved = np.zeros(n), NUDGE * np.eye(n)
-        at = model.accelerations
+        at = model.acceleration
         self.stiff = np.column_stack([(at(0.0, d, rest) - at(0.0, -d, rest)) / (2 * NUDGE) for d in moved])
         self.damped = np.column_stack([(at(0.0, rest, d) - at(0.0, rest, -d)) / (2 * NUDGE) for d in moved])
         still, hubs = at(0.0, rest, rest), range(WRENCH * len(vehicle.hubs))

@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from models.core.runge_kutta import step_on
+
 Acceleration = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
 """Accelerations (n,) at a time (s), positions and rates (n,)."""
 
@@ -19,12 +21,7 @@ def march(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, steps: int, 
 
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for i in range(steps):
-            t, state = i * step, states[i]
-            first = rate(t, state)
-            two = rate(t + 0.5 * step, state + 0.5 * step * first)
-            three = rate(t + 0.5 * step, state + 0.5 * step * two)
-            four = rate(t + step, state + step * three)
-            states[i + 1] = state + step / 6.0 * (first + 2.0 * two + 2.0 * three + four)
+            states[i + 1] = step_on(rate, i * step, states[i], step)
             if not np.isfinite(states[i + 1]).all():
                 states[i + 1 :] = np.nan
                 break

@@ -198,7 +198,8 @@ class Again:
         run, handling, step = self.drive.run, self.drive.handling, factor * self.step
         first, count = round(MIDDLE * (len(run.times) - 1)), max(2, round(share * (len(run.times) - 1) / factor))
         later = _later(handling, run.times[first])
-        path = build(self.engine, later).run(run.positions[first], run.rates[first], count * step, step)
+        model = build(self.engine, later, Settings("RK4", step, count * step))
+        path = model.run(run.positions[first], run.rates[first])
         return principal(read(later, path, self.engine), run.times[first])
 
     def by_cells(self, names: list[str]) -> dict[str, Estimate]:
@@ -259,11 +260,11 @@ def _later(handling: Handling, since: float) -> Handling:
     )
 
 
-def build(engine: str, handling: Handling) -> FreeModel:
-    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"."""
+def build(engine: str, handling: Handling, settings: Settings | None = None) -> FreeModel:
+    """The vehicle in "exudyn" or "mujoco", or as the plain equations of "reference"; settings : wanted for runs."""
     if engine == REFERENCE:
-        return Plain(engine, _plain(handling).acceleration)
-    return free_model(engine, driven_by(handling))
+        return Plain(engine, _plain(handling).acceleration, len(handling.vehicle.coordinates()), settings)
+    return free_model(engine, driven_by(handling), settings)
 
 
 def _plain(handling: Handling) -> "PlainRolling":
@@ -279,10 +280,10 @@ def driven_by(handling: Handling) -> Driven:
 
 def driven(engine: str, handling: Handling, speed: float, duration: float, step: float = 1e-3) -> Drive:
     """Drive from straight rolling at a speed (m/s) for a duration (s); RunFailed where it does not end well."""
-    model = build(engine, handling)
+    model = build(engine, handling, Settings("RK4", step, duration))
     begun = time.process_time()
     with _turning_over(handling, engine):
-        path = model.run(*handling.straight(speed), duration, step)
+        path = model.run(*handling.straight(speed))
     return read(handling, path, engine, time.process_time() - begun)
 
 

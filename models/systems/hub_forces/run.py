@@ -159,7 +159,9 @@ def errors_of_steps(
         inputs = drive(tried_step, first + count)
         guide = None if inputs.guide is None else inputs.guide[2 * first :]
         part = replace(inputs, hubs=inputs.hubs[2 * first :], guide=guide)
-        path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(run.states[row])
+        path = build(engine, vehicle, part, tried_step, count * tried_step, forces).run(
+            run.positions[row], run.rates[row]
+        )
         return principal(vehicle, path, first * tried_step)
 
     fine, units = principal(vehicle, run), dict.fromkeys(("roll", "pitch"), "rad")
@@ -206,7 +208,7 @@ def run(
     kind = scene.forces_with(method)
     model = build(engine, measurement.vehicle, drive, scene.run.step, scene.run.duration, kind)
     begun = time.process_time()
-    path = model.run(measurement.start(drive))
+    path = model.run(*np.split(measurement.start(drive), 2))
     seconds = time.process_time() - begun
     result = labelled(measurement, path, engine, method, seconds)
     if not error:

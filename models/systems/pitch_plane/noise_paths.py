@@ -192,13 +192,14 @@ class MujocoThreads(NoisePaths):
         """States (paths, steps + 1, 8) of all models, and whether MuJoCo warned of anything."""
         from mujoco import rollout
 
-        from models.engines.mujoco_quiet import quiet
+        from models.engines.mujoco_march import warnings
+        from models.engines.mujoco_quiet import installed, quiet
 
         start = np.concatenate(([0.0], self.base.initial))
         held = models[0].drive.controls is not None
-        controls = np.concatenate([model.padded(model.drive.controls) for model in models]) if held else None
+        controls = np.stack([model.controls() for model in models]) if held else None
         working = models[: self.threads]
-        with models[0].callback(), quiet():
+        with installed(models[0].drive.law), quiet():
             sensed, _ = rollout.rollout(
                 [model.model for model in models],
                 [model.data for model in working],
@@ -207,7 +208,7 @@ class MujocoThreads(NoisePaths):
                 nstep=self.settings.steps,
             )
         states = np.concatenate((np.tile(self.base.initial, (len(models), 1, 1)), sensed[:, :, 1:9]), axis=1)
-        return states, any(model.warnings() for model in working)
+        return states, any(warnings(model.data) for model in working)
 
     def facts(self) -> dict[str, Any]:
         """As of all noise paths."""

@@ -14,8 +14,9 @@ from models.core.discretisation import FINE_WINDOW, Series, estimated, of_tolera
 from models.core.errors import InputError, RunFailed
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Channels, Model, Settings
+from models.engines.assembly import Assembly, Channels, Settings
 from models.engines.catalogue import CATALOGUE, OUTSIDE
+from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.assumptions import assumptions, principal
 from models.systems.pitch_plane.scene import Scene, assemble, settings_of

@@ -294,8 +294,7 @@ def driven(
     check_rates(vehicle, road.excitation)
     steps = len(table) // 2
     model = _model(engine, vehicle, road, table)
-    zero = np.zeros(len(vehicle.coordinates()))
-    run = model.run(zero, zero)
+    run = model.run()
     at = np.arange(int(np.ceil(skipped / road.step - 1e-9)), steps + 1, every)
     return _read(model, vehicle, road, table, run, at)
 
@@ -317,7 +316,9 @@ def _read(
 ) -> Ride:
     """Outputs of a run at steps (m,)."""
     linear = linearise(vehicle, road.speed)
-    accelerations = np.array([model.acceleration(run.positions[i], run.rates[i], table[2 * i]) for i in at])
+    accelerations = np.array(
+        [model.acceleration(i * road.step, run.positions[i], run.rates[i], table[2 * i]) for i in at]
+    )
     rows = np.column_stack([accelerations, run.rates[at], run.positions[at], table[2 * at]])
     outputs = rows @ np.array([row_of(output) for output in linear.outputs]).T
     bent = {spring.name for spring in vehicle.springs if spring.bent}

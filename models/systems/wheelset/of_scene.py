@@ -18,8 +18,8 @@ from models.systems.wheelset.scene import WheelsetScene
 SETS = {"chosen": CHOSEN}
 IMPLEMENTATIONS = {
     "reference": "models.rail.equations.Equations",
-    "exudyn": "models.engines.wheelset_exudyn.ExudynWheelset",
-    "mujoco": "models.engines.wheelset_mujoco.MujocoWheelset",
+    "exudyn": "models.engines.wheelset.ExudynWheelset",
+    "mujoco": "models.engines.wheelset.MujocoWheelset",
 }
 FLANGE = "flange_stiffness"
 """The only parameter that profiles leave nothing to do: cones stand for them where motions are small."""

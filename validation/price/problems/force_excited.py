@@ -16,7 +16,8 @@ from models.advice.price.problem import Setting
 from models.core.noise import normal
 from models.core.signals import Sampled, Smooth, Stacked
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
+from models.engines.model import Model
 from models.engines.protocol import build
 from models.systems.pitch_plane.run import outputs
 from models.systems.pitch_plane.run import run as simulate

@@ -117,7 +117,7 @@ class FreeVehicle:
         n = len(self.vehicle.coordinates())
 
         def rates(t: float, y: np.ndarray) -> np.ndarray:
-            return np.concatenate([y[n:], acceleration(y[:n], y[n:], self.road(t))])
+            return np.concatenate([y[n:], acceleration(t, y[:n], y[n:], self.road(t))])
 
         solution = solve_ivp(
             rates,
@@ -134,7 +134,7 @@ class FreeVehicle:
         """Wheel loads beside the static ones (m, w) in N and accelerations (m, p) in m/s^2 of states (m, 2 n)."""
         road = self.road(times)
         n = states.shape[1] // 2
-        given = [self._model.acceleration(y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
+        given = [self._model.acceleration(0.0, y[:n], y[n:], z) for y, z in zip(states, road, strict=True)]
         motion = np.column_stack([given, states[:, n:], states[:, :n], road])
         return {
             name: motion @ np.array([row_of(output) for output in self._outputs if output.kind == kind]).T

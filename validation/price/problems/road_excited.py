@@ -18,8 +18,9 @@ from models.advice.price.systems.pitch_plane import engine_settings
 from models.core.assumptions import judged
 from models.core.result import Channel, Result, result
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Model, Settings
+from models.engines.assembly import Assembly, Settings
 from models.engines.catalogue import CATALOGUE
+from models.engines.model import Model
 from models.engines.protocol import build
 from models.engines.reference import derivative_of
 from models.systems.pitch_plane.assumptions import assumptions

@@ -15,10 +15,9 @@ import numpy as np
 from mujoco import rollout
 
 from models.core.errors import Refused, RunFailed
+from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
-from models.engines.exudyn import counted
-from models.engines.exudyn_coordinates import solve
-from models.engines.exudyn_system import items
+from models.engines.exudyn_system import counted, items, solve
 from models.engines.mujoco import INTEGRATORS
 from models.engines.mujoco_quiet import quiet
 from models.sensors.rotations import from_matrix, logarithm, product
@@ -76,9 +75,9 @@ def in_exudyn(method: str, period: float, count: int, every: int, start: np.ndar
     options.solution.sensors.writePeriod = period * every
     options.timeIntegration.automaticStepSize = False
     options.timeIntegration.generalizedAlpha.spectralRadius = 0.9
-    solved = solve(mbs, options, count, period, name)
+    note = solve(mbs, Settings(name, period, count * period), options)
     kept = mbs.GetSensorStoredData(sensor)[:, 1:]
-    if not solved or len(kept) != count // every + 1:
+    if note or len(kept) != count // every + 1:
         raise RunFailed("exudyn", "the solver reported failure", period * every * len(kept))
     attitudes = start + kept[:, 3:] if implicit else from_matrix(kept.reshape(-1, 3, 3))
     return _sound("exudyn", attitudes, counted(mbs))

@@ -21,9 +21,11 @@ from models.core.errors import Refused, RunFailed
 from models.engines.catalogue import MISSING
 from models.engines.contact_bridge import FREEDOMS, Wheels, add_forces, check_step, forces, linear
 from models.engines.contact_bridge_exudyn import Forces, Rolling
-from models.engines.contact_bridge_mujoco import Marcher, model, native_law
-from models.engines.exudyn import counted
-from models.engines.mujoco_callback import installed
+from models.engines.contact_bridge_mujoco import model
+from models.engines.exudyn_system import counted
+from models.engines.mujoco_callback import kernel_law
+from models.engines.mujoco_march import Marcher
+from models.engines.mujoco_quiet import installed
 from models.engines.stability import LONG_RUN, limit
 from models.machine.compiled import njit
 from models.machine.stack import start
@@ -100,7 +102,7 @@ def rates(state, numbers, table, out):
     out[:n] = state[n:]
     out[n:] = 0.0
     position, rate, force = state[:n].copy(), state[n:].copy(), np.zeros(n)
-    forces(start(numbers), start(position), start(rate), start(force))
+    forces(start(numbers), 0.0, start(position), start(rate), start(force))
     for i in range(n):
         out[n + i] = (force[i] - table[1, i] * position[i] - table[2, i] * rate[i]) / table[0, i]
 
@@ -210,7 +212,7 @@ class RollingWheels:
         marcher = Marcher(model(self.wheels, DURATION / steps, method))
 
         def run() -> Result:
-            with installed(native_law()):
+            with installed(kernel_law(forces)):
                 state = marcher.run(self._start[None], steps)[0, -1]
             return Result(state, {"steps": steps, "force calls": STAGES[method] * steps})
 

@@ -87,9 +87,10 @@ def counted() -> Iterator[list[float]]:
     """Evaluations of the forces within the block, run by run, each times the cells of its tyres' nets."""
     calls, march = list[float](), FreeModel.run
 
-    def counting(model: FreeModel, q: np.ndarray, v: np.ndarray, duration: float, step: float) -> Trajectory:
-        calls.append(4.0 * round(duration / step) * model.numbers[CELLS])
-        return march(model, q, v, duration, step)
+    def counting(model: FreeModel, q: np.ndarray, v: np.ndarray) -> Trajectory:
+        assert model.settings is not None
+        calls.append(4.0 * model.settings.steps * model.numbers[CELLS])
+        return march(model, q, v)
 
     with mock.patch.object(FreeModel, "run", counting):
         yield calls

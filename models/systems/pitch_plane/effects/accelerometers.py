@@ -14,7 +14,8 @@ from models.core.noise import ACCELEROMETERS, normal
 from models.core.result import Result
 from models.core.strict import Strict, quantity
 from models.core.trajectory import Trajectory
-from models.engines.assembly import Assembly, Channels, Model
+from models.engines.assembly import Assembly, Channels
+from models.engines.model import Model
 from models.systems.pitch_plane.sampling import PATH, SEED, check_rate, numbers, read, within_range
 
 COST = "one acceleration of the engine per sample after the run; no state in any engine"
@@ -92,7 +93,7 @@ class Accelerometers:
         from models.sensors.sensor_array import on_bracket, readings
 
         p, y = self.parameters, run.states[rows]
-        moved = np.array([model.acceleration(run.times[row], run.states[row]) for row in rows])
+        moved = np.array([model.acceleration(run.times[row], run.positions[row], run.rates[row]) for row in rows])
         places = np.array(list(p.positions().values()))
         values = readings(places, y[:, 3], y[:, 7], moved[:, 2], moved[:, 3], assembly.parameters.g)
         for i, sensor in enumerate(p.sensors.values()):

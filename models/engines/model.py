@@ -1,0 +1,29 @@
+"""What an engine is to every system: one protocol, which comparisons, prices, choices and sweeps go by."""
+
+from typing import Protocol
+
+import numpy as np
+
+from models.core.trajectory import Trajectory
+
+
+class Model(Protocol):
+    """A vehicle in an engine, or as written equations, with what drives it and how it is marched.
+
+    Ride asks beside that for a linear vehicle (``spatial_protocol``), and a braked vehicle, whose wheels take smaller
+    steps than its chassis, for single steps (``free_vehicle.FreeModel.march``). A wheelset on rails has a state that is
+    not its coordinates and their rates, and marches of many lengths about one linearisation: it is
+    ``rail.equations.Equations``, of which an engine gives accelerations and marches by a ``FreeModel``.
+    """
+
+    def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Accelerations (n,) in m/s^2 and rad/s^2 at a time (s), coordinates and rates (n,)."""
+        ...
+
+    def run(self) -> Trajectory:
+        """March over the whole duration; RunFailed if the answer is not complete, finite and sane."""
+        ...
+
+    def plan(self) -> dict[str, int]:
+        """What was built: degrees of freedom, native items, callbacks."""
+        ...

@@ -1,0 +1,72 @@
+"""Runs in MuJoCo's own loop: one with a guard on the way, or many at once in several threads."""
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from models.core.errors import RunFailed
+from models.core.waiting import marching
+from models.engines.mujoco_quiet import quiet
+from models.engines.protocol import guard
+
+CHUNK = 4096
+"""Steps between two looks at the guard."""
+FORCE_CALLS = {"RK4": 4}
+"""Evaluations of the forces in a step of an integrator; 1 in those that are not here."""
+
+
+def warnings(data: mujoco.MjData) -> str:
+    """What MuJoCo itself noticed, as a phrase; empty if nothing."""
+    names = [mujoco.mjtWarning(i).name for i in range(len(data.warning)) if data.warning[i].number]
+    return f"; MuJoCo warned {', '.join(names)}" if names else ""
+
+
+def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, controls: np.ndarray) -> np.ndarray:
+    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step.
+
+    In chunks, so that a run that has failed is not carried to its end. RunFailed where MuJoCo stops, starts again at
+    time zero or warns; the guard names a worse reason if there is one.
+    """
+    steps, step = len(controls), model.opt.timestep
+    path, times = np.empty((steps + 1, 1 + start.size)), step * np.arange(steps + 1)
+    path[0, 0], path[0, 1:] = 0.0, start
+    for warning in data.warning:
+        warning.number = 0
+    with quiet(), marching(lambda: data.time / times[-1]):
+        for first, last in _chunks(steps):
+            rows, held = path[first + 1 : last + 1], controls[None, first:last] if model.nu else None
+            rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])
+            late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
+            if late.any() or warnings(data):
+                end = first + (int(np.argmax(late)) if late.any() else len(rows))
+                guard("mujoco", times[: end + 1], path[: end + 1, 1:], times[end])
+                raise RunFailed("mujoco", f"the engine gave up{warnings(data)}", times[end], path[end, 1:])
+    return path[:, 1:]
+
+
+def _chunks(steps: int) -> Iterator[tuple[int, int]]:
+    """First and last row of each part of a run."""
+    for first in range(0, steps, CHUNK):
+        yield first, min(first + CHUNK, steps)
+
+
+class Marcher:
+    """Runs of one model in one thread or more."""
+
+    def __init__(self, built: mujoco.MjModel, threads: int = 1) -> None:
+        self.model, self._data = built, [mujoco.MjData(built) for _ in range(threads)]
+
+    def run(self, states: np.ndarray, steps: int) -> np.ndarray:
+        """States (n, steps, 2 m) of n runs from ``states`` (n, 2 m); RunFailed unless all of it is finite."""
+        whole = np.concatenate((np.zeros((len(states), 1)), states), axis=1)
+        with marching(lambda: self._data[0].time / (steps * self.model.opt.timestep)):
+            path = rollout.rollout(self.model, self._data, whole, nstep=steps)[0][..., : 1 + 2 * self.model.nv]
+        late = path[:, -1, 0] < (steps - 0.5) * self.model.opt.timestep
+        failed = late | ~np.isfinite(path[:, -1]).all(axis=1)  # MuJoCo starts again at time zero where it gives up
+        if failed.any():
+            failed_path = path[int(failed.argmax())]
+            last = failed_path[int(failed_path[:, 0].argmax())]
+            raise RunFailed("mujoco", "the engine gave up", float(last[0]), last[1:])
+        return path[..., 1:]
