@@ -75,7 +75,7 @@ def test_nothing_is_drawn_of_short_work_and_into_pipes(tmp_path):
 
 def test_a_command_that_takes_seconds_has_one_and_its_results_do_not(tmp_path):
     """One run in one engine, at some 15,000 steps a second on an idle core and with twice as many of half the steps."""
-    arguments = ["run", "release", "--engine", "exudyn", "--json", "--out", "out", "--set", "run.duration=30"]
+    arguments = ["run", "release", "--engine", "exudyn", "--json", "--out", "out", "--set", "run.duration=60"]
     command = [sys.executable, "-m", "studies.command_line", *arguments]
     drawn, written = on_terminal(*command, folder=tmp_path)
     assert "exudyn" in drawn and re.search(r" s (left|so far)", drawn)

@@ -20,7 +20,7 @@ SLOW = 0.4
 """s of one compilation from which on it is told: loading what was compiled before takes less."""
 KNOWN = 0.01
 """Share of a work from which on its time left is told."""
-COMPILING = {"pitch-plane": 5.0}
+COMPILING = {"pitch-plane": 5.0, "handling": 30.0}
 """s that all kernels of a system take to compile on an idle core; an upper bound, as some may be there."""
 LOCK = "numba:compiler_lock"
 """Numba's event from the beginning to the end of each compilation."""
