@@ -128,7 +128,7 @@ def _figure(
     results: Results,
     folder: Path,
 ) -> None:
-    from models.drawing.figures import DARK, SMALL, WIDE, heading, plt, save
+    from models.drawing.figures import DARK, WIDE, heading, legend_below, plt, save
 
     figure, (histogram, cloud) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
     edges = np.histogram_bin_edges(np.concatenate([arrays["distance"] for arrays in ensembles]), bins=24)
@@ -137,7 +137,7 @@ def _figure(
         label = f"{options.names[i]}: {distance.mean:.2f} m, scatter {distance.deviation:.2f} m"
         histogram.hist(arrays["distance"], edges, color=f"C{i}", alpha=0.5, label=label)
         histogram.axvline(distance.mean, color=f"C{i}")
-        cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6, label=options.names[i])
+        cloud.plot(arrays["speed"], arrays["distance"], "o", ms=3, color=f"C{i}", alpha=0.6)
     speeds = np.sort(ensembles[0]["speed"])
     cloud.plot(
         speeds,
@@ -149,8 +149,7 @@ def _figure(
     said = f"; Welch's test of the means: p = {tests['distance'].p:.2g}" if tests else ""
     histogram.set(xlabel="stopping distance [m]", ylabel="stops [-]", title="Stopping distances and their means")
     cloud.set(xlabel="initial speed [m/s]", ylabel="stopping distance [m]", title="More scatters than the speed")
-    histogram.legend(fontsize=SMALL)
-    cloud.legend(fontsize=SMALL)
+    legend_below(figure, histogram, cloud, columns=2)
     heading(figure, f"{scene.title}: {options.runs} stops each{said}", results)
     save(figure, folder / "ensemble.png")
 

@@ -22,6 +22,7 @@ from models.drawing.figures import (
     panels,
     plt,
     save,
+    wrapped,
 )
 from models.drawing.figures import COLOURS as ENGINES
 from models.ride.frequency import one_sided
@@ -181,7 +182,8 @@ def detail_figure(
     path: Path,
 ) -> None:
     """Errors of all outputs by model and road as a table of colours, with what a covariance costs."""
-    heads = [f"{model}\n{1e3 * cost[model]:.2g} ms\n" + road.replace(", ", ",\n") for model, road in errors]
+    share = 0.66 * WIDE / len(errors)
+    heads = [wrapped(f"{model}\n{1e3 * cost[model]:.2g} ms\n{road}", share, SMALL) for model, road in errors]
     values = 100 * np.array(list(errors.values())).T
     figure, axis = plt.subplots(figsize=(WIDE, 0.3 * len(names) + 2.2))
     picture = axis.imshow(values, cmap="RdBu_r", vmin=-60, vmax=60, aspect="auto")
@@ -224,10 +226,10 @@ def drive_figure(
             (line,) = axis.plot(found.time, exact, label=label)
             axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
-        _name_below(axis)
+        _name_below(axis, 0.03)
     axes[-1, 0].plot(found.time, found.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
-    _save(figure, above, "\nsolid: exact; dashed: each speed taken by itself", path)
+    _save(figure, above, "\nSolid: exact; dashed: each speed taken by itself", path)
 
 
 MOST = 12
@@ -293,9 +295,9 @@ def _few(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
     return panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
 
 
-def _name_below(axis: plt.Axes) -> None:
-    """The legend below a panel."""
-    axis.legend(fontsize=SMALL, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+def _name_below(axis: plt.Axes, drop: float = 0.18) -> None:
+    """The legend below a panel, by a share of its height that leaves room for what is written there."""
+    axis.legend(fontsize=SMALL, loc="upper center", bbox_to_anchor=(0.5, -drop), ncols=2)
 
 
 def _save(figure: plt.Figure, above: Heading, text: str, path: Path) -> None:

@@ -125,7 +125,7 @@ def _figures(measured: Result, runs: dict[str, Result], folder: Path) -> None:
 def _figure_measurement(measured: Result) -> Any:
     from models.drawing.figures import WIDE, heading, legend_below, plt
 
-    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 4.6), width_ratios=(2, 1))
+    figure, axes = plt.subplots(2, 2, figsize=(WIDE, 4.6), sharex="col", width_ratios=(2, 1))
     middle = round(float(measured.times[-1]) / 2, 1)
     detail = (measured.times >= middle) & (measured.times <= middle + 1)
     panels = ((("zeta1", "zeta2"), "Road under the wheels, up [m]", -1.0), (("f1", "f2"), "Wheel force [kN]", 1e-3))

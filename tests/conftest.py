@@ -10,18 +10,24 @@ import models  # noqa: F401  before any test imports numpy: it sets the threads 
 
 @pytest.fixture(autouse=True, scope="session")
 def figure_rules():
-    """Hold every figure that a test saves to the rules of figures."""
+    """Hold every figure that a test saves, or puts into a page, to the rules of figures."""
     from figure_rules import faults
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    save = Figure.savefig
+    save, vectors = Figure.savefig, FigureCanvasSVG.print_svg
 
     def checked(figure, *args, **options):
         assert not (found := faults(figure)), "\n".join(found)
         return save(figure, *args, **options)
 
+    def paged(canvas, *args, **options):
+        assert not (found := faults(canvas.figure)), "\n".join(found)
+        return vectors(canvas, *args, **options)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", checked)
+        patch.setattr(FigureCanvasSVG, "print_svg", paged)
         yield
 
 

@@ -112,7 +112,7 @@ def test_pages_of_drawings_use_the_palette():
     """Colours are written down in one place; what is drawn in space, and roads, have some more."""
     apart = {"pictures", "braking_figures.py"}
     root = Path(__file__).parents[1]
-    files = [*root.glob("studies/**/*.py"), *root.glob("models/drawing/*.py")]
+    files = [file for place in ("studies", "validation", "models/drawing") for file in (root / place).rglob("*.py")]
     others = [file for file in files if not apart & set(file.parts) and file.name != "figures.py"]
     written = {file.name: colour for file in others for colour in TURNS if colour in file.read_text()}
     assert len(others) > 30 and written == {}

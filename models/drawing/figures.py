@@ -93,8 +93,8 @@ LETTER = 0.6
 
 def wrapped(text: str, inches: float, size: float) -> str:
     """Lines of text broken where letters of a size (points) would leave a width."""
-    most = max(int(72 * inches / (LETTER * size)), 12)
-    return "\n".join("\n".join(wrap(line, most)) for line in text.split("\n"))
+    most = max(int(72 * inches / (LETTER * size)), 8)
+    return "\n".join("\n".join(wrap(line, most, break_long_words=False)) for line in text.split("\n"))
 
 
 def heading(figure: Figure, title: str, results: Results | None = None) -> None:

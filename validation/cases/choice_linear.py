@@ -315,13 +315,13 @@ def tables(data: dict[str, Any]) -> list[Table]:
 
 def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import BLUE, VERMILION, WIDE, heading, plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     predicted, confirmed_ = (100 * abs(np.array([v for one in data["scenes"] for v in one[key]])) for key in PARTS)
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
-    left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color="#0072b2", label="a quantity")
+    left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color=BLUE, label="a quantity")
     left.set(
         xscale="log",
         yscale="log",
@@ -331,7 +331,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     )
     left.legend(loc="upper left")
     tolerance, saving = (np.array([one[key] for one in data["scenes"]]) for key in ("tolerance", "saving"))
-    right.plot(100 * tolerance, saving, "o", ms=4, color="#d55e00")
+    right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")
     return [(SAID, figure)]

@@ -200,7 +200,7 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """Predicted against confirmed changes, and savings over tolerance."""
-    from models.drawing.figures import WIDE, heading, plt
+    from models.drawing.figures import DARK, WIDE, heading, plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     ends = np.array([1e-4, 6.0])
@@ -227,7 +227,7 @@ def draw(data: Saved) -> Drawn:
         ylabel="predicted change [%]",
         title="All that was left out, and longer steps",
     )
-    right.axhline(5.0, color="#222222", ls="--", lw=0.8, label="5 times")
+    right.axhline(5.0, color=DARK, ls="--", lw=0.8, label="5 times")
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     left.legend(loc="upper left")
     right.legend(loc="best")

@@ -33,7 +33,6 @@ SHARE, FEW, COST = 0.95, 0.1, 0.6
 """Least share that is right, largest one that is useless, and largest cost of an estimate, by the run's."""
 EDGE = 1e-12
 """True errors below this share of their channel are rounding."""
-COLOURS = ("#222222", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#767676", "#b00020")
 
 
 @allowing("what is judged is how well equations are solved, whatever a random vehicle does")
@@ -190,11 +189,11 @@ def tables(data: Saved) -> list[Table]:
 
 def draw(data: Saved) -> Drawn:
     """True over stated error, both by the channel's deviation."""
-    from models.drawing.figures import GREY, ORANGE, heading, plt
+    from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, plt
 
     figure, axis = plt.subplots(figsize=(6.5, 5.0))
     known = [one for one in data["samples"] if one["ratio"] is not None and one["share"] > 0.0]
-    for name, colour in zip(dict.fromkeys(one["system"] for one in known), COLOURS, strict=False):
+    for name, colour in zip(dict.fromkeys(one["system"] for one in known), (*TURNS, BAD), strict=False):
         stated = np.array([one["share"] for one in known if one["system"] == name])
         ratios = np.array([one["ratio"] for one in known if one["system"] == name])
         axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)

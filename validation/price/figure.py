@@ -21,6 +21,7 @@ from models.drawing.figures import (
     PINK,
     SKY,
     SMALL,
+    TITLE,
     VERMILION,
     WIDE,
     heading,
@@ -54,7 +55,7 @@ BROKEN: Style = {
 }
 LABEL = np.array([0.37, 0.1])
 """Width and height of a default's name, in fractions of the panel."""
-CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.92, 17)])
+CORNERS = np.array([(x, y) for x in np.linspace(0.015, 0.62, 13) for y in np.linspace(0.2, 0.87, 17)])
 """Where a name may stand: the middle of its left side, clear of the bands below and of what is told above."""
 
 
@@ -73,7 +74,7 @@ def draw(measured: Measured) -> Figure:
         timed = kind == "seconds"
         label = "time [s] of a run, model built anew (median)" if timed else f"{kind} in the run [-]"
         ax.set(xscale="log", yscale="log", xlabel=label)
-        ax.set_title(f"By {kind}" + (f":\n{several}" if timed else ", counted exactly"))
+        ax.set_title(wrapped(f"By {kind}, {several if timed else 'counted exactly'}", 0.44 * WIDE, TITLE))
     _failures(axes[0], measured, top)
     axes[0].set_ylabel(f"error of the {measured.quantity} [{measured.unit}]")
     axes[0].set_ylim(0.3 * measured.uncertainty[measured.quantity], 15 * top)
@@ -149,15 +150,18 @@ def _front(ax: Axes, measured: Measured, kind: str) -> None:
 
 def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
     """Ring and name each engine's default setting, where the panel is emptiest."""
-    taken = _drawn(ax)
+    taken, names = _drawn(ax), list[np.ndarray]()
     ring: Style = {"markersize": 11, "markerfacecolor": "none", "markeredgecolor": DARK, "markeredgewidth": 1.2}
     for owner, p in measured.defaults.items():
         if p.status != "ok":
             continue
         place = (p.cost(kind), measured.error(p))
         ax.plot(*place, "o", **ring, zorder=5)
-        corner = _emptiest(taken, _within(ax, [place])[0])
-        taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])])
+        own = _within(ax, [place])[0]
+        corner = _emptiest(taken, own, names)
+        names.append(corner + LABEL * np.array([0.5, 0.0]))
+        way = own + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - own)
+        taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",
             place,
@@ -185,13 +189,18 @@ def _drawn(ax: Axes) -> np.ndarray:
     return np.vstack(points)
 
 
-def _emptiest(taken: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Of CORNERS, one whose name keeps off what is taken, near its own place where several do."""
+def _emptiest(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
+    """Of CORNERS, one whose name keeps off what is taken, near its own place where several do.
+
+    names : middles of names that stand already, through which no line to this one shall lead.
+    """
     middles = CORNERS + LABEL * np.array([0.5, 0.0])
     apart = np.abs(middles[:, None] - taken) / (0.5 * LABEL)
     clear = np.minimum(apart.max(axis=2).min(axis=1), 1.8)
     far = np.hypot(*(middles - places).T)
-    return np.asarray(CORNERS[np.argmax(clear - 0.3 * far)])
+    ways = places + np.linspace(0.0, 1.0, 17)[:, None, None] * (middles - places)
+    crossed = [(np.abs(ways - name) < 0.55 * LABEL).all(axis=2).any(axis=0) for name in names]
+    return np.asarray(CORNERS[np.argmax(clear - 0.3 * far - 2.0 * np.sum(crossed, axis=0))])
 
 
 def _failures(ax: Axes, measured: Measured, top: float) -> None:
