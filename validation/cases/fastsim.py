@@ -340,7 +340,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
                 "machine, its lower bound: median of rounds with its 95 % interval.",
-                ("what", "time", "by the bound"),
+                ("what", "time", "time / bound"),
                 tuple(tuple(row) for row in data["speed"]),
             )
         )

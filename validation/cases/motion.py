@@ -367,7 +367,7 @@ def draw(data: Saved) -> Drawn:
     left.plot(height, spatial, "ko", markersize=4, label="Monte Carlo")
     left.plot(height, plane, "ko", markersize=4)
     left.set(
-        title="noise of the angular acceleration by that of the readings [1/m]",
+        title="noise of the angular acceleration / noise of the readings [1/m]",
         xlabel="height of the fifth sensor above the plane of the others [m]",
     )
     curves = data["curves"]

@@ -180,8 +180,8 @@ def draw(data: Saved) -> Drawn:
     ax.set(
         xscale="log",
         yscale="log",
-        xlabel="true error by tolerance",
-        ylabel="predicted error by tolerance",
+        xlabel="true error / tolerance",
+        ylabel="predicted error / tolerance",
         xlim=span,
         ylim=span,
         title=f"Recommended for {len(data['verdicts'])} scenes never seen",

@@ -184,7 +184,7 @@ def tables(data: Saved) -> list[Table]:
         for one in known
     )
     heads = ("System", "Scene", "Engine", "Channel", "Stated", "in %", "True", "True / stated", "Cost")
-    note = "Shares are of the channel's standard deviation over the run; the cost is that of the estimate by the run's."
+    note = "Shares are of the channel's standard deviation over the run; the cost is estimate / run."
     return [Table("Stated and true errors", note, heads, rows)]
 
 
@@ -202,7 +202,12 @@ def draw(data: Saved) -> Drawn:
     for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):
         axis.plot(ends, factor * ends, style, color="#777777", lw=0.9)
     axis.axvspan(WARNED, 10.0, color="#e69f00", alpha=0.15, lw=0)
-    axis.set(xscale="log", yscale="log", xlabel="stated error by the channel's deviation", ylabel="true error, same")
+    axis.set(
+        xscale="log",
+        yscale="log",
+        xlabel="stated error / channel's deviation",
+        ylabel="true error / channel's deviation",
+    )
     axis.set_title("dashed: three times the stated error; dotted: ten times and a tenth; shaded: warnings")
     axis.legend(loc="upper left")
     return [("True errors of random scenes over what their results state.", figure)]
