@@ -5,5 +5,6 @@
 - ``alike``: when two printed outputs say the same
 - ``scene_keys``: the reference of scene keys and effects, from the models that read scenes
 - ``validation_cases``: the reference of the cases of the validation report
+- ``gallery``: small copies of the figures that studies draw, for the page that lists them
 - ``website``: the site, built with every example run anew
 """

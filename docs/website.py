@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from docs.gallery import add_pictures
 from docs.outputs import run_pages
 from docs.pages import OUTSIDE, ROOT, pages
 from docs.validation_cases import newest_report, rows
@@ -49,6 +50,7 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     copy_pages(sources)
     well = as_shown or run_pages(pages(sources), check=False, strict=True)
     add_rows(sources)
+    add_pictures(ROOT / "results", sources / "docs" / "gallery.md")
     shutil.copyfile(ROOT / "docs" / "mkdocs.yml", work / "mkdocs.yml")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]

@@ -64,7 +64,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     return [
         Table(
             "Straight stops by controller",
-            "Utilisation: mean deceleration above 15 km/h by that of the tyre's "
+            "Utilisation: ratio of the mean deceleration above 15 km/h to that of the tyre's "
             "peak on all wheels; on the dry road the front brakes at their 8 bar bound it, not the tyres. "
             "Speed of the vehicle given, 4 substeps.",
             ("stop", "distance in m", "time in s", "utilisation", "longest lock above 15 km/h in ms"),

@@ -307,7 +307,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     saved = np.array([one["saving"] for one in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
     note = (
-        f"Calls at equal accuracy, whole scene by what is left, over {len(scenes)} scenes with "
+        f"Ratio of calls of the whole scene to calls of what is left, at equal accuracy, {len(scenes)} scenes with "
         "tolerances from 0.5 to 10 %."
     )
     return [Table("What choosing effects saves", note, ("percentile", "times fewer calls"), rows)]

@@ -182,7 +182,7 @@ def tables(data: Saved) -> list[Table]:
         "its 95 % interval [s]",
         "quartiles [s]",
         "runs",
-        "by prediction",
+        "median / prediction",
     )
     note = f"Drift-off: pitch {ANGLE} rad from the true one. The prediction of an ensemble is its median, too."
     return [Table("Drift-off, predicted and measured", note, heads, rows)]

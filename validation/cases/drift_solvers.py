@@ -274,10 +274,10 @@ def tables(data: Saved) -> list[Table]:
         columns = (
             "treatment",
             "growth of the spread [1/s]",
-            "by the law [1/s]",
+            "law [1/s]",
             f"spread at {WINDOW[1]:g} s [rad]",
-            "damage f3z by truth",
-            "damage f3x by truth",
+            "damage f3z / true damage",
+            "damage f3x / true damage",
         )
         about = (
             f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "

@@ -206,7 +206,7 @@ def tables(data: Saved) -> list[Table]:
     rows = tuple((engine, name, f"{1e3 * step:g}", f"{error:.1e}") for engine, name, step, error in data["table"])
     title = "Enforced moment on the study road, perturbed model, after the first 20 ms"
     note = (
-        "Rms of the error by the rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness of 40 Hz "
+        "Rms of the error / rms of the moment. The rows above use a manoeuvre of up to 2.7 Hz; roughness of 40 Hz "
         "needs a smaller step."
     )
     return [Table(title, note, ("engine", "integrator", "step [ms]", "relative error"), rows)]

@@ -151,17 +151,17 @@ def _invariants(batches: int, count: int, first: int) -> list[Row]:
             answers[name] = max(answers.get(name, 0.0), value)
     what = {
         "finite": "results that are not finite",
-        "bound": "|F| beyond mu N",
+        "bound": "excess of the force |F| above mu N",
         "moment": "moment beyond the sum of the traction's bound times the distance from the centre, "
-        "by the longer semi-axis",
+        "over the longer semi-axis",
         "limit": "power that friction takes beyond that of full sliding, over the creepage",
-        "reversal": "F(-creepage) + F",
-        "mirror": "mirrored in y",
+        "reversal": "sum of the forces at creepages of opposite sign",
+        "mirror": "difference of the forces from those of the contact mirrored in y",
         "power": "power that friction would give, over the creepage",
         "power coarse": "power that friction would give, over the creepage, 9 to 12 cells per strip",
         "zero": "force without load or creepage",
-        "similarity": "eight times the load, twice the size",
-        "stick": "share of stick outside 0 to 1",
+        "similarity": "difference of the forces at eight times the load and twice the size from the law of similarity",
+        "stick": "excess of the share of stick beyond 0 to 1",
     }
     total = batches * count
     return [
@@ -340,7 +340,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 "FASTSIM: price",
                 "Beside the time that a root and a division per cell take on this "
                 "machine, its lower bound: median of rounds with its 95 % interval.",
-                ("what", "time", "by the bound"),
+                ("what", "time", "time / bound"),
                 tuple(tuple(row) for row in data["speed"]),
             )
         )

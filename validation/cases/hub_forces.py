@@ -351,7 +351,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         rows = tuple((element, *(f"{damages[element]:.3g}" for damages in runs.values())) for element in elements)
         shown.append(
             Table(
-                f"Damage by the true one, hub forces in the frame '{frame}'",
+                f"Ratio of the damage to the true damage, hub forces in the frame '{frame}'",
                 "Section forces in the chassis' axes, slope 5; roll and pitch are prescribed as measured.",
                 ("element", *runs),
                 rows,

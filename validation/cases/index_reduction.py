@@ -40,7 +40,7 @@ EXUDYN = {"index 2": "TrapezoidalIndex2", "index 3": "GeneralizedAlpha"}
 LACKING = (
     (
         "exudyn.1",
-        "Exudyn at index 1",
+        "Exudyn is asked to run at index 1",
         "has no formulation on the level of accelerations; its explicit solvers leave "
         "constraints out without a word, which the adapter refuses",
     ),
@@ -48,7 +48,7 @@ LACKING = (
     ("exudyn.projection", "Exudyn is asked for projection", "has none between steps"),
     (
         "mujoco",
-        "MuJoCo at index 3, 2 or 1",
+        "MuJoCo is asked to run at index 3, 2 or 1",
         "has no hard constraints: an equality is a spring and a damper on the "
         "level of accelerations, so the adapter leaves the pitch out of the coordinates",
     ),
@@ -219,7 +219,7 @@ def _index_two_refused() -> Row:
     return behaves(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
-        "Exudyn's generalised-alpha solver with its flag for index 2",
+        "Exudyn's generalised-alpha solver is asked to run with its flag for index 2",
         found,
         "refused",
         "index 2 is there with the trapezoidal rule alone",

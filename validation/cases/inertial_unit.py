@@ -101,7 +101,7 @@ def _one_axis(paths: int) -> list[Row]:
             ),
             _small(
                 f"one_axis.{axis + 1}.spill",
-                "largest angle about the other two axes",
+                f"largest angle about the two axes without noise, noise about axis {axis + 1}",
                 spill,
                 "rad",
                 "eq. (30): the spurious rotation keeps to its own axis",
@@ -132,17 +132,23 @@ def _three_axes(paths: int) -> list[Row]:
     all_equal = np.full(3, EQUAL)
     same = float(np.trace(mean_error(all_equal, rates, PERIOD, START)))
     return [
-        _mean("trace", "E[tr E], three equal axes, turning body", trace, mean_trace(EQUAL, SPAN), "3 exp(-s^2 t)"),
+        _mean(
+            "trace",
+            "mean trace of the error's rotation matrix, three equal axes, turning body",
+            trace,
+            mean_trace(EQUAL, SPAN),
+            "3 exp(-s^2 t)",
+        ),
         _mean(
             "scalar",
-            "E[q1] of the error, three equal axes, turning body",
+            "mean scalar part q1 of the error's quaternion, three equal axes, turning body",
             equal[:, 0],
             mean_scalar(all_equal, SPAN),
             "exp(-3 s^2 t / 8), of the normalised quaternion",
         ),
         _mean(
             "scalar.unequal",
-            "E[q1] of the error, unequal axes, turning body",
+            "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
             found[:, 0],
             mean_scalar(UNEQUAL, SPAN),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
@@ -189,17 +195,23 @@ def _norms(paths: int) -> list[Row]:
         law = euler_mean_square(EQUAL, axes, period, steps)
         scalar, true, noisy = mean_scalar(np.full(axes, EQUAL), span), q[:, 0], f"{axes} noisy axes"
         means = (
-            ("norm", f"E[|q|^2] of explicit Euler, {noisy}, not normalised", square, law, "(1 + k s^2 D / 4)^n"),
+            (
+                "norm",
+                f"mean squared norm of the quaternion by explicit Euler, {noisy}, not normalised",
+                square,
+                law,
+                "(1 + k s^2 D / 4)^n",
+            ),
             (
                 "mean",
-                f"E[q1] of explicit Euler, {noisy}, not normalised",
+                f"mean scalar part q1 by explicit Euler, {noisy}, not normalised",
                 true,
                 1.0,
                 "after Ito the mean is the true quaternion",
             ),
             (
                 "direction",
-                f"E[q1] of explicit Euler, normalised at the end, {noisy}",
+                f"mean scalar part q1 by explicit Euler, normalised at the end, {noisy}",
                 true / square**0.5,
                 scalar,
                 STRATONOVICH,

@@ -302,8 +302,8 @@ def tables(data: Saved) -> list[Table]:
         for engine in ENGINES
     )
     note = (
-        f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage by the "
-        "true one, moments by I beta'' (rms), largest pitch error in rad."
+        f"Mean and standard deviation over {len(data['damage'])} noise samples of {DURATION:g} s: damage / true "
+        "damage, moments / I beta'' (rms), largest pitch error in rad."
     )
     heads = (
         "engine",

@@ -364,7 +364,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         rows = tuple((element, *(f"{own[element]:.4f}" for own in means.values())) for element in elements)
         found.append(
             Table(
-                f"Damage by the true one, {name}, mean of {SAMPLES} samples of noise",
+                f"Ratio of the damage to the true damage, {name}, mean of {SAMPLES} samples of noise",
                 "Section forces in the chassis' axes, slope 5, held by the filter.",
                 ("element", *means),
                 rows,

@@ -70,7 +70,7 @@ def _exact(name: str) -> list[Row]:
     found, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
     alpha = float(np.abs(angular_acceleration(found, PATH.rates) - PATH.alpha).max())
     squares = (rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
-    what = f"{name} sensors{', formula for a plane' if array.planar else ''}"
+    what = f"sensors: {name}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
         ("alpha", "error of the angular acceleration from clean readings", alpha, "rad/s^2"),
@@ -256,7 +256,7 @@ def _follows(
         Observed(
             f"motion.recovered.{way}.{what}.{engine}",
             SYSTEM,
-            f"{what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
+            f"error of the {what} recovered from {words}, {engine}, {len(states) / 1e3:.0f} s at 1 kHz without noise",
             float(np.abs(error).max()),
             unit,
         ).at_most(bound, "cubics through samples of 1 ms, across wheel modes of 700 1/s", "closed form")

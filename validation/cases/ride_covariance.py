@@ -128,7 +128,7 @@ def _closed_rows() -> list[Row]:
     vehicle = corners([(a, front), (-b, rear)], np.diag([front.m_s + rear.m_s, inertia]))
     half = [stationary(excited(vehicle, one_track((a, -b)), v)).variance[0] for v in speeds]
     formula = [half_car_acceleration(CORNER, v * INTENSITY, a, b, v) for v in speeds]
-    what = "half car that splits into quarter cars, variance at its centre of gravity, delay exact, 3 to 50 m/s"
+    what = "error of the variance at the centre of a half car that splits into quarter cars, delay exact, 3 to 50 m/s"
     worst_half = off(np.array(half), np.array(formula))
     return [
         *rows,

@@ -183,7 +183,7 @@ def tables(data: Saved) -> list[Table]:
         for one in known
     )
     heads = ("System", "Scene", "Engine", "Channel", "Stated", "in %", "True", "True / stated", "Cost")
-    note = "Shares are of the channel's standard deviation over the run; the cost is that of the estimate by the run's."
+    note = "Shares are of the channel's standard deviation over the run; the cost is estimate / run."
     return [Table("Stated and true errors", note, heads, rows)]
 
 

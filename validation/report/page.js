@@ -33,7 +33,7 @@ function find() {
   document.body.classList.toggle("finding", finding);
   form.querySelector("output").textContent = !finding ? "" : total ? `${total} of ${all} rows` : "No row fits: try fewer words, or clear the filters.";
   const top = document.getElementById("search").offsetTop;
-  if (finding && scrollY > top) scrollTo(0, top);
+  if (finding) scrollTo(0, top);
 }
 
 function clear(wanted = "") {
