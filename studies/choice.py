@@ -44,7 +44,7 @@ class Alone:
 
 
 @dataclass(frozen=True)
-class Found:
+class SceneChoice:
     """A scene's choice, effects one by one, tolerances above which effects that stay would go, energy activity (W) by
     element where it has a closed form; results of what is left, with their errors."""
 
@@ -80,34 +80,37 @@ def run(scene: Any, engines: tuple[str, ...], folder: Path, progress: Progress) 
 
 def told(scenes: list[Any], engines: tuple[str, ...], folder: Path, progress: Progress) -> dict[str, Any]:
     """Choices of scenes, the first by one of these engines, saved and drawn."""
-    scene, found = scenes[0], list[Found]()
-    for i, own in enumerate(scenes):
-        progress(own.title, i / len(scenes))
-        linear, asked = has_closed_form(own), engines if own is scene else ()
-        plan_of(own).check(own, () if linear else (engine_of(own, asked),))
-        said = partial(_spent, progress, f"{own.title}, of at most {RUNS} runs", i, len(scenes))
-        found.append(_linear(own) if linear else chosen(own, asked, said))
-        _save(found[-1], folder / f"{i + 1}_{own.system.replace('-', '_')}.csv")
+    scene, choices = scenes[0], list[SceneChoice]()
+    for i, each in enumerate(scenes):
+        progress(each.title, i / len(scenes))
+        linear, asked = has_closed_form(each), engines if each is scene else ()
+        plan_of(each).check(each, () if linear else (engine_of(each, asked),))
+        said = partial(_spent, progress, f"{each.title}, of at most {RUNS} runs", i, len(scenes))
+        choices.append(_linear(each) if linear else chosen(each, asked, said))
+        _save(choices[-1], folder / f"{i + 1}_{each.system.replace('-', '_')}.csv")
     progress("figure", 1.0)
-    choice_figure(found, folder / "choice.png")
+    choice_figure(choices, folder / "choice.png")
     return {
         "scene": scene.title,
         "folder": str(folder),
         "failed": {},
-        "answer": [_answer(one) for one in found],
-        "table": [line for one in found for line in lines(one, len(found) > 1)],
-        "results": _results(found),
+        "answer": [_answer(choice) for choice in choices],
+        "table": [line for choice in choices for line in lines(choice, len(choices) > 1)],
+        "results": _results(choices),
     }
 
 
-def _results(found: list[Found]) -> dict[str, Result]:
+def _results(choices: list[SceneChoice]) -> dict[str, Result]:
     """Results of what is left of each scene, by what tells them apart."""
     return {
         " ".join(
-            (*([one.scene.system] if found[1:] else []), f"what is left{f', run {i + 1}' if one.results[1:] else ''}")
+            (
+                *([choice.scene.system] if choices[1:] else []),
+                f"what is left{f', run {i + 1}' if choice.results[1:] else ''}",
+            )
         ): run
-        for one in found
-        for i, run in enumerate(one.results)
+        for choice in choices
+        for i, run in enumerate(choice.results)
     }
 
 
@@ -142,20 +145,20 @@ def search(scene: Any) -> str:
     )
 
 
-def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> Found:
+def chosen(scene: Any, engines: tuple[str, ...], progress: Callable[[float], None] = lambda share: None) -> SceneChoice:
     """A scene's choice by one implementation."""
     engine = engine_of(scene, engines)
     chooser = Chooser(scene, engine, scene.quantities, scene.tolerance, progress=progress)
     choice, none = chooser.choose(), chooser.work(frozenset())
     results = chooser.whole.variants.stated(frozenset(choice.left_out), choice.times) if scene.error else []
     alone = [
-        Alone(one, chooser.teller.predicted(frozenset([one])), none / chooser.work(frozenset([one])))
-        for one in chooser.effects
+        Alone(effect, chooser.teller.predicted(frozenset([effect])), none / chooser.work(frozenset([effect])))
+        for effect in chooser.effects
     ]
-    return Found(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
+    return SceneChoice(scene, engine, choice, alone, chooser.further(frozenset(choice.left_out)), {}, results)
 
 
-def _linear(scene: Any) -> Found:
+def _linear(scene: Any) -> SceneChoice:
     """The same of a linear stationary scene of ride, by its closed form; calls are those of a second of motion."""
     from models.advice.ride_choice.activity import activity
     from models.advice.ride_choice.choose import Chooser as Linear
@@ -163,66 +166,70 @@ def _linear(scene: Any) -> Found:
 
     with told_by(scene):
         chooser = Linear.of(scene)
-        found = chooser.choose()
+        linear = chooser.choose()
         singles = {effect: frozenset([effect]) for effect in chooser.effects}
         calls = chooser.cost(frozenset()).calls
         alone = [
-            Alone(effect.name, abs(chooser.predicted(one)), calls / chooser.cost(one).calls)
-            for effect, one in singles.items()
+            Alone(effect.name, abs(chooser.predicted(each)), calls / chooser.cost(each).calls)
+            for effect, each in singles.items()
         ]
-        further = {effect.name: change for effect, change in chooser.further(frozenset(found.left_out)).items()}
+        further = {effect.name: change for effect, change in chooser.further(frozenset(linear.left_out)).items()}
         watts = activity(chooser.wholes[len(chooser.wholes) // 2])
-    before, after = round(found.before.calls), round(found.after.calls)
-    work = tuple(cost.work for cost in (found.before, found.before, found.after))
+    before, after = round(linear.before.calls), round(linear.after.calls)
+    work = tuple(cost.work for cost in (linear.before, linear.before, linear.after))
     choice = Choice(
-        tuple(one.name for one in found.candidates),
-        tuple(one.name for one in found.left_out),
+        tuple(each.name for each in linear.candidates),
+        tuple(each.name for each in linear.left_out),
         1,
-        abs(found.predicted),
-        0.0 * found.predicted,
-        abs(found.confirmed),
-        0.0 * found.predicted,
-        found.kept,
+        abs(linear.predicted),
+        0.0 * linear.predicted,
+        abs(linear.confirmed),
+        0.0 * linear.predicted,
+        linear.kept,
         (before, before, after),
         work,
-        found.rounds,
+        linear.rounds,
         0,
         0.0,
     )
-    return Found(scene, "closed form", choice, alone, further, watts)
+    return SceneChoice(scene, "closed form", choice, alone, further, watts)
 
 
-def _answer(one: Found) -> dict[str, Any]:
+def _answer(answered: SceneChoice) -> dict[str, Any]:
     """What was chosen, and how right and how cheap that is."""
-    choice = one.choice
+    choice = answered.choice
     return {
-        "system": one.scene.system,
-        "implementation": one.engine,
+        "system": answered.scene.system,
+        "implementation": answered.engine,
         "left out": list(choice.left_out),
-        "stay": one.stay,
+        "stay": answered.stay,
         "step times": choice.times,
         "errors": {
             name: {part: float(getattr(choice, part)[i]) for part in ("predicted", "confirmed", "chance")}
-            for i, name in enumerate(one.scene.quantities)
+            for i, name in enumerate(answered.scene.quantities)
         },
         "kept": choice.kept,
         "calls": list(choice.calls),
         "confirmations": choice.rounds,
-        "would matter no more above": one.further,
-        "would break an assumption": {name: [asdict(each) for each in own] for name, own in choice.barred.items()},
+        "would matter no more above": answered.further,
+        "would break an assumption": {
+            name: [asdict(each) for each in barred] for name, barred in choice.barred.items()
+        },
     }
 
 
-def _save(one: Found, path: Path) -> None:
+def _save(choice: SceneChoice, path: Path) -> None:
     """A row per effect: what leaving it out alone changes, what that saves, and whether it was left out."""
     with path.open("x", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        heads = [f"{name}, change [-]" for name in one.scene.quantities]
+        heads = [f"{name}, change [-]" for name in choice.scene.quantities]
         writer.writerow(["effect", "left out", *heads, "times less work alone [-]", "would break"])
-        for effect in one.alone:
+        for effect in choice.alone:
             values = map(repr, effect.changes.tolist())
-            broken = "; ".join(each.says for each in one.choice.barred.get(effect.effect, ()))
-            writer.writerow([effect.effect, effect.effect in one.choice.left_out, *values, repr(effect.saved), broken])
+            broken = "; ".join(each.says for each in choice.choice.barred.get(effect.effect, ()))
+            writer.writerow(
+                [effect.effect, effect.effect in choice.choice.left_out, *values, repr(effect.saved), broken]
+            )
 
 
 def percent(value: float) -> str:
@@ -235,20 +242,20 @@ def _between(change: float, beside: float) -> str:
     return percent(change) + (f" +- {percent(beside)}" if beside else "")
 
 
-def _stays(change: float, one: Found) -> str:
+def _stays(change: float, scene_choice: SceneChoice) -> str:
     """Why an effect stays whose going would change quantities by so much, with all that went."""
-    if change > BUDGET * one.scene.tolerance or one.watts or one.choice.ended:
+    if change > BUDGET * scene_choice.scene.tolerance or scene_choice.watts or scene_choice.choice.ended:
         return f"would matter no more at a tolerance above {percent(change)}"
     return f"stays at {percent(change)}: steps would have to be shorter for it to go, or whole runs did not confirm it"
 
 
-def lines(one: Found, named: bool) -> list[str]:
+def lines(scene_choice: SceneChoice, named: bool) -> list[str]:
     """The choice in words."""
-    choice, scene = one.choice, one.scene
+    choice, scene = scene_choice.choice, scene_choice.scene
     rows = [
-        f"  {scene.title} ({scene.system}, {one.engine})" if named else f"  by {one.engine}",
+        f"  {scene.title} ({scene.system}, {scene_choice.engine})" if named else f"  by {scene_choice.engine}",
         f"    left out: {', '.join(choice.left_out) or 'nothing'}",
-        f"    stay: {', '.join(one.stay) or 'nothing'}",
+        f"    stay: {', '.join(scene_choice.stay) or 'nothing'}",
     ]
     for i, name in enumerate(scene.quantities):
         kept = "kept" if choice.confirmed[i] + choice.chance[i] <= scene.tolerance else "NOT KEPT"
@@ -259,7 +266,7 @@ def lines(one: Found, named: bool) -> list[str]:
         )
     before, step, after = choice.calls
     saved = f"{before:,} -> {after:,}, {before / after:.3g} times fewer"
-    if one.watts:
+    if scene_choice.watts:
         rows.append(f"    calls per second of motion {saved}")
     else:
         faster = choice.seconds[0] / choice.seconds[2]
@@ -268,28 +275,29 @@ def lines(one: Found, named: bool) -> list[str]:
             f"steps with all effects; CPU seconds {faster:.3g} times fewer, once"
         )
     rows += [
-        f"    {name} {_stays(change, one)}" for name, change in sorted(one.further.items(), key=lambda item: item[1])
+        f"    {name} {_stays(change, scene_choice)}"
+        for name, change in sorted(scene_choice.further.items(), key=lambda item: item[1])
     ]
     rows += [
         f"    {name} stays; without it an assumption would be broken: {each.fact()}"
-        for name, own in choice.barred.items()
-        for each in own
+        for name, breaches in choice.barred.items()
+        for each in breaches
     ]
     if choice.ended:
         rows.append(f"    the search ended at the calls of {RUNS} runs of the scene: larger sets were not tried")
     if choice.more:
         rows.append(f"    chance alone stands in the way of more: {choice.more:.2g} times as many samples would tell")
-    rows += misled(one)
+    rows += misled(scene_choice)
     worst = float((choice.confirmed + choice.chance).max())
     return [*rows, f"    the choice holds for tolerances down to {percent(worst)}"] if choice.left_out else rows
 
 
-def misled(one: Found) -> list[str]:
+def misled(choice_of: SceneChoice) -> list[str]:
     """Where energy activity misleads: inertias that are active, and whose motion a quantity does not see."""
-    total, rows = sum(value for value in one.watts.values() if np.isfinite(value)), []
-    for effect in one.alone:
-        share = one.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
-        for name, change in zip(one.scene.quantities, effect.changes, strict=True):
+    total, rows = sum(value for value in choice_of.watts.values() if np.isfinite(value)), []
+    for effect in choice_of.alone:
+        share = choice_of.watts.get(f"inertia {effect.effect}", 0.0) / (total or 1.0)
+        for name, change in zip(choice_of.scene.quantities, effect.changes, strict=True):
             if np.isfinite(share) and share > ACTIVE and change < IDLE:
                 rows.append(
                     f"    energy activity misleads: {effect.effect} holds {percent(share)} of it, and without "
@@ -298,30 +306,30 @@ def misled(one: Found) -> list[str]:
     return rows
 
 
-def choice_figure(found: list[Found], path: Path) -> None:
+def choice_figure(choices: list[SceneChoice], path: Path) -> None:
     """A panel per scene; one more for the activity of those that have it."""
     from models.drawing.figures import WIDE, heading, plt, save
 
-    shown = [(one, False) for one in found] + [(one, True) for one in found if one.watts]
-    heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(one.alone), 4)) for one, active in shown]
+    shown = [(choice, False) for choice in choices] + [(choice, True) for choice in choices if choice.watts]
+    heights = [1.5 + 0.2 * (ELEMENTS if active else max(len(choice.alone), 4)) for choice, active in shown]
     figure, axes = plt.subplots(len(shown), 1, figsize=(WIDE, sum(heights) + 0.5), squeeze=False, height_ratios=heights)
-    for axis, (one, active) in zip(axes.flat, shown, strict=True):
-        _activity(axis, one) if active else _changes(axis, one)
+    for axis, (choice, active) in zip(axes.flat, shown, strict=True):
+        _activity(axis, choice) if active else _changes(axis, choice)
     title = "Which effects matter for which question: change by leaving out one effect, against the tolerance"
-    heading(figure, title, _results(found))
+    heading(figure, title, _results(choices))
     save(figure, path)
 
 
-def _changes(axis: Any, one: Found) -> None:
+def _changes(axis: Any, scene_choice: SceneChoice) -> None:
     """Changes of every quantity by leaving out each effect alone.
 
     Shaded rows, from the scene's tolerance on, tell why an effect stays; a name says whether it went with the others.
     """
     from models.drawing.figures import BAD, DARK, PALE, SMALL
 
-    shown = sorted(one.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
+    shown = sorted(scene_choice.alone, key=lambda effect: float(np.nan_to_num(effect.changes, posinf=HIGHEST).max()))
     y = np.arange(len(shown))
-    for i, name in enumerate(one.scene.quantities):
+    for i, name in enumerate(scene_choice.scene.quantities):
         values = np.array([effect.changes[i] for effect in shown])
         axis.plot(
             np.clip(np.where(np.isfinite(values), 100 * values, np.nan), LOWEST, HIGHEST),
@@ -334,41 +342,41 @@ def _changes(axis: Any, one: Found) -> None:
     for row, effect in zip(y, shown, strict=True):
         if not np.isfinite(effect.changes).all():
             axis.text(HIGHEST, row, "cannot go alone", ha="right", va="center", fontsize=SMALL)
-    barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in one.choice.barred]
+    barred = [row for row, effect in zip(y, shown, strict=True) if effect.effect in scene_choice.choice.barred]
     if barred:
         place = np.full(len(barred), HIGHEST)
         axis.plot(place, barred, "x", color=BAD, ms=7, mew=1.6, label="would break an assumption")
-    axis.axvline(100 * one.scene.tolerance, color=DARK, ls="--", lw=1, label="tolerance")
-    axis.axvspan(100 * one.scene.tolerance, 1.5 * HIGHEST, color=PALE, alpha=0.25, lw=0, label="matters alone")
+    axis.axvline(100 * scene_choice.scene.tolerance, color=DARK, ls="--", lw=1, label="tolerance")
+    axis.axvspan(100 * scene_choice.scene.tolerance, 1.5 * HIGHEST, color=PALE, alpha=0.25, lw=0, label="matters alone")
     axis.set(
         xscale="log",
         xlim=(LOWEST / 1.5, HIGHEST * 1.5),
         yticks=y,
-        yticklabels=[_told_of(one, effect) for effect in shown],
+        yticklabels=[_told_of(scene_choice, effect) for effect in shown],
         xlabel="change by leaving out this effect alone [%] (at the ends: beyond)",
     )
-    before, _, after = one.choice.calls
+    before, _, after = scene_choice.choice.calls
     axis.set_title(
-        f"{one.scene.system}: {before / after:.3g} times fewer calls at {100 * one.scene.tolerance:g} %, "
-        "without the effects named 'left out'"
+        f"{scene_choice.scene.system}: {before / after:.3g} times fewer calls "
+        f"at {100 * scene_choice.scene.tolerance:g} %, without the effects named 'left out'"
     )
     axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _told_of(one: Found, effect: Alone) -> str:
+def _told_of(one: SceneChoice, effect: Alone) -> str:
     """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
     return effect.effect.replace("_", " ") + (" (left out)" if effect.effect in one.choice.left_out else " (stays)")
 
 
-def _activity(axis: Any, one: Found) -> None:
+def _activity(axis: Any, scene_choice: SceneChoice) -> None:
     from models.drawing.figures import BLUE
 
-    finite = {name: value for name, value in one.watts.items() if np.isfinite(value)}
+    finite = {name: value for name, value in scene_choice.watts.items() if np.isfinite(value)}
     total = sum(finite.values())
     shown = sorted(finite.items(), key=lambda item: -item[1])[:ELEMENTS][::-1]
     axis.barh([name for name, _ in shown], [100 * value / total for _, value in shown], color=BLUE, alpha=0.7)
     axis.set(
-        title=f"{one.scene.system}: energy activity, which knows neither the question nor pairs",
+        title=f"{scene_choice.scene.system}: energy activity, which knows neither the question nor pairs",
         xlabel="share of the mean power [%]",
     )
 

@@ -145,8 +145,8 @@ def show(
     from models.advice.price.effects_text import lines as price_lines
 
     with waiting("short runs with and without each effect", loaded.system):
-        found = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
-    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found, loaded.quantities)))
+        prices = price_list(loaded, None if engine is None else engines_of(engine, loaded.system)[0])
+    print(json.dumps(as_dict(prices), indent=1) if as_json else "\n".join(price_lines(prices, loaded.quantities)))
 
 
 def _say_user_code(scene: Any) -> None:
@@ -237,15 +237,15 @@ def price(
     loaded = load_scene(scene, changes)
     _say_user_code(loaded)
     with waiting("runs of every engine in ever finer steps", loaded.system):
-        found = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
-    print(json.dumps(as_dict(found), indent=1) if as_json else "\n".join(price_lines(found)))
-    if not found.winners:
+        priced = price_of(loaded, tolerance, quantity, engines_of(engine, loaded.system))
+    print(json.dumps(as_dict(priced), indent=1) if as_json else "\n".join(price_lines(priced)))
+    if not priced.winners:
         sys.exit(1)
 
 
 @app.command()
 def compare(
-    one: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
+    first: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
     two: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
     out: Out = None,
     shift: Annotated[
@@ -264,16 +264,16 @@ def compare(
     from studies.command.comparison import compare as differences
     from studies.command.comparison import report
 
-    if measured.against(one, two):
-        for run in measured.runs_of(one).values():
+    if measured.against(first, two):
+        for run in measured.runs_of(first).values():
             measured.overlay(run, two, shift)  # before a folder is made
         folder = _folder("compare", None, "", out, None)
-        return _finish(lambda progress: measured.report(one, two, folder, shift), folder, as_json)
+        return _finish(lambda progress: measured.report(first, two, folder, shift), folder, as_json)
     if shift is not None:
         raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
-    differences(one, two)  # before a folder is made
+    differences(first, two)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
-    _finish(lambda progress: report(one, two, folder), folder, as_json)
+    _finish(lambda progress: report(first, two, folder), folder, as_json)
 
 
 @app.command()
@@ -375,7 +375,7 @@ def _finish(
         print(json.dumps(summary, indent=1))
     else:
         _print(summary, doubts)
-    if summary.get("failed") or (strict and any(one["broken"] for one in summary["assumptions"].values())):
+    if summary.get("failed") or (strict and any(judged["broken"] for judged in summary["assumptions"].values())):
         sys.exit(1)
 
 

@@ -94,7 +94,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         noisy = follower(scene, Path(name))({}, {"force_noise": noise})
         first = run_away(noisy, "reference", scene.error)
         asked = (noisy, times, measured["pitch"], options.threshold)
-        found = run_paths(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell)
+        paths = run_paths(noise_paths(*asked), options.paths, folder / BLOCKS, pool, progress=tell)
         gaps = {}
         for engine in (engine for engine in engines if engine != "reference"):
             progress(f"{engine}: {options.engine_paths} of the same paths", 1.0)
@@ -102,22 +102,22 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
                 repeated = run_paths(mujoco_threads(*asked, options.workers), options.engine_paths)
             else:
                 repeated = run_paths(noise_paths(*asked, engine), options.engine_paths, executor=pool, blocks=Blocks(1))
-            gaps[engine] = gap(found, repeated, times)
+            gaps[engine] = gap(paths, repeated, times)
     write_measurement(measured, folder, period)
     true = measured.states[np.rint(times / scene.run.step).astype(int)]
     channels = {
-        "states": Channel(("path", "time", "state"), found["states"], "m, rad, m/s, rad/s"),
-        "drift_off": Channel("path", found["drift_off"], "s", "drift-off, infinite if never"),
-        "failed": Channel("path", found["failed"], "s", "last good time of a path that failed"),
+        "states": Channel(("path", "time", "state"), paths["states"], "m, rad, m/s, rad/s"),
+        "drift_off": Channel("path", paths["drift_off"], "s", "drift-off, infinite if never"),
+        "failed": Channel("path", paths["failed"], "s", "last good time of a path that failed"),
     }
     axes = {"time": Channel("time", times, "s"), "state": Channel("state", list(STATE_NAMES))}
-    rows = _rows(options, times, found["states"] - true)
+    rows = _rows(options, times, paths["states"] - true)
     saved = _told(result(noisy, channels, axes, engine="reference", threshold=options.threshold), first, rows, options)
     saved.save(folder / "ensemble.nc")
-    table = text(options, scene, rows, found, gaps)
+    table = text(options, scene, rows, paths, gaps)
     write_whole(folder / "table.txt", "\n".join(table) + "\n")
     results = {"measurement": measured, "all paths": saved}
-    _figure(times, found["states"][:, :, 3] - true[:, 3], found["drift_off"], options, results, folder)
+    _figure(times, paths["states"][:, :, 3] - true[:, 3], paths["drift_off"], options, results, folder)
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -141,7 +141,7 @@ def _told(saved: Result, first: Result, rows: list[dict[str, float]], options: O
     }
     assumed = [upright("end the runs before, or hold their pitch (kalman_filter)", _steepest)]
     return of_chance(
-        judged(saved, assumed), {f"deviation of {name}": one for name, one in worst.items()}, options.paths
+        judged(saved, assumed), {f"deviation of {name}": breach for name, breach in worst.items()}, options.paths
     )
 
 
@@ -168,7 +168,7 @@ def _rows(options: Options, times: np.ndarray, errors: np.ndarray) -> list[dict[
 
 
 def text(
-    options: Options, scene: Scene, rows: list[dict[str, float]], found: Arrays, gaps: dict[str, float]
+    options: Options, scene: Scene, rows: list[dict[str, float]], paths: Arrays, gaps: dict[str, float]
 ) -> list[str]:
     """The table as lines of text."""
     lines = [
@@ -183,9 +183,9 @@ def text(
     ]
     lines.append(f"  Drift-off ({options.threshold:g} rad), quantiles with their 95 % intervals [s]")
     for level in QUANTILES:
-        value, low, high = quantile(found["drift_off"], level)
+        value, low, high = quantile(paths["drift_off"], level)
         lines.append(f"  {100 * level:7g} %   {_time(value)}   ({_time(low)} to {_time(high)})")
-    lost = int(np.isfinite(found["failed"]).sum())
+    lost = int(np.isfinite(paths["failed"]).sum())
     lines += [f"  {lost} paths left all bounds and count as drifted off by then"] if lost else []
     for engine, worst in gaps.items():
         differ = (

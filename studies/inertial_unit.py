@@ -165,19 +165,21 @@ def _row(
         "minutes": minutes,
         "angle by law": float(angle_law(np.array(float(end)), options, grade)),
         "angle measured": float(np.degrees(np.mean(angles[:, -1] ** 2) ** 0.5)),
-        "damage error": {name: [float(np.quantile(one, part)) for part in (0.5, SURE)] for name, one in worst.items()},
+        "damage error": {
+            name: [float(np.quantile(errors, part)) for part in (0.5, SURE)] for name, errors in worst.items()
+        },
     }
 
 
 def cheapest(rows: list[dict[str, Any]], options: Options) -> dict[str, float | None]:
     """Duration in minutes -> coarsest grade (deg/h) of which SURE of all units keep the allowed damage error."""
-    found: dict[str, float | None] = {}
+    cheapest_grades: dict[str, float | None] = {}
     for minutes in options.durations:
         judged = (row for row in rows if row["minutes"] == minutes and row["damage error"])
         worst = {row["grade"]: max(sure for _, sure in row["damage error"].values()) for row in judged}
         good = (grade for grade, error in worst.items() if error <= options.allowed_damage_error)
-        found[f"{minutes:g}"] = max(good, default=None)
-    return found
+        cheapest_grades[f"{minutes:g}"] = max(good, default=None)
+    return cheapest_grades
 
 
 def text(rows: list[dict[str, Any]], options: Options, engines: tuple[str, ...]) -> list[str]:
@@ -215,11 +217,11 @@ def _figure_grades(rows: list[dict[str, Any]], options: Options, results: Result
     figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.8))
     times = np.geomspace(options.durations[0], options.durations[-1], 60)
     for i, grade in enumerate(options.grades):
-        own = [row for row in rows if row["grade"] == grade]
-        minutes = [row["minutes"] for row in own]
+        of_grade = [row for row in rows if row["grade"] == grade]
+        minutes = [row["minutes"] for row in of_grade]
         axes[0].loglog(times, angle_law(60 * times, options, i), color=f"C{i}")
-        axes[0].loglog(minutes, [row["angle measured"] for row in own], "o", color=f"C{i}", markersize=4)
-        error = [100 * next(iter(row["damage error"].values()))[1] for row in own]
+        axes[0].loglog(minutes, [row["angle measured"] for row in of_grade], "o", color=f"C{i}", markersize=4)
+        error = [100 * next(iter(row["damage error"].values()))[1] for row in of_grade]
         axes[1].loglog(minutes, error, "o-", color=f"C{i}", markersize=4, label=f"{grade:g} deg/h")
     axes[1].axhline(100 * options.allowed_damage_error, color=DARK, linestyle=":", label="allowed")
     axes[0].set(title="Angle error, rms [deg]; line: law, dots: measured", xlabel="length of the drive [min]")

@@ -44,8 +44,8 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     from studies.wheelset_figures import branch_figure, cycle_figure
 
     options = read(Options, scene.options, scene.file, "options")
-    found = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error)
-    orbits, notes = found.detail, json.loads(found.data.attrs["doubts"])
+    branched = branch(scene, lambda count: progress("branch of cycles", 0.6 * count / (count + 10)), error=scene.error)
+    orbits, notes = branched.detail, json.loads(branched.data.attrs["doubts"])
     speed = options.speed or cycle_speed(scene, orbits)
     progress(f"cycle at {speed:g} m/s", 0.6)
     results, failed = cycles(scene, engines, speed, error=scene.error)
@@ -53,9 +53,9 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
     for engine, result in results.items():
         result.save(folder / f"cycle_{engine}.nc")
     if orbits:
-        found.save(folder / "branch.nc")
-        found.save_table(folder / "branch.csv", *ORBIT)
-        branch_figure(found, wheelset_of(scene), scene.title, folder / "branch.png")
+        branched.save(folder / "branch.nc")
+        branched.save_table(folder / "branch.csv", *ORBIT)
+        branch_figure(branched, wheelset_of(scene), scene.title, folder / "branch.png")
     if by_engine:
         cycle_figure(results, scene.title, folder / "cycle.png")
     else:
@@ -71,7 +71,7 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
                 for engine, orbit in by_engine.items()
             },
         },
-        "results": {**({"branch": found} if orbits else {}), **results},
+        "results": {**({"branch": branched} if orbits else {}), **results},
         "table": [*_branch_lines(orbits), *_cycle_lines(by_engine), *(f"  {note}" for note in notes)],
     }
 

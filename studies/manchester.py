@@ -52,16 +52,18 @@ def run(scene: WheelRailScene, engines: tuple[str, ...], folder: Path, progress:
     """Every case at every position; saves each as a result and as CSV of positions and of patches, and a figure."""
     results, failed, table = dict[str, Result](), dict[str, str](), list[str]()
     for k, (name, case) in enumerate(scene.cases.items()):
-        found = results[name] = system.run(scene, case=name, told=partial(_told, progress, scene, k), error=scene.error)
-        contacts = found.detail
+        result = results[name] = system.run(
+            scene, case=name, told=partial(_told, progress, scene, k), error=scene.error
+        )
+        contacts = result.detail
         failed |= {f"{name}, {shift:g} mm": why for shift, why in contacts.failed.items()}
         text = f"{case_text(case.yaw, case.friction)}; {cost(contacts.seconds)} a position"
         table += [f"  {name}: {text}", *_table(contacts.placed)]
         if contacts.placed:
-            _save(name, found, folder)
-    if drawn := {name: found for name, found in results.items() if found.detail.placed}:
+            _save(name, result, folder)
+    if drawn := {name: result for name, result in results.items() if result.detail.placed}:
         _figure(scene, drawn, folder / "manchester.png")
-    answer = {name: [numbers(placed) for placed in found.detail.placed] for name, found in results.items()}
+    answer = {name: [numbers(placed) for placed in result.detail.placed] for name, result in results.items()}
     return {
         "scene": scene.title,
         "folder": str(folder),
@@ -76,12 +78,12 @@ def _told(progress: Progress, scene: WheelRailScene, k: int, shift: float, share
     progress(f"{[*scene.cases][k]} at {shift:g} mm", (k + share) / len(scene.cases))
 
 
-def _save(name: str, found: Result, folder: Path) -> None:
+def _save(name: str, result: Result, folder: Path) -> None:
     """The result, a row for each position, and a row for each patch of each wheel."""
-    found.save(folder / f"{name}.nc")
-    found.save_table(folder / f"{name}.csv", *POSITION)
+    result.save(folder / f"{name}.nc")
+    result.save_table(folder / f"{name}.csv", *POSITION)
     units = {"shift": "mm", "patch": "-", **{key: unit for key, (unit, _, _) in PATCH.items()}}
-    positions = [numbers(placed) for placed in found.detail.placed]
+    positions = [numbers(placed) for placed in result.detail.placed]
     for wheel in WHEELS:
         rows = [
             {"shift": position["shift"], "patch": k, **patch}
@@ -99,8 +101,8 @@ def _figure(scene: WheelRailScene, results: dict[str, Result], path: Path) -> No
     drawn, axes = plt.subplots(len(PANELS), 2, figsize=(WIDE, 9.6), sharex=True, sharey="row")
     for column, wheel in enumerate(WHEELS[::-1]):
         for axis, (quantity, label) in zip(axes[:, column], PANELS.items(), strict=True):
-            for k, (name, found) in enumerate(results.items()):
-                case, data = scene.cases[name], found.data.sel(wheel=wheel)
+            for k, (name, result) in enumerate(results.items()):
+                case, data = scene.cases[name], result.data.sel(wheel=wheel)
                 # later cases hollow and beside, so that equal ones show
                 shift = np.repeat(data["shift"].values + 0.08 * k, data.sizes["patch"])
                 half = data["half_width"] * np.cos(np.radians(data["touch_angle"]))
@@ -132,8 +134,8 @@ def _table(placed: list[Placed]) -> list[str]:
         f"{'b':>6}{'Fx':>7}{'Fy':>7}{'dr':>8}"
     )
     each = [(position, wheel) for position in placed for wheel in WHEELS]
-    several = [f"{1e3 * one.shift:g} ({wheel})" for one, wheel in each if len(getattr(one, wheel)) > 1]
-    flange = [one.shift for one, wheel in each if patches(one, wheel)[0].angle < -FLANGE]
+    several = [f"{1e3 * laid.shift:g} ({wheel})" for laid, wheel in each if len(getattr(laid, wheel)) > 1]
+    flange = [laid.shift for laid, wheel in each if patches(laid, wheel)[0].angle < -FLANGE]
     lines = [heads, *(line for position in map(numbers, placed) for line in _lines(position))]
     if several:
         lines.append(f"    several patches on one wheel at, in mm: {', '.join(several)}")

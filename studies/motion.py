@@ -196,19 +196,19 @@ def _recover(source: Source, array: SensorArray, options: Options, p: Parameters
     source.ways["high-passed"] = moved(array, readings, cut_offs=cut_offs)
 
 
-def _values(found: Motion) -> dict[str, np.ndarray]:
+def _values(motion: Motion) -> dict[str, np.ndarray]:
     """Pitch (rad), pitch rate (rad/s) and heave (m, down) of a recovered motion."""
-    return {"pitch": found.angles()[:, 1], "rate": found.rates[:, 1], "heave": found.position[:, 2]}
+    return {"pitch": motion.angles()[:, 1], "rate": motion.rates[:, 1], "heave": motion.position[:, 2]}
 
 
 def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Result:
     """Recovered pitch, rate and heave: a file of every way, and all of them as a result, which is returned."""
     stem, ways = Path(source.name).stem, {way: _values(moved) for way, moved in source.ways.items()}
-    for way, found in ways.items():
-        columns = {name: (CHANNELS[name][1], values) for name, values in found.items()}
+    for way, moved_values in ways.items():
+        columns = {name: (CHANNELS[name][1], values) for name, values in moved_values.items()}
         write_time_series(folder / f"{stem}, {way}.csv", columns, source.period)
     channels = {
-        name: Channel(("way", "time"), [found[name] for found in ways.values()], unit)
+        name: Channel(("way", "time"), [moved_values[name] for moved_values in ways.values()], unit)
         for name, (_, unit) in CHANNELS.items()
     }
     times = source.period * np.arange(len(source.readings))
@@ -220,7 +220,7 @@ def _save(scene: Scene, source: Source, folder: Path, options: Options) -> Resul
     if scene.error:
         beside = "the table has the error of each way beside the run" if source.truth else "no truth is known"
         not_estimated(saved, f"noise and mounts err most, and {beside}")
-    saved.save(folder / f"{stem} motion.nc")
+    saved.save(folder / f"{stem} moved_values.nc")
     return saved
 
 
@@ -256,15 +256,15 @@ def _lines(source: Source, p: Parameters) -> list[str]:
     return lines
 
 
-def _verdict(found: Quality) -> str:
+def _verdict(quality: Quality) -> str:
     """The consistency figure in words."""
-    if found.rigid is None:
+    if quality.rigid is None:
         return "whether the body is rigid cannot be told: no sensor is left over"
-    share = f"{100 * found.share:.2g} % of the relative accelerations fit no rigid body"
-    if found.rigid:
+    share = f"{100 * quality.share:.2g} % of the relative accelerations fit no rigid body"
+    if quality.rigid:
         return f"{share} (allowed: {100 * LIMIT:g} %, or what the noise leaves): the mounts pass for rigid"
-    if found.suspect:
-        return f"{share} (allowed: {100 * LIMIT:g} %): {found.suspect!r} does not move with the body and is left out"
+    if quality.suspect:
+        return f"{share} (allowed: {100 * LIMIT:g} %): {quality.suspect!r} does not move with the body and is left out"
     return (
         f"{share} (allowed: {100 * LIMIT:g} %): the body or a mount gives way and no single sensor explains it, "
         "or the noise is larger than the scene states (deviation)"
@@ -295,11 +295,11 @@ def _figure(source: Source, results: Results, path: Path) -> None:
         ["misfit", "misfit"],
     ]
     figure, axes = plt.subplot_mosaic(rows, figsize=(WIDE, 2.0 * len(rows) + 0.8), sharex=True)
-    ways = {way: _values(found) for way, found in source.ways.items()}
+    ways = {way: _values(motion) for way, motion in source.ways.items()}
     for name, label, scale in (("pitch", "Pitch, nose up [mrad]", 1e3), ("heave", "Heave, down [m]", 1.0)):
-        _motions(axes[name], times, {way: scale * found[name] for way, found in ways.items()}, label, source, name)
+        _motions(axes[name], times, {way: scale * motion[name] for way, motion in ways.items()}, label, source, name)
         if source.truth:
-            errors = {way: scale * np.abs(found[name] - source.truth[name]) for way, found in ways.items()}
+            errors = {way: scale * np.abs(motion[name] - source.truth[name]) for way, motion in ways.items()}
             _errors(
                 axes[f"{name} error"], times, errors, f"Largest error of the {name} so far {label[label.index('[') :]}"
             )

@@ -76,7 +76,9 @@ def _told(exam: Examination) -> list[str]:
         end = exam.failed.get(name, "to the end")
         lines.append(f"  {name} run: {outcome.period * (outcome.done - 1):.6g} s, {end}")
     lines += [f"  effect of {text}" for text in told(exam.consequences)]
-    lines += [f"  verdict on the {name} run: {own.word} ({own.reason})" for name, own in exam.verdicts.items()]
+    lines += [
+        f"  verdict on the {name} run: {verdict.word} ({verdict.reason})" for name, verdict in exam.verdicts.items()
+    ]
     return lines
 
 

@@ -68,15 +68,15 @@ def _titled(drawn: Any, title: str, path: Path, legend: Any = None, place: str =
 
 def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Path:
     """Signals over time, what is meant marked."""
-    own, marked, shown = evidence.recording, finding.times, signals[:SHOWN]
+    recording, marked, shown = evidence.recording, finding.times, signals[:SHOWN]
     begin = max(marked[0] - AROUND, 0.0) if marked else 0.0
-    end = min(marked[1] + AROUND if marked else LONGEST, own.duration)
-    first, last = round(begin / own.period), round(end / own.period) + 1
+    end = min(marked[1] + AROUND if marked else LONGEST, recording.duration)
+    first, last = round(begin / recording.period), round(end / recording.period) + 1
     every = max((last - first) // MOST, 1)
-    times = own.period * np.arange(first, last)[::every]
+    times = recording.period * np.arange(first, last)[::every]
     drawn, axes = plt.subplots(len(shown), 1, figsize=(WIDE, 1.2 + 1.5 * len(shown)), sharex=True, squeeze=False)
     for axis, signal in zip(axes[:, 0], shown, strict=True):
-        values = own.columns.read(signal.name, first, last - first)[::every]
+        values = recording.columns.read(signal.name, first, last - first)[::every]
         axis.plot(times[: len(values)], values, color=QUIET, lw=0.8)
         axis.set_ylabel(f"{signal.name} [{UNITS[signal.quantity]}]")
         if finding.check == "gravity" and signal.component == "z":
@@ -85,7 +85,11 @@ def _times(finding: Finding, evidence: Evidence, signals: tuple[Signal, ...], pa
         if marked:
             axis.axvspan(*marked, color=MARK, alpha=0.5, lw=0)
         if finding.check == "clipped" and marked:
-            axis.axhline(float(own.columns.read(signal.name, round(marked[0] / own.period), 1)[0]), color=LOUD, ls="--")
+            axis.axhline(
+                float(recording.columns.read(signal.name, round(marked[0] / recording.period), 1)[0]),
+                color=LOUD,
+                ls="--",
+            )
     axes[-1, 0].set_xlabel("time [s]" + ("; yellow: what is meant" if marked else ""))
     return _titled(drawn, f"{shorten(finding.place or 'Recording', TITLE, placeholder=' ...')}: as recorded", path)
 
@@ -110,14 +114,14 @@ def _means(evidence: Evidence, path: Path) -> Path:
 
 def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
     """What a channel reads by what it should, by frequency: a delay is a slope of the phase, a factor a level."""
-    own = evidence.agreement
-    assert own is not None
+    agreement = evidence.agreement
+    assert agreement is not None
     for before in evidence.faults[: evidence.faults.index(fault)]:  # the agreement in which this one was found
-        own = own.without(before)
-    among = own.inputs if fault.signals[0] in own.inputs else own.outputs
-    group = Group(fault.name, among is own.inputs, tuple(among.index(s) for s in fault.signals))
-    line, size = ((own.weights * part).sum(axis=1) for part in own.share(group))
-    f, ratio, sure = own.frequencies, size / line if group.forces else line / size, size / size.max()
+        agreement = agreement.without(before)
+    among = agreement.inputs if fault.signals[0] in agreement.inputs else agreement.outputs
+    group = Group(fault.name, among is agreement.inputs, tuple(among.index(s) for s in fault.signals))
+    line, size = ((agreement.weights * part).sum(axis=1) for part in agreement.share(group))
+    f, ratio, sure = agreement.frequencies, size / line if group.forces else line / size, size / size.max()
     late, factor = (fault.size, 1.0) if fault.kind == "late" else (0.0, fault.size)
     told = f"{1e3 * fault.size:+.2f} ms" if fault.kind == "late" else f"factor {fault.size:.4g}"
     expected = factor * np.exp(-2j * np.pi * f * late)
@@ -140,13 +144,13 @@ def _ratio(evidence: Evidence, fault: Fault, path: Path) -> Path:
 
 def _exchange(evidence: Evidence, fault: Fault, path: Path) -> Path:
     """Unexplained shares of every reading, as mapped and exchanged."""
-    own = evidence.agreement
-    assert own is not None
-    names = [s.name for s in own.outputs]
+    agreement = evidence.agreement
+    assert agreement is not None
+    names = [s.name for s in agreement.outputs]
     drawn, axis = plt.subplots(figsize=(WIDE, 1.4 + 0.24 * len(names)))
     at = np.arange(len(names))
-    axis.barh(at - 0.2, 100 * own.unexplained, 0.38, color=LOUD, label="as mapped")
-    axis.barh(at + 0.2, 100 * own.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
+    axis.barh(at - 0.2, 100 * agreement.unexplained, 0.38, color=LOUD, label="as mapped")
+    axis.barh(at + 0.2, 100 * agreement.without(fault).unexplained, 0.38, color=QUIET, label=f"{fault.name} exchanged")
     axis.set_yticks(at, names)
     axis.invert_yaxis()
     axis.set_xlabel("what the hub forces leave unexplained of each reading [%]")
@@ -157,15 +161,17 @@ def _spectrum(evidence: Evidence, signals: tuple[Signal, ...], path: Path) -> Pa
     """Power density of signals beside the noise that is stated."""
     from scipy.signal import welch
 
-    own = evidence.recording
+    recording = evidence.recording
     drawn, axis = plt.subplots(figsize=(WIDE, 3.4))
     for signal in signals[:SHOWN]:
-        values = own.samples(signal)
-        f, density = welch(np.where(np.isfinite(values), values, np.nanmean(values)), 1 / own.period, nperseg=2048)
+        values = recording.samples(signal)
+        f, density = welch(
+            np.where(np.isfinite(values), values, np.nanmean(values)), 1 / recording.period, nperseg=2048
+        )
         axis.loglog(f[1:], np.sqrt(density[1:]), lw=0.9, label=signal.name)
         stated = evidence.claimed.get(signal.name)
         if stated:
-            axis.axhline(stated * np.sqrt(2 * own.period), color=LOUD, ls="--", label=f"stated for {signal.name}")
+            axis.axhline(stated * np.sqrt(2 * recording.period), color=LOUD, ls="--", label=f"stated for {signal.name}")
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel(f"spectral density [{UNITS[signals[0].quantity]} / sqrt(Hz)]")
     return _titled(drawn, "Noise: where the spectrum goes flat", path, axis)
@@ -195,13 +201,15 @@ def _timed(rows: int, height: float, **more: Any) -> tuple[Any, np.ndarray]:
 
 def inputs_figure(exam: Examination, path: Path) -> Path:
     """Forces at all hubs along each axis."""
-    own, axes = exam.recording, [a for a in "zxy" if exam.recording.find("force", component=a)]
+    recording, axes = exam.recording, [a for a in "zxy" if exam.recording.find("force", component=a)]
     drawn, panels = _timed(len(axes), 1.9 * len(axes) + 0.5, sharex=True)
-    times = own.period * np.arange(own.count)
+    times = recording.period * np.arange(recording.count)
     for panel, axis in zip(panels[:, 0], axes, strict=True):
         for i, hub in enumerate(exam.rig.hubs):
-            for signal in (s for s in own.find("force", hub, axis) if not s.check):
-                panel.plot(*thinned(times, own.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7)
+            for signal in (s for s in recording.find("force", hub, axis) if not s.check):
+                panel.plot(
+                    *thinned(times, recording.samples(signal) / 1e3), color=WHEELS[i % len(WHEELS)], label=hub, lw=0.7
+                )
         panel.set_title(f"Force on the hub along {axis} [kN]")
     drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=len(exam.rig.hubs))
     return save(drawn, path)
@@ -231,10 +239,10 @@ def drift_figure(exam: Examination, path: Path) -> Path:
 
 def _angles(exam: Examination, angle: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times (s) and values (rad) of an angle as measured, in every run, and in truth."""
-    own, chassis = exam.recording, exam.rig.chassis
+    recording, chassis = exam.recording, exam.rig.chassis
     curves = dict[str, tuple[np.ndarray, np.ndarray]]()
-    for signal in own.find("angle", chassis, angle)[:1]:
-        curves["measured"] = own.period * np.arange(own.count), own.samples(signal)
+    for signal in recording.find("angle", chassis, angle)[:1]:
+        curves["measured"] = recording.period * np.arange(recording.count), recording.samples(signal)
     for name, run in exam.runs.items():
         curves[name] = run.period * np.arange(run.done), run.samples(f"{chassis} {angle}")
     if exam.virtual is not None:
@@ -261,9 +269,9 @@ def forces_figure(run: Outcome, answers: Sequence[Answer], path: Path, name: str
 def counting_figure(counted: dict[Answer, Counted], path: Path) -> Path:
     """Level crossings and range pairs of some loads."""
     drawn, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
-    for colour, (answer, own) in zip(WHEELS, counted.items(), strict=False):
-        left.plot(np.maximum(own.crossings, 0.5), 1e-3 * own.levels, drawstyle="steps-mid", color=colour)
-        right.plot(np.maximum(own.pairs, 0.25), 1e-3 * own.ranges, color=colour, label=answer.name)
+    for colour, (answer, counts) in zip(WHEELS, counted.items(), strict=False):
+        left.plot(np.maximum(counts.crossings, 0.5), 1e-3 * counts.levels, drawstyle="steps-mid", color=colour)
+        right.plot(np.maximum(counts.pairs, 0.25), 1e-3 * counts.ranges, color=colour, label=answer.name)
     for panel, title, what in (
         (left, "level crossings, upwards", "level"),
         (right, "range pairs of at least", "range"),

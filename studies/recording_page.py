@@ -53,7 +53,7 @@ def page(exam: Examination, folder: Path, result: Result) -> str:
         exam=exam,
         names=NAMES,
         errors=error_lines(result),
-        breaches=[one.line() for one in broken_of(result)],
+        breaches=[breach.line() for breach in broken_of(result)],
         assumed=assumed_of(result),
         free=FREE,
         weights=[finding.weight for finding in exam.findings],
@@ -90,7 +90,7 @@ def _figures(exam: Examination, folder: Path) -> dict[str, Any]:
 
 def _forces(exam: Examination, outcome: Outcome, folder: Path) -> dict[str, Any]:
     """What the page says of section forces: those that change, how many do not, and figures of the first ones."""
-    moving = {answer: own for answer, own in exam.counted.items() if own.greatest - own.least > STILL}
+    moving = {answer: counts for answer, counts in exam.counted.items() if counts.greatest - counts.least > STILL}
     first, inside = list(moving)[:DRAWN], set(exam.rig.places.connectors)
     return {
         "slope": SLOPE,
@@ -98,7 +98,9 @@ def _forces(exam: Examination, outcome: Outcome, folder: Path) -> dict[str, Any]
         "moving": moving,
         "still": len(exam.counted) - len(moving),
         "first": len(first),
-        "parts": [{a: own for a, own in moving.items() if (a.section in inside) is part} for part in (True, False)],
+        "parts": [
+            {a: counts for a, counts in moving.items() if (a.section in inside) is part} for part in (True, False)
+        ],
         "forces": draw.forces_figure(outcome, first, folder / "forces.png", exam.chosen),
         "counting": draw.counting_figure({answer: moving[answer] for answer in first}, folder / "counting.png"),
     }

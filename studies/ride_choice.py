@@ -100,8 +100,8 @@ def _runs(scene: RideScene, rest: ReducedScene) -> dict[str, Result]:
 
 
 def _alone(chooser: Chooser, effect: Effect) -> Alone:
-    one = frozenset([effect])
-    return Alone(effect, chooser.predicted(one), chooser.confirm(one), illegal(one))
+    single = frozenset([effect])
+    return Alone(effect, chooser.predicted(single), chooser.confirm(single), illegal(single))
 
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
@@ -241,9 +241,9 @@ def _table(scene: RideScene, choice: Choice, alone: list[Alone], further: dict[E
     lines += saving(choice, tolerance)
     lines += ["  alone, what leaving it out changes (confirmed):"]
     lines += [
-        f"    {one.effect.name}: {', '.join(map(percent, one.confirmed))}"
-        + (f" ({one.illegal})" if one.illegal else "")
-        for one in alone
+        f"    {single.effect.name}: {', '.join(map(percent, single.confirmed))}"
+        + (f" ({single.illegal})" if single.illegal else "")
+        for single in alone
     ]
     for effect, change in sorted(further.items(), key=lambda item: item[1]):
         idle = "  {} could go, too ({:.3g} %), but saves no calls, or does not hold nearby"

@@ -83,7 +83,7 @@ NONE = "\n(no finite variance)"
 
 
 def outputs_figure(
-    found: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], above: Heading, path: Path
+    swept: Sweep, kinds: Sequence[tuple[str, str]], static: Mapping[str, float], above: Heading, path: Path
 ) -> None:
     """Standard deviations of the outputs over speed in the scene's own case, a panel per kind and unit (``kinds``)."""
     groups = list(dict.fromkeys(kinds))
@@ -91,12 +91,12 @@ def outputs_figure(
     for axis, (kind, si) in zip(axes, groups, strict=True):
         unit, factor = _shown_unit(si)
         what = "deviation / static load [-]" if kind == "tyre force" else f"standard deviation [{unit}]"
-        names = [name for name, own in zip(found.outputs, kinds, strict=True) if own == (kind, si)]
-        curves = {name: factor * found.of(found.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
+        names = [name for name, unit_of in zip(swept.outputs, kinds, strict=True) if unit_of == (kind, si)]
+        curves = {name: factor * swept.of(swept.cases[0], name)[:-1] / static.get(name, 1.0) for name in names}
         for label, values in _distinct(curves).items():
-            axis.plot(found.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
+            axis.plot(swept.speeds[:-1], values, label=label if np.isfinite(values).any() else label + NONE)
         if not np.isfinite(list(curves.values())).any():
-            axis.set(xlim=(0, found.speeds.max()), yticks=[])
+            axis.set(xlim=(0, swept.speeds.max()), yticks=[])
         axis.set(xlabel="speed [m/s]", ylabel=what, ylim=(0, None), title=kind.capitalize())
         _say_where_none(axis)
         _name_below(axis)
@@ -159,10 +159,10 @@ def road_figure(road: TwoTrackRoad, y: float, fitted: FittedRoad | None, above: 
     wavenumber = np.geomspace(0.02, 100.0, 300)
     figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 4.0))
     if fitted is not None:
-        own = fitted.spectra
-        left.loglog(own.wavenumber, own.left, color=GREY, linewidth=0.8, label="measured")
-        right.semilogx(own.wavenumber, own.coherency, color=GREY, linewidth=0.8, label="measured")
-        right.axhline(own.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
+        spectra = fitted.spectra
+        left.loglog(spectra.wavenumber, spectra.left, color=GREY, linewidth=0.8, label="measured")
+        right.semilogx(spectra.wavenumber, spectra.coherency, color=GREY, linewidth=0.8, label="measured")
+        right.axhline(spectra.chance_coherency(), color=GREY, linestyle=":", label="what chance alone shows (95 %)")
     left.loglog(wavenumber, road.spectrum(wavenumber, y), "k", label="mean and roll process")
     right.semilogx(wavenumber, road.coherency(wavenumber, y, -y), "k", label="mean and roll process")
     if road.mean.cutoff is None:
@@ -202,7 +202,7 @@ def detail_figure(
 
 
 def drive_figure(
-    found: VaryingSpeed,
+    varied: VaryingSpeed,
     alone: np.ndarray,
     shown: Sequence[str],
     kinds: Mapping[str, tuple[str, str]],
@@ -216,18 +216,18 @@ def drive_figure(
         len(heights), 1, figsize=(WIDE, sum(heights) + 0.8), sharex=True, height_ratios=heights, squeeze=False
     )
     for axis, (kind, unit) in zip(axes[:, 0], groups, strict=False):
-        own = {name: found.names.index(name) for name in shown if kinds[name] == (kind, unit)}
-        pairs = {name: np.concatenate([found.deviation[:, i], alone[:, i]]) for name, i in own.items()}
+        columns = {name: varied.names.index(name) for name in shown if kinds[name] == (kind, unit)}
+        pairs = {name: np.concatenate([varied.deviation[:, i], alone[:, i]]) for name, i in columns.items()}
         for label, both in _distinct(pairs).items():
             exact, quasi = np.split(both, 2)
             if not np.isfinite(exact).all():  # what is left at standstill is rounding
                 axis.plot([], label=label + NONE)
                 continue
-            (line,) = axis.plot(found.time, exact, label=label)
-            axis.plot(found.time, quasi, "--", color=line.get_color(), linewidth=0.8)
+            (line,) = axis.plot(varied.time, exact, label=label)
+            axis.plot(varied.time, quasi, "--", color=line.get_color(), linewidth=0.8)
         axis.set(ylabel=f"standard deviation [{_written(unit)}]", title=kind.capitalize(), ylim=(0, None))
         _name_below(axis, 0.03)
-    axes[-1, 0].plot(found.time, found.speed, color="0.3")
+    axes[-1, 0].plot(varied.time, varied.speed, color="0.3")
     axes[-1, 0].set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, None))
     _save(figure, above, "\nSolid: exact; dashed: each speed taken by itself", path)
 

@@ -58,19 +58,19 @@ def agreement(results: dict[str, Result]) -> dict[str, float]:
     return {f"{a} - {b}": difference(results[a], results[b]) for a, b in combinations(results, 2)}
 
 
-def difference(one: Result, other: Result) -> float:
+def difference(first: Result, other: Result) -> float:
     """Largest difference of any state; where the rows lie elsewhere, the denser run is read by a cubic spline."""
-    if same_times(one, other):
-        return float(np.abs(one.states - other.states).max())
+    if same_times(first, other):
+        return float(np.abs(first.states - other.states).max())
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (one, other) if len(one.times) > len(other.times) else (other, one)
+    fine, coarse = (first, other) if len(first.times) > len(other.times) else (other, first)
     return float(np.abs(CubicSpline(fine.times, fine.states)(coarse.times) - coarse.states).max())
 
 
-def same_times(one: Result, other: Result) -> bool:
+def same_times(first: Result, other: Result) -> bool:
     """True if the rows of both runs lie at the same times."""
-    return len(one.times) == len(other.times) and bool(np.allclose(one.times, other.times, rtol=0, atol=1e-9))
+    return len(first.times) == len(other.times) and bool(np.allclose(first.times, other.times, rtol=0, atol=1e-9))
 
 
 def _figure(scene: Scene, results: dict[str, Result], path: Path) -> None:

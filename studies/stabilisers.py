@@ -52,7 +52,7 @@ def run(scene: Scene, engines: tuple[str, ...], folder: Path, progress: Progress
         "failed": failed,
         "results": results,
         "table": table,
-        "sweep": {road: found.tolist() for road, found in sweep.items()},
+        "sweep": {road: curve.tolist() for road, curve in sweep.items()},
     }
 
 
@@ -74,17 +74,17 @@ def text(rows: list[Row], benches: list[Bench], options: Options) -> list[str]:
         "  * seconds by those of the free run, each run once",
     ]
     for engine, road in dict.fromkeys((row["engine"], row["road"]) for row in rows):
-        own = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
+        of_engine = [row for row in rows if (row["engine"], row["road"]) == (engine, road)]
         bench = next(bench for bench in benches if bench.road == road)
         where = "the road" if road == "road" else f"a grade of {options.grade:g} rad"
-        free = next(row["seconds"] for row in own if row["method"] == "free")
+        free = next(row["seconds"] for row in of_engine if row["method"] == "free")
         lines += [
             "",
             f"  {engine} on {where}: force noise {bench.deviation:.1f} N; predicted beforehand: a free run "
             f"can be trusted for {bench.trusted:.1f} s, springs hold from {bench.holding:.0f} N m/rad on",
         ]
         lines += [HEADS, UNITS]
-        lines += [_line(row, free) for row in own]
+        lines += [_line(row, free) for row in of_engine]
     return lines
 
 

@@ -125,9 +125,9 @@ def _ensemble(base: Scene, quiet: Result, deviation: float, options: Options, en
     noisy = changed(base, effects={"force_noise": {"deviation": deviation, "seed": options.seed}})
     rows = np.arange(0, len(quiet.times), max(1, round(SPACING / base.run.step)))
     times, true = quiet.times[rows], quiet["pitch"]
-    found = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths)
-    errors = np.abs(found["states"][:, :, 3] - true[rows])
-    return {"times": times, "drift_off": found["drift_off"], "errors": errors}
+    paths = run_paths(noise_paths(noisy, times, true, options.angle, engine), options.paths)
+    errors = np.abs(paths["states"][:, :, 3] - true[rows])
+    return {"times": times, "drift_off": paths["drift_off"], "errors": errors}
 
 
 def _told(saved: Result, quiet: Result, spread: dict[str, np.ndarray], options: Options) -> Result:

@@ -54,23 +54,30 @@ def run(scene: WheelsetScene, engines: tuple[str, ...], folder: Path, progress: 
         "folder": str(folder),
         "failed": failed,
         "answer": _answer(wheelset, linear, paths),
-        "results": {**_results(paths), **{f"{engine}, eigenvalues": one for engine, one in eigenvalues.items()}},
+        "results": {
+            **_results(paths),
+            **{f"{engine}, eigenvalues": linear_run for engine, linear_run in eigenvalues.items()},
+        },
         "table": [*_waves(wheelset, linear), *_stability(wheelset, linear), *_motions(scene, paths)],
     }
 
 
 def _results(paths: Paths) -> dict[str, Result]:
     """Paths by engine and speed, in words."""
-    return {f"{engine}, {at}": path for engine, own in paths.items() for at, path in at_speeds(own).items()}
+    return {
+        f"{engine}, {at}": path
+        for engine, paths_of_engine in paths.items()
+        for at, path in at_speeds(paths_of_engine).items()
+    }
 
 
 def _save_table(linear: dict[str, Linear], folder: Path) -> None:
     """Damping and frequency over the speeds."""
     columns = {"speed": ("m/s", next(iter(linear.values())).speeds)}
-    for engine, one in linear.items():
-        columns[f"{engine} growth"] = ("1/s", one.values.real.max(axis=1))
-        columns[f"{engine} hunting damping"] = ("1/s", -one.hunting.real)
-        columns[f"{engine} hunting frequency"] = ("Hz", one.hunting.imag / (2.0 * np.pi))
+    for engine, linear_run in linear.items():
+        columns[f"{engine} growth"] = ("1/s", linear_run.values.real.max(axis=1))
+        columns[f"{engine} hunting damping"] = ("1/s", -linear_run.hunting.real)
+        columns[f"{engine} hunting frequency"] = ("Hz", linear_run.hunting.imag / (2.0 * np.pi))
     write_table(folder / "over_speed.csv", columns)
 
 
@@ -78,10 +85,11 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict
     """What was found, as plain numbers in SI; None where there is no critical speed."""
     return {
         "klingel": klingel(wheelset),
-        "wavelength": {engine: one.wavelength for engine, one in linear.items()},
-        "critical_speed": {engine: one.critical for engine, one in linear.items()},
+        "wavelength": {engine: linear_run.wavelength for engine, linear_run in linear.items()},
+        "critical_speed": {engine: linear_run.critical for engine, linear_run in linear.items()},
         "largest_power": {
-            engine: max(float(path["power"].max()) for path in own.values()) for engine, own in paths.items()
+            engine: max(float(path["power"].max()) for path in paths_of_engine.values())
+            for engine, paths_of_engine in paths.items()
         },
     }
 
@@ -89,17 +97,17 @@ def _answer(wheelset: Wheelset, linear: dict[str, Linear], paths: Paths) -> dict
 def _waves(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
     """Klingel's wavelength by its closed form, and how far each implementation's lies from it."""
     closed_form = "closed form of the cones, no slip" if wheelset.profiles else "closed form, no slip"
-    closed, first = klingel(wheelset), next((one.wavelength for one in linear.values()), 0.0)
+    closed, first = klingel(wheelset), next((linear_run.wavelength for linear_run in linear.values()), 0.0)
     lines = [
         "  wavelength of the free wheelset",
         f"    {closed_form:<34}{closed:>14.9g} m",
         f"    {'creep forces alone':<34}{kinematic_wavelength(wheelset):>14.9g} m",
     ]
-    for engine, one in linear.items():
+    for engine, linear_run in linear.items():
         lines.append(
-            f"    {f'eigenvalues of {engine}':<34}{one.wavelength:>14.9g} m   "
-            f"{one.wavelength / closed - 1:+.1e} from the closed form, "
-            f"{one.wavelength / first - 1:+.0e} from the first"
+            f"    {f'eigenvalues of {engine}':<34}{linear_run.wavelength:>14.9g} m   "
+            f"{linear_run.wavelength / closed - 1:+.1e} from the closed form, "
+            f"{linear_run.wavelength / first - 1:+.0e} from the first"
         )
     return lines
 
@@ -110,10 +118,10 @@ def _stability(wheelset: Wheelset, linear: dict[str, Linear]) -> list[str]:
         "  critical speed with linear creep",
         f"    {'lateral and yaw motion alone':<34}" + _speed(*critical_or_why(wheelset)),
     ]
-    first = next((one.critical for one in linear.values()), None)
+    first = next((linear_run.critical for linear_run in linear.values()), None)
     return lines + [
-        f"    {f'eigenvalues of {engine}':<34}" + _speed(one.critical, one.why, first if k else None)
-        for k, (engine, one) in enumerate(linear.items())
+        f"    {f'eigenvalues of {engine}':<34}" + _speed(linear_run.critical, linear_run.why, first if k else None)
+        for k, (engine, linear_run) in enumerate(linear.items())
     ]
 
 
@@ -131,7 +139,10 @@ def _motions(scene: WheelsetScene, paths: Paths) -> list[str]:
     lines = [f"  paths, by {name}, with {scene.contact.law}"]
     for speed, path in first.items():
         motion, power = path.detail, path["power"]
-        gaps = {engine: np.abs(own[speed].detail.states - motion.states).max() for engine, own in others}
+        gaps = {
+            engine: np.abs(paths_of_engine[speed].detail.states - motion.states).max()
+            for engine, paths_of_engine in others
+        }
         book = ledger(equations_of(scene, "reference", speed), motion)
         lines += [
             f"    {speed:g} m/s: {_ending(motion)}",

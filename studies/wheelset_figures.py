@@ -37,11 +37,13 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
     """Growth and wavelength of the hunting motion over the speed, and the root locus of its eigenvalue."""
     linear: dict[str, Linear] = {engine: result.detail for engine, result in eigenvalues.items()}
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(WIDE, 3.8))
-    for engine, one in linear.items():
+    for engine, linear_run in linear.items():
         style: Any = {"color": COLOURS[engine], "label": LABELS[engine]}
-        left.plot(one.speeds, one.values.real.max(axis=1), MARKS[engine], **style)
-        middle.plot(one.speeds, 2.0 * np.pi * one.speeds / one.hunting.imag, MARKS[engine], **style)
-        right.plot(one.hunting.real, one.hunting.imag / (2.0 * np.pi), MARKS[engine], **style)
+        left.plot(linear_run.speeds, linear_run.values.real.max(axis=1), MARKS[engine], **style)
+        middle.plot(
+            linear_run.speeds, 2.0 * np.pi * linear_run.speeds / linear_run.hunting.imag, MARKS[engine], **style
+        )
+        right.plot(linear_run.hunting.real, linear_run.hunting.imag / (2.0 * np.pi), MARKS[engine], **style)
     first = next(iter(linear.values()))
     for line in (left.axhline, right.axvline):
         line(0.0, color="0.6", linewidth=0.8)
@@ -68,26 +70,26 @@ def stability_figure(eigenvalues: Mapping[str, Result], wheelset: Wheelset, titl
 def paths_figure(results: Mapping[str, Mapping[float, Result]], title: str, path: Path) -> None:
     """Lateral displacement over time, a panel per speed; below, how far the engines are from the first one."""
     paths: dict[str, dict[float, Motion]] = {
-        engine: {speed: result.detail for speed, result in own.items()} for engine, own in results.items()
+        engine: {speed: result.detail for speed, result in path_then.items()} for engine, path_then in results.items()
     }
     name, first = next(iter(paths.items()))
     rows = (2, 1) if len(paths) > 1 else (2,)
     size = WIDE, 1.1 + 1.3 * sum(rows)
     figure, axes = plt.subplots(len(rows), len(first), figsize=size, squeeze=False, sharex="col", height_ratios=rows)
-    for column, (speed, own) in zip(axes.T, first.items(), strict=True):
+    for column, (speed, path_then) in zip(axes.T, first.items(), strict=True):
         for i, (engine, motions) in enumerate(paths.items()):
             states, colour = motions[speed].states, COLOURS[engine]
             every = slice(40 * (1 + i), None, 150) if i else slice(None)
             mark = MARKS[engine] if i else "-"
-            column[0].plot(own.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
+            column[0].plot(path_then.times[every], 1e3 * states[every, Y], mark, color=colour, label=LABELS[engine])
             if i:
-                gap = np.maximum(np.abs(states - own.states).max(axis=1), 1e-17)
-                column[1].semilogy(own.times, gap, color=colour, linewidth=0.7)
+                gap = np.maximum(np.abs(states - path_then.states).max(axis=1), 1e-17)
+                column[1].semilogy(path_then.times, gap, color=colour, linewidth=0.7)
                 column[1].set(ylabel="[m, rad, m/s, rad/s]", title=f"Largest difference from {LABELS[name]}")
         column[0].set(ylabel="lateral displacement [mm]", title=f"{speed:g} m/s")
         column[-1].set_xlabel("time [s]")
     legend_below(figure, axes[0, 0])
-    told = {f"{engine}, {at}": run for engine, own in results.items() for at, run in at_speeds(own).items()}
+    told = {f"{engine}, {at}": run for engine, path_then in results.items() for at, run in at_speeds(path_then).items()}
     heading(figure, f"{title}: the same path in every implementation", told)
     save(figure, path)
 
@@ -96,17 +98,17 @@ def creep_figure(results: Mapping[float, Result], title: str, path: Path) -> Non
     """Creep forces on each wheel and their power in the last second of every path."""
     paths: dict[float, Motion] = {speed: result.detail for speed, result in results.items()}
     figure, axes = plt.subplots(3, len(paths), figsize=(WIDE, 6.0), squeeze=False, sharex="col")
-    for k, (speed, own) in enumerate(paths.items()):
-        last = own.times >= own.times[-1] - SHOWN
-        for side, colour, sums in _wheels(own.contacts[last], "fx", "fy", "power"):
+    for k, (speed, course) in enumerate(paths.items()):
+        last = course.times >= course.times[-1] - SHOWN
+        for side, colour, sums in _wheels(course.contacts[last], "fx", "fy", "power"):
             for axis, values in zip(axes[:, k], sums, strict=True):
-                axis.plot(own.times[last], values, color=colour, label=side)
+                axis.plot(course.times[last], values, color=colour, label=side)
         axes[0, k].set(ylabel="along the track [N]", title=f"{speed:g} m/s")
         axes[1, k].set(ylabel="across the track [N]")
         axes[2, k].set(ylabel="power [W]", xlabel="time [s]")
         axes[2, k].axhline(0.0, color="0.6", linewidth=0.8)
     legend_below(figure, axes[0, 0])
-    largest = max(float(own.contacts["power"].max()) for own in paths.values())
+    largest = max(float(course.contacts["power"].max()) for course in paths.values())
     told = f"Creep forces on the wheels and their power, at any time {largest:.3g} W or less"
     heading(figure, f"{title}\n{told}", at_speeds(results))
     save(figure, path)
@@ -151,10 +153,10 @@ def cycle_figure(results: Mapping[str, Result], title: str, path: Path) -> None:
         states = orbit.path().states[:: 1 if engine == "reference" else 16]
         left.plot(1e3 * states[:, Y], 1e3 * states[:, YAW], MARKS[engine], color=COLOURS[engine], label=LABELS[engine])
     first = next(iter(cycles.values()))
-    own = first.path()
-    for side, colour, (along, across) in _wheels(own.contacts, "fx", "fy"):
+    around = first.path()
+    for side, colour, (along, across) in _wheels(around.contacts, "fx", "fy"):
         for force, name, line in ((along, "along", "-"), (across, "across", "--")):
-            right.plot(own.times, 1e-3 * force, line, color=colour, label=f"{side}, {name}")
+            right.plot(around.times, 1e-3 * force, line, color=colour, label=f"{side}, {name}")
     left.set(
         xlabel="lateral displacement [mm]",
         ylabel="yaw [mrad]",

@@ -136,11 +136,11 @@ def _lifted(loads: np.ndarray) -> bool:
 
 def _acceleration(plane: Plane, first: int, motion: Motion) -> tuple[float, float]:
     """Of the body on four wheels, along and across it (m/s^2)."""
-    found = motion.accelerations
-    k, along, across = plane.group[first], np.zeros(found.size), np.zeros(found.size)
+    accelerations = motion.accelerations
+    k, along, across = plane.group[first], np.zeros(accelerations.size), np.zeros(accelerations.size)
     units = np.column_stack((np.cos(motion.state[0, 2:]), np.sin(motion.state[0, 2:])))
     ahead, aside = rows(Point(k, 0.0, 0.0), Direction(*units[k]), units, motion.state[1], plane, along, across)
-    return float(along @ found + ahead), float(across @ found + aside)
+    return float(along @ accelerations + ahead), float(across @ accelerations + aside)
 
 
 def _tipped(status: int, plane: Plane, four: slice, rates: tuple[float, float], loads: np.ndarray) -> str:

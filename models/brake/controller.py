@@ -52,8 +52,10 @@ class Controller(Protocol):
 
 def is_steady(controller: Controller) -> bool:
     """Whether it need be asked only once: what a steady class says does not hold for a ``sample`` derived from it."""
-    own: Mapping[str, object] = next((vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {})
-    return bool(own.get("steady", False))
+    declared: Mapping[str, object] = next(
+        (vars(kind) for kind in type(controller).__mro__ if "sample" in vars(kind)), {}
+    )
+    return bool(declared.get("steady", False))
 
 
 @dataclass(frozen=True, eq=False)

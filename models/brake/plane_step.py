@@ -145,18 +145,18 @@ def respond(motion, before, after, step, vehicle, frame):
     """Fill ``frame.out`` with the accelerations by the tyres' forces if they were those of the ``motion``: the map
     whose fixed point is wanted. before, after (W,) : torques at the ends of the step."""
     plane, tables, wheels, surfaces, report = vehicle.plane, vehicle.tables, frame.wheels, frame.surfaces, frame.report
-    found, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
+    accelerations, out, along, across, right = motion.accelerations, frame.out, frame.along, frame.across, frame.right
     load, still, rate, start = wheels.load, wheels.still, wheels.rate, wheels.start
     size, free, lifts = coordinates(plane), prescribed(plane), False
     for a in range(size):
-        out[a] = found[a] if a < free else right[a]
+        out[a] = accelerations[a] if a < free else right[a]
     for i in range(load.size):
-        load[i] = still[i] + times(frame.press[i], found)
+        load[i] = still[i] + times(frame.press[i], accelerations)
         lifts = lifts or load[i] < 0.0
     if lifts:
         share_out(load, plane.place)
     for i in range(load.size):
-        speed1 = start[i] + step * (rate[i] + times(along[i], found))
+        speed1 = start[i] + step * (rate[i] + times(along[i], accelerations))
         given = StepInput(start[i], speed1, before[i], after[i], step)
         wheel = Wheel(plane.radius[i], plane.spin[i], motion.turning[i])
         tyre(i, given, wheel, tables, wheels, surfaces, report)
@@ -173,13 +173,13 @@ def stage(motion, before, after, step, most, vehicle, frame):
     means. Returns what is left of the error: the last change, which the round has made smaller as it did the change
     before.
     """
-    found, out, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
+    accelerations, out, out0, off0 = motion.accelerations, frame.out, frame.out_before, frame.off
     size, left, last = coordinates(vehicle.plane), math.inf, 0.0
     for rounds in range(most):
         respond(motion, before, after, step, vehicle, frame)
         change, product, square = 0.0, 0.0, 0.0
         for a in range(size):
-            off = out[a] - found[a]
+            off = out[a] - accelerations[a]
             change = max(change, abs(off))
             product += off * (off - off0[a])
             square += (off - off0[a]) ** 2
@@ -187,8 +187,8 @@ def stage(motion, before, after, step, most, vehicle, frame):
         done, last = not left > CLOSE or rounds == most - 1, change
         mix = min(max(product / square, -2.0), 0.75) if rounds > 0 and square > 0.0 and not done else 0.0
         for a in range(size):
-            off0[a] = out[a] - found[a]
-            found[a] = out[a] - mix * (out[a] - out0[a])
+            off0[a] = out[a] - accelerations[a]
+            accelerations[a] = out[a] - mix * (out[a] - out0[a])
             out0[a] = out[a]
         if done:
             break
@@ -207,34 +207,34 @@ def by_means(motion, before, after, step, vehicle, frame):
     Source: A. F. Filippov, Differential equations with discontinuous righthand sides (1988); W. R. Mann, Proc. AMS 4
     (1953) 506-510; recalled, not checked.
     """
-    found, out, report = motion.accelerations, frame.out, motion.report
+    accelerations, out, report = motion.accelerations, frame.out, motion.report
     size, share, last = coordinates(vehicle.plane), 0.5, math.inf
     means = array(doubles(report.size), report.shape)
-    begun = array(doubles(found.size), found.shape)
+    begun = array(doubles(accelerations.size), accelerations.shape)
     respond(motion, before, after, step, vehicle, frame)
-    moved_to(out, found)
+    moved_to(out, accelerations)
     for c in range(report.shape[0]):
         moved_to(report[c], means[c])
     for _ in range(MOST_WINDOWS):
         way, net, most, change = 0.0, 0.0, 0.0, 0.0
-        moved_to(found, begun)
+        moved_to(accelerations, begun)
         for _ in range(WINDOW):
             respond(motion, before, after, step, vehicle, frame)
             change = 0.0
             for a in range(size):
-                change = max(change, abs(out[a] - found[a]))
-                way += share * abs(out[a] - found[a])
+                change = max(change, abs(out[a] - accelerations[a]))
+                way += share * abs(out[a] - accelerations[a])
             if not change > CLOSE:
-                moved_to(out, found)
+                moved_to(out, accelerations)
                 return change
             most = max(most, change)
             for a in range(size):
-                found[a] += share * (out[a] - found[a])
+                accelerations[a] += share * (out[a] - accelerations[a])
             for c in range(report.shape[0]):
                 for i in range(report.shape[1]):
                     means[c, i] += share * (report[c, i] - means[c, i])
         for a in range(size):
-            net += abs(found[a] - begun[a])
+            net += abs(accelerations[a] - begun[a])
         turns, thrown = net < 0.5 * way, change > last
         if (turns and share * change <= SPREAD) or (thrown and share * most <= SPREAD):
             for c in range(report.shape[0]):
@@ -245,7 +245,7 @@ def by_means(motion, before, after, step, vehicle, frame):
 
 
 @inlined
-def comes_to_rest(rates, turning, found, step, plane):
+def comes_to_rest(rates, turning, accelerations, step, plane):
     """Time (s) within the step at which the vehicle stands, or -1 if it does not.
 
     Friction takes speed away until there is none, and only the time grid would let it turn round: it stands where its
@@ -257,8 +257,8 @@ def comes_to_rest(rates, turning, found, step, plane):
     for a in range(rates.size):
         weight = mass if a < 2 else plane.inertias[a - 2]
         speed += weight * rates[a] ** 2
-        both += weight * rates[a] * found[a]
-        rate += weight * found[a] ** 2
+        both += weight * rates[a] * accelerations[a]
+        rate += weight * accelerations[a] ** 2
     if speed == 0.0 and not turning.any():
         return 0.0
     if rate == 0.0 or both >= 0.0 or -both > step * rate or speed > 2.25 * step * step * rate:
@@ -274,7 +274,7 @@ def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
     m/s. Returns the time (s) of the step at which the vehicle comes to rest, ``step`` if it does not, -1 if the loads
     were not found.
     """
-    plane, state, turning, found = vehicle.plane, motion.state, motion.turning, motion.accelerations
+    plane, state, turning, accelerations = vehicle.plane, motion.state, motion.turning, motion.accelerations
     count, size = turning.size, coordinates(plane)
     ways = array(doubles(3 * count * size), (3, count, size))
     some, middle = array(doubles(6 * size), (6, size)), array(doubles(count), (count,))
@@ -304,11 +304,11 @@ def step_on(motion, torques, step, steer, regular, vehicle, surfaces):
         most = HALF_ROUNDS if half else PATIENCE
         if not stage(motion, torques[0], last, time, most, vehicle, frame) <= (math.inf if half else CLOSE):
             return -1.0
-        rest = comes_to_rest(rate0, turning, found, step, plane) if half and not plane.hooked else -1.0
+        rest = comes_to_rest(rate0, turning, accelerations, step, plane) if half and not plane.hooked else -1.0
         if rest >= 0.0:
             time = rest
         for a in range(size):
-            state[1, a] = rate0[a] + time * found[a]
+            state[1, a] = rate0[a] + time * accelerations[a]
             state[0, a] = place0[a] + 0.5 * time * (rate0[a] + state[1, a])
         if rest >= 0.0:
             state[1], turning[:] = 0.0, 0.0

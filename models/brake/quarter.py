@@ -51,17 +51,17 @@ class Quarter(Strict):
     @property
     def plane(self) -> Plane:
         """As compiled functions take it: unit and group are the only ones, the wheel is at the centre."""
-        none, one = np.zeros(1, dtype=np.int64), np.ones(1)
+        none, unit = np.zeros(1, dtype=np.int64), np.ones(1)
         return Plane(
-            self.mass * one,
-            one,
+            self.mass * unit,
+            unit,
             np.zeros((1, 1)),
             none,
             none.copy(),
             np.zeros((1, 2)),
-            self.radius * one,
-            self.spin_inertia * one,
-            self.mass * GRAVITY * one,
+            self.radius * unit,
+            self.spin_inertia * unit,
+            self.mass * GRAVITY * unit,
             np.zeros(1),
             np.zeros(1),
             0,

@@ -204,32 +204,32 @@ def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
     return True
 
 
-def advance(motion, torques, step, steer, vehicle, own):
+def advance(motion, torques, step, steer, vehicle, course):
     """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.
     """
-    angles, known, contacts, middle = vehicle.tables.angles, own.known, own.contacts, own.middle
+    angles, known, contacts, middle = vehicle.tables.angles, course.known, course.contacts, course.middle
     wheels = known.wheels
-    q, v, turning, found = motion.state[0], motion.state[1], motion.turning, motion.accelerations
-    rates, size = own.rates, found.size
-    regular, half, time = vehicle.slope * own.liveliness * step, 0.5 * step, 0.0
-    if not found.any():
+    q, v, turning, accelerations = motion.state[0], motion.state[1], motion.turning, motion.accelerations
+    rates, size = course.rates, accelerations.size
+    regular, half, time = vehicle.slope * course.liveliness * step, 0.5 * step, 0.0
+    if not accelerations.any():
         wheels.rate[:] = 0.0
     known.held.steer[:] = steer
     for n in range(torques.shape[0] - 1):
         before, after = torques[n], torques[n + 1]
         under_wheels(motion.state, step, vehicle, known.surfaces)
-        own.forces[:] = 0.0
-        held_forces(own.numbers, q, v, own.forces, contacts)
+        course.forces[:] = 0.0
+        held_forces(course.numbers, q, v, course.forces, contacts)
         wheels.start[:] = contacts.along
-        relax(contacts, half, vehicle.slope, own.lag, known.surfaces)
+        relax(contacts, half, vehicle.slope, course.lag, known.surfaces)
         meet(contacts, regular, known.surfaces.lag, angles, wheels)
         hold(known, before, 0.5 * (before + after), half, motion, vehicle)
-        accelerate(own.engine, q, v, rates)
-        found[:] = rates[:size]
-        rest = comes_to_rest(v[:size], turning, found, step, vehicle.plane)
+        accelerate(course.engine, q, v, rates)
+        accelerations[:] = rates[:size]
+        rest = comes_to_rest(v[:size], turning, accelerations, step, vehicle.plane)
         if rest >= 0.0:
             q += rest * v + 0.5 * rest**2 * rates
             v[:size], turning[:] = 0.0, 0.0
@@ -237,12 +237,12 @@ def advance(motion, torques, step, steer, vehicle, own):
                 return AT_REST, time + rest
         else:
             middle[0], middle[1] = q + half * v + 0.5 * half**2 * rates, v + half * rates
-            own.forces[:] = 0.0
-            held_forces(own.numbers, middle[0], middle[1], own.forces, contacts)
+            course.forces[:] = 0.0
+            held_forces(course.numbers, middle[0], middle[1], course.forces, contacts)
             wheels.rate[:] = (contacts.along - wheels.start) / half
             meet(contacts, regular, known.surfaces.lag, angles, wheels)
             hold(known, before, after, step, motion, vehicle)
-            if not march(own.engine, q, v):
+            if not march(course.engine, q, v):
                 return GAVE_UP, time
             turning[:] = motion.report[TURNING]
         time += step

@@ -91,9 +91,9 @@ EVEN = road([Stretch(0.0, 0, 0)])
 """The same surface everywhere."""
 
 
-def check_way(own: Road, way: float) -> None:
+def check_way(road: Road, way: float) -> None:
     """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
-    shortest = float(np.diff(own.starts[1:]).min()) if own.starts.size > 2 else np.inf
+    shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
     if way > shortest:
         raise InputError(
             "",

@@ -48,10 +48,10 @@ def hooked(trailer: Trailer, transfer: bool = True) -> Plane:
 
 def train(vehicle: Truck, trailer: Trailer, transfer: bool = True) -> Plane:
     """Numbers of a truck with a trailer on its hook: eight wheels."""
-    own, reach = truck(vehicle, transfer), np.zeros((3, 3))
+    truck_records, reach = truck(vehicle, transfer), np.zeros((3, 3))
     reach[1:, 0], reach[1:, 1], reach[2, 2] = trailer.hook, -trailer.drawbar, -trailer.front.x
-    units = (np.concatenate((a, b)) for a, b in zip(own[:2], _units(trailer), strict=True))
-    both = (np.concatenate((a, b)) for a, b in zip(own[3:11], _wheels(trailer, 1, transfer), strict=True))
+    units = (np.concatenate((a, b)) for a, b in zip(truck_records[:2], _units(trailer), strict=True))
+    both = (np.concatenate((a, b)) for a, b in zip(truck_records[3:11], _wheels(trailer, 1, transfer), strict=True))
     parts: list[Any] = [*units, reach, *both, 0, trailer.fold, np.arange(3)]
     return Plane(*parts)
 
@@ -100,19 +100,19 @@ def follow(
 
 @njit(cache=True, error_model="numpy")
 def _follow(motion, hook, step, torques, vehicle, pull):
-    plane, state, report, found = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
-    size, straight, states, forces = found.size, np.zeros(motion.turning.size), pull.states, pull.forces
+    plane, state, report, accelerations = vehicle.plane, motion.state, report_of(motion.report), motion.accelerations
+    size, straight, states, forces = accelerations.size, np.zeros(motion.turning.size), pull.states, pull.forces
     mass, (right, along, across), units = np.empty((size, size)), np.empty((3, size)), np.empty((size - 2, 2))
     states[0], surfaces = state, surfaces_of(np.empty((4, motion.turning.size)))
     under_wheels(state, step, vehicle, surfaces)
     for n in range(hook.shape[0] - 1):
-        found[:2] = (hook[n + 1] - hook[n]) / step
+        accelerations[:2] = (hook[n + 1] - hook[n]) / step
         if step_on(motion, torques, step, straight, vehicle.slope * GRAVITY * step, vehicle, surfaces) < 0.0:
             return False
         states[n + 1] = state
         headings(0.5 * (states[n, 0] + state[0]), units)
         inertia(units, 0.5 * (states[n, 1] + state[1]), plane, mass, right, along, across)
-        forces[n] = (mass @ found - right)[:2]
+        forces[n] = (mass @ accelerations - right)[:2]
         for i in range(plane.unit.size):
             psi = 0.5 * (states[n, 0, 2 + plane.unit[i]] + state[0, 2 + plane.unit[i]])
             fx, fy = report.force_x[i], report.force_y[i]

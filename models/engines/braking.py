@@ -78,17 +78,17 @@ def bodies(plane: Plane) -> SpatialVehicle:
 
     The hinge of unit k lies at reach[k, j] ahead of the units j < k and reach[k, k] behind its own centre.
     """
-    found = list[Body]()
+    chain = list[Body]()
     for k, (mass, turn) in enumerate(zip(plane.masses, plane.inertias, strict=True)):
         tensor = ((turn, 0.0, 0.0), (0.0, turn, 0.0), (0.0, 0.0, turn))
         hinge, centre = float(plane.reach[k, :k].sum()), float(plane.reach[k].sum())
         if k == 0:
-            found.append(Body("0", float(mass), (0.0, 0.0, 0.0), ("x", "y", "rz"), tensor))
+            chain.append(Body("0", float(mass), (0.0, 0.0, 0.0), ("x", "y", "rz"), tensor))
             continue
         below = "0" if k == 1 else f"hinge {k - 1}"
-        found.append(Body(f"hinge {k}", 0.0, (hinge, 0.0, 0.0), ("rz",), parent=below))
-        found.append(Body(str(k), float(mass), (centre, 0.0, 0.0), (), tensor, parent=f"hinge {k}"))
-    return SpatialVehicle("braked", tuple(found), (), (), ())
+        chain.append(Body(f"hinge {k}", 0.0, (hinge, 0.0, 0.0), ("rz",), parent=below))
+        chain.append(Body(str(k), float(mass), (centre, 0.0, 0.0), (), tensor, parent=f"hinge {k}"))
+    return SpatialVehicle("braked", tuple(chain), (), (), ())
 
 
 class Carried:
@@ -127,8 +127,8 @@ class Carried:
 
     def _moved(self, before: np.ndarray, step: float) -> np.ndarray:
         """Positions and rates (2, 2 + U) after a step of the engine."""
-        own = before.copy()
-        own[:, 3:] = np.diff(before[:, 2:], axis=1)
-        after = self._model.march(own[0], own[1], 1, step)[-1].reshape(2, -1)
+        carried = before.copy()
+        carried[:, 3:] = np.diff(before[:, 2:], axis=1)
+        after = self._model.march(carried[0], carried[1], 1, step)[-1].reshape(2, -1)
         after[:, 2:] = np.cumsum(after[:, 2:], axis=1)
         return after

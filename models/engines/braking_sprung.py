@@ -49,9 +49,9 @@ class OnSprings:
     """The vehicle in an engine; ``advance`` stands in for the compiled one of that name, with all coordinates."""
 
     def __init__(self, engine: str, vehicle: Sprung) -> None:
-        own, self.wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
+        handling, self.wheels = vehicle.handling, len(vehicle.handling.vehicle.tyres)
         self.engine, self.vehicle, self.size = engine, vehicle, vehicle.size
-        self._table = np.concatenate((own.numbers, np.zeros(HELD * self.wheels)))
+        self._table = np.concatenate((handling.numbers, np.zeros(HELD * self.wheels)))
         self._allowed = set[float]()
 
     @cached_property
@@ -60,20 +60,20 @@ class OnSprings:
 
         A body that rolls lets its contacts go sideways more easily than its mass would.
         """
-        own, size = self.vehicle.handling, self.size
+        handling, size = self.vehicle.handling, self.size
         contacts, across = Contacts(*np.empty((3, self.wheels))), np.empty((self.wheels, size))
         for j, rate in enumerate(np.eye(size)):
             held_forces(self._table, np.zeros(size), rate, np.zeros(size), contacts)
             across[:, j] = contacts.across
-        loads = np.array([own.held.tyres[tyre.name] for tyre in own.vehicle.tyres])
-        damping = np.linalg.solve(mass(own.vehicle), across.T @ (loads[:, None] * across))
+        loads = np.array([handling.held.tyres[tyre.name] for tyre in handling.vehicle.tyres])
+        damping = np.linalg.solve(mass(handling.vehicle), across.T @ (loads[:, None] * across))
         return float(np.linalg.eigvals(damping).real.max())
 
     @cached_property
     def _model(self) -> FreeModel:
         """Built with the first step."""
-        own = self.vehicle.handling
-        return free_model(self.engine, Driven(own.vehicle, own.gravity, self._table, held, set_held))
+        handling = self.vehicle.handling
+        return free_model(self.engine, Driven(handling.vehicle, handling.gravity, self._table, held, set_held))
 
     def _go(self, lags: bool) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """``advance`` and the generator of samples, of tyres that lag or not; compiled where the engine can be called
@@ -141,13 +141,13 @@ class OnSprings:
         """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
         RunFailed as ``advance``."""
         _, by_steps = self._go(lag is not None)
-        step, own = sample / (braking.torques.shape[0] - 1), self._own
+        step, on_engine = sample / (braking.torques.shape[0] - 1), self._own
         self.check_step(step)
         if lag is not None:
             from models.brake.sprung_relaxation import ContactLag
 
-            own = own._replace(lag=ContactLag(*lag, np.zeros(1)))
-        rows = by_steps(told, kept, sample, braking, motion, vehicle, own)
+            on_engine = on_engine._replace(lag=ContactLag(*lag, np.zeros(1)))
+        rows = by_steps(told, kept, sample, braking, motion, vehicle, on_engine)
         while True:
             with self._model.at_step(step):
                 status, time, speed, supply = next(rows)
@@ -173,15 +173,15 @@ class OnSprings:
 
     def rolling(self, state: np.ndarray, steer: np.ndarray, vehicle: OnRoad) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
-        own, none = self._own, np.zeros(steer.size)
-        known = self._at_wheels(own.numbers)
+        on_engine, none = self._own, np.zeros(steer.size)
+        known = self._at_wheels(on_engine.numbers)
         for part in known.held:
             part[:] = 0.0
         known.held.steer[:] = steer
-        held_forces(own.numbers, *state, np.zeros(self.size), own.contacts)
-        turning = own.contacts.along / vehicle.plane.radius
+        held_forces(on_engine.numbers, *state, np.zeros(self.size), on_engine.contacts)
+        turning = on_engine.contacts.along / vehicle.plane.radius
         under_wheels(state, 0.0, vehicle, known.surfaces)
-        known.wheels.start[:] = own.contacts.along
-        meet(own.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
+        known.wheels.start[:] = on_engine.contacts.along
+        meet(on_engine.contacts, 0.0, known.surfaces.lag, vehicle.tables.angles, known.wheels)
         hold(known, none, none, BLINK, motion_of(state, turning), vehicle)
         return self._model.acceleration(0.0, *state), turning

@@ -188,14 +188,14 @@ def set_forces(block, t, size):
 
 
 @njit(cache=True, error_model="numpy")
-def slopes(numbers, q, v, by_q, by_v, found):
-    """Fill ``found`` (size, size) with by_q dF/dq + by_v dF/dv, central differences; for implicit integrators.
+def slopes(numbers, q, v, by_q, by_v, sensitivity):
+    """Fill ``sensitivity`` (size, size) with by_q dF/dq + by_v dF/dv, central differences; for implicit integrators.
 
     No wheel feels another, so that one coordinate of all wheels is moved at a time: 16 evaluations, however many
     wheels there are.
     """
     high, low, place, rate = np.empty(q.size), np.empty(q.size), q.copy(), v.copy()
-    found[:] = 0.0
+    sensitivity[:] = 0.0
     for i in range(FREEDOMS):
         for moved, by, step in ((place, by_q, OF_POSITION[i]), (rate, by_v, OF_RATE[i])):
             if by == 0.0:
@@ -208,7 +208,7 @@ def slopes(numbers, q, v, by_q, by_v, found):
             add_forces(numbers, place, rate, low)
             moved[i::FREEDOMS] = kept
             for row in range(q.size):
-                found[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
+                sensitivity[row, row - row % FREEDOMS + i] += by * (high[row] - low[row]) / (2.0 * step)
 
 
 def linear(wheels: Wheels) -> Linear:

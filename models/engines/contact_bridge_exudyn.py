@@ -108,14 +108,14 @@ class Rolling:
 
     def _loads(self, of: Listed) -> None:
         """The first load computes the forces of all."""
-        data, found = self.mbs.systemData, [0.0] * self.wheels.size
+        data, loads = self.mbs.systemData, [0.0] * self.wheels.size
 
         def first(mbs: Any, t: float, load: float) -> float:
-            found[:] = of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
-            return found[0]
+            loads[:] = of(data.GetODE2Coordinates(), data.GetODE2Coordinates_t())
+            return loads[0]
 
         for i, marker in enumerate(self._markers()):
-            function = (lambda mbs, t, load, i=i: found[i]) if i else first
+            function = (lambda mbs, t, load, i=i: loads[i]) if i else first
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=marker, loadUserFunction=function))
 
     def _before(self, of: Listed) -> None:

@@ -86,14 +86,14 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
 
 def _to_ground(built: Build, place: tuple[str, str], part: Strut | PitchSpring, law: Any = None) -> None:
     """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
-    own = {} if law is None else {"springForceUserFunction": law}
-    built.callbacks += len(own)
+    keywords = {} if law is None else {"springForceUserFunction": law}
+    built.callbacks += len(keywords)
     built.mbs.AddObject(
         items.CoordinateSpringDamper(
             markerNumbers=[ground_marker(built.mbs), built.places[place]],
             stiffness=part.stiffness,
             damping=part.damping,
-            **own,
+            **keywords,
         )
     )
 
@@ -259,9 +259,9 @@ class ExudynModel:
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), from Exudyn's own residual and mass matrix."""
-        found = self._free_acceleration(time, q, v)
-        found[list(self.assembly.guided)] = self._wanted(time)
-        return found
+        accelerations = self._free_acceleration(time, q, v)
+        accelerations[list(self.assembly.guided)] = self._wanted(time)
+        return accelerations
 
     def _wanted(self, time: float) -> np.ndarray:
         """Accelerations of the prescribed coordinates, if any."""

@@ -43,7 +43,7 @@ def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] 
     places = {axle.wheel: axle.x for axle in vehicle.axles}
     joints = {place for i, place in enumerate(vehicle.coordinates()) if i not in guided}
     for body in vehicle.bodies:
-        own = spec.worldbody.add_body(
+        body_spec = spec.worldbody.add_body(
             name=body.name,
             pos=[places.get(body.name, 0.0), 0, 0],
             mass=body.mass,
@@ -52,9 +52,9 @@ def specification(vehicle: Vehicle, settings: Settings, guided: Collection[int] 
             explicitinertial=True,
         )
         if (body.name, "z") in joints:
-            own.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
+            body_spec.add_joint(name=f"{body.name} z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
         if (body.name, "pitch") in joints:
-            own.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
+            body_spec.add_joint(name=f"{body.name} pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     for strut in (strut for strut in vehicle.struts if not strut.pushes_only):
         if strut.lower.body is None:
             joint = spec.joint(f"{strut.upper.body} z")

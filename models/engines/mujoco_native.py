@@ -40,8 +40,8 @@ def _call(typing_context, function, model, data):
     def generate(context, builder, signature, arguments):
         pointer = ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [pointer, pointer]).as_pointer()
-        own = [builder.inttoptr(argument, pointer) for argument in arguments[1:]]
-        builder.call(builder.inttoptr(arguments[0], kind), own)
+        pointers = [builder.inttoptr(argument, pointer) for argument in arguments[1:]]
+        builder.call(builder.inttoptr(arguments[0], kind), pointers)
         return context.get_dummy_value()
 
     return types.void(types.intp, types.intp, types.intp), generate

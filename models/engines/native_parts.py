@@ -123,10 +123,10 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element as an engine may have it; None where it is neither."""
-    one, two = (_behind(tree, end, element.frame) for end in (element.one, element.two))
-    if one is not None and two is not None and not any(_turns(tree, body) for body in (*one, *two)):
-        return _along_coordinates(tree, element, one, two)
-    if element.frame == element.two and one is not None:
+    first, two = (_behind(tree, end, element.frame) for end in (element.one, element.two))
+    if first is not None and two is not None and not any(_turns(tree, body) for body in (*first, *two)):
+        return _along_coordinates(tree, element, first, two)
+    if element.frame == element.two and first is not None:
         return AxialTravel(element.two, element.point_two, element.one, element.point_one, -element.axis)
     if element.frame == element.one and two is not None:
         return AxialTravel(element.one, element.point_one, element.two, element.point_two, element.axis)
@@ -145,12 +145,12 @@ def _behind(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | No
 
 
 def _along_coordinates(
-    tree: SpatialVehicle, element: Element, one: tuple[str, ...], two: tuple[str, ...]
+    tree: SpatialVehicle, element: Element, first: tuple[str, ...], two: tuple[str, ...]
 ) -> CoordinateTravel:
     """Slides of the bodies behind the frame to either end, along its axes; those that move both ends drop out."""
     factors = dict[int, float]()
     for number, (body, freedom) in enumerate(tree.coordinates()):
-        ends = int(body in two) - int(body in one)
+        ends = int(body in two) - int(body in first)
         if factor := ends * float(element.axis[FREEDOMS.index(freedom) % 3]):
             factors[number] = factor
     return CoordinateTravel(tuple(factors), tuple(factors.values()))

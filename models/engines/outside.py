@@ -43,21 +43,29 @@ HIGHEST = 20
 
 def register(name: str) -> None:
     """Import the class that ``module:Class`` names and enter it in the catalogue; InputError if it cannot be used."""
-    found = _class(name)
-    order = getattr(found, "order", None)
+    outside_class = _class(name)
+    order = getattr(outside_class, "order", None)
     if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= HIGHEST:
         raise _unusable(name, f"must say its order of convergence: order = a whole number from 1 to {HIGHEST}")
-    integrates = callable(getattr(found, "integrate", None))
-    missing = [] if integrates else [own for own in ("run", "acceleration") if not callable(getattr(found, own, None))]
+    integrates = callable(getattr(outside_class, "integrate", None))
+    missing = (
+        []
+        if integrates
+        else [
+            constrained
+            for constrained in ("run", "acceleration")
+            if not callable(getattr(outside_class, constrained, None))
+        ]
+    )
     if missing:
         raise _unusable(
             name,
             f"has no {' and no '.join(missing)}(): an engine has run() and acceleration(time, "
             "state), an integrator has integrate(f, times, start, tolerance)",
         )
-    own = bool(getattr(found, "constraints", False))
-    CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or own)}
-    RECOMMENDED[name], OUTSIDE[name] = name, found
+    constrained = bool(getattr(outside_class, "constraints", False))
+    CATALOGUE[name] = {name: Integrator(order, "any", constraints=integrates or constrained)}
+    RECOMMENDED[name], OUTSIDE[name] = name, outside_class
 
 
 def _unusable(name: str, why: str) -> InputError:
@@ -71,16 +79,16 @@ def _class(name: str) -> type:
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:
-        found = getattr(import_module(module), attribute)
+        outside_class = getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
         raise _unusable(name, f"there is no module {error.name!r} here, nor among the installed ones") from None
     except AttributeError:
         raise _unusable(name, f"the module {module} has no {attribute}") from None
     except (Exception, SystemExit) as error:
         raise _unusable(name, f"the module {module} cannot be imported: {_said(error)}") from None
-    if not isinstance(found, type):
+    if not isinstance(outside_class, type):
         raise _unusable(name, f"{attribute} is no class")
-    return found
+    return outside_class
 
 
 def _said(error: BaseException) -> str:
@@ -89,10 +97,10 @@ def _said(error: BaseException) -> str:
 
 def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     """The class on an assembly: as an engine of its own, or as an integrator of the reference's equations."""
-    found = OUTSIDE[name]
-    if callable(getattr(found, "integrate", None)):
-        return Integrated(assembly, settings, name, _asked(name, "building it", found).integrate)
-    return Guarded(name, _asked(name, "building it", found, assembly, settings), assembly, settings)
+    outside_class = OUTSIDE[name]
+    if callable(getattr(outside_class, "integrate", None)):
+        return Integrated(assembly, settings, name, _asked(name, "building it", outside_class).integrate)
+    return Guarded(name, _asked(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
 def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
@@ -108,12 +116,12 @@ def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
 def _numbers(name: str, what: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An answer as an array of this shape; RunFailed if it is none."""
     try:
-        found = np.asarray(value if value is not None else "nothing", dtype=float)
+        numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
         raise RunFailed(name, f"{what} gave {type(value).__name__} instead of numbers") from None
-    if found.shape != shape:
-        raise RunFailed(name, f"{what} gave the shape {found.shape} instead of {shape}")
-    return found
+    if numbers.shape != shape:
+        raise RunFailed(name, f"{what} gave the shape {numbers.shape} instead of {shape}")
+    return numbers
 
 
 @dataclass
@@ -143,8 +151,8 @@ class Integrated(Reference):
             grid = np.array([start, *within, *last])
             asked = (self._rhs(start, end, calls), grid, y.copy(), self.settings.tolerance)
             answer = _asked(self.name, "integrate", self.integrate, *asked)
-            found = _numbers(self.name, "integrate", answer, (len(grid), 8))
-            states[inside], y = found[1 : 1 + len(within)], found[-1]
+            states_then = _numbers(self.name, "integrate", answer, (len(grid), 8))
+            states[inside], y = states_then[1 : 1 + len(within)], states_then[-1]
             if not np.isfinite(y).all():
                 raise RunFailed(self.name, "the state became infinite or not a number", start)
         return states, calls[0]
@@ -173,22 +181,22 @@ class Guarded:
 
     def run(self) -> Trajectory:
         """What the engine's own run gives, checked."""
-        found = _asked(self.name, "run", self.model.run)
-        if not (hasattr(found, "times") and hasattr(found, "states")):
-            raise RunFailed(self.name, f"run gave {type(found).__name__}, which has no times and states")
-        count = np.size(found.times)
-        times = _numbers(self.name, "run, as times,", found.times, (count,))
-        states = _numbers(self.name, "run, as states,", found.states, (count, 8))
-        enforced = getattr(found, "enforced", None)
+        answer = _asked(self.name, "run", self.model.run)
+        if not (hasattr(answer, "times") and hasattr(answer, "states")):
+            raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
+        count = np.size(answer.times)
+        times = _numbers(self.name, "run, as times,", answer.times, (count,))
+        states = _numbers(self.name, "run, as states,", answer.states, (count, 8))
+        enforced = getattr(answer, "enforced", None)
         if self.assembly.guided:
             enforced = _numbers(self.name, "run, as enforced,", enforced, (count, len(self.assembly.guided)))
         guard(self.name, times, states, self.settings.duration, enforced=enforced)
-        return Trajectory(times, states, enforced, dict(getattr(found, "counts", {})))
+        return Trajectory(times, states, enforced, dict(getattr(answer, "counts", {})))
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Accelerations (4,) at a time (s), coordinates and rates (4,), which the class gets as one state (8,)."""
-        found = _asked(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
-        return _numbers(self.name, "acceleration", found, (4,))
+        answer = _asked(self.name, "acceleration", self.model.acceleration, time, np.concatenate((q, v)))
+        return _numbers(self.name, "acceleration", answer, (4,))
 
     def plan(self) -> dict[str, int]:
         """What was built, as far as the engine says."""

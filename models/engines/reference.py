@@ -83,13 +83,19 @@ class Reference:
     settings: Settings
 
     def __post_init__(self) -> None:
-        own = self.assembly
-        terms = {"springs": own.vehicle.pitch_springs, "moment": own.moment is not None}
-        lifts = any(strut.pushes_only for strut in own.vehicle.struts)
-        equations = "lift-off" if lifts else "road" if own.mode == "free" else own.mode  # a flat road is a road, too
-        self._key = (equations, own.vehicle.geometry, *(term for term, there in terms.items() if there))
-        self._input = own.input if own.input is None or own.moment is None else Stacked((own.input, own.moment))
-        self._p = numbers(own.parameters, own.vehicle)
+        assembly = self.assembly
+        terms = {"springs": assembly.vehicle.pitch_springs, "moment": assembly.moment is not None}
+        lifts = any(strut.pushes_only for strut in assembly.vehicle.struts)
+        equations = (
+            "lift-off" if lifts else "road" if assembly.mode == "free" else assembly.mode
+        )  # a flat road is a road, too
+        self._key = (equations, assembly.vehicle.geometry, *(term for term, there in terms.items() if there))
+        self._input = (
+            assembly.input
+            if assembly.input is None or assembly.moment is None
+            else Stacked((assembly.input, assembly.moment))
+        )
+        self._p = numbers(assembly.parameters, assembly.vehicle)
 
     def run(self) -> Trajectory:
         """Integrate over the whole duration; raises RunFailed if the answer is not complete and finite."""

@@ -67,24 +67,24 @@ def _spring(built: Build, spring: SpringDamper) -> None:
     """Native where Exudyn has an item for it: along a global axis, or along any axis of a body that never turns."""
     axis, ends, held = np.array(spring.axis), [spring.one, spring.two], built.held.parts[spring.name]
     upright = np.count_nonzero(axis) == 1
-    one, two = (
+    first, two = (
         built.marker(end, point, not upright)
         for end, point in zip(ends, (spring.point_one, spring.point_two), strict=True)
     )
     rest = np.subtract(spring.point_two, spring.point_one)
     curved = spring.travel_force or spring.rate_force or spring.friction
     if curved or not (upright or any(not built.vehicle.turns(end) for end in ends)):
-        return built.connect(f"spring {spring.name!r}", one, two, _law(spring, axis, rest, held))
+        return built.connect(f"spring {spring.name!r}", first, two, _law(spring, axis, rest, held))
     sunk = held / spring.stiffness if spring.stiffness else 0.0
     if upright:
         diagonal = axis**2
         law = {"stiffness": spring.stiffness * diagonal, "damping": spring.damping * diagonal}
-        return built.spring(one, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
+        return built.spring(first, two, **law, offset=rest - sunk * axis, name=f"spring {spring.name!r}")
     sign = -1 if built.vehicle.turns(spring.one) else 1  # the axis is one of the first marker's body
     built.mbs.AddObject(
         items.LinearSpringDamper(
             name=f"spring {spring.name!r}",
-            markerNumbers=[one, two][::sign],
+            markerNumbers=[first, two][::sign],
             axisMarker0=sign * built.own(ends[::sign][0], axis),
             stiffness=spring.stiffness,
             damping=spring.damping,

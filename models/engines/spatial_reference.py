@@ -67,23 +67,25 @@ class SpatialReference:
 
     def motions_of(self, q: np.ndarray, v: np.ndarray) -> dict[str, Motion]:
         """All bodies, parents first: each freedom shifts along, or turns about, an axis that those before it turned."""
-        found: dict[str, Motion] = {}
+        motions: dict[str, Motion] = {}
         for body in self.vehicle.bodies:
             rows = np.zeros((3, self.size))
-            below = found[body.parent] if body.parent else Motion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
+            below = (
+                motions[body.parent] if body.parent else Motion(np.zeros(3), UNIT, rows, rows, rows[:, 0], rows[:, 0])
+            )
             origin = self.vehicle.body(body.parent).position if body.parent else (0.0, 0.0, 0.0)
-            arm, own, omega = np.subtract(body.position, origin), rows.copy(), below.turn @ v
+            arm, turned_rows, omega = np.subtract(body.position, origin), rows.copy(), below.turn @ v
             for k, freedom in enumerate(FREEDOMS[:3]):
                 if freedom in body.freedoms:
                     arm[k] += q[self.index[body.name, freedom]]
-                    own[:, self.index[body.name, freedom]] = below.rotation[:, k]
+                    turned_rows[:, self.index[body.name, freedom]] = below.rotation[:, k]
             centre, shift, rest = below.at(arm, omega)
             m = Motion(
                 centre,
                 below.rotation,
-                shift + own,
+                shift + turned_rows,
                 below.turn.copy(),
-                rest + 2 * across(omega) @ own @ v,
+                rest + 2 * across(omega) @ turned_rows @ v,
                 below.turn_rest.copy(),
             )
             for k, freedom in enumerate(FREEDOMS[3:]):
@@ -92,8 +94,8 @@ class SpatialReference:
                     m.turn_rest += across(m.turn @ v) @ axis * v[i]
                     m.turn[:, i] += axis
                     m.rotation = m.rotation @ _turned(k, q[i])
-            found[body.name] = m
-        return found
+            motions[body.name] = m
+        return motions
 
     def _point(self, body: str | None, point: Vector) -> tuple[np.ndarray, np.ndarray]:
         """Place (3,) and rows (3, n) of a point given in the design position."""
@@ -140,10 +142,10 @@ class SpatialReference:
         moment = self.held.parts[bar.name] + bar.stiffness * turned + bar.damping * row @ self.v
         return np.asarray(-moment * row)
 
-    def _travel(self, one: End, two: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
-        """axis . (point two - point one) less its value in the design position, and its derivatives (n,)."""
-        (first, of_first), (second, of_second) = self._point(*one), self._point(*two)
-        along, apart, row = np.array(axis), np.subtract(two[1], one[1]), np.zeros(self.size)
+    def _travel(self, from_end: End, to_end: End, axis: Vector, frame: str | None) -> tuple[float, np.ndarray]:
+        """axis . (point to_end - point one) less its value in the design position, and its derivatives (n,)."""
+        (first, of_first), (second, of_second) = self._point(*from_end), self._point(*to_end)
+        along, apart, row = np.array(axis), np.subtract(to_end[1], from_end[1]), np.zeros(self.size)
         if frame is not None:
             m = self.motions[frame]
             apart, along = m.rotation @ apart, m.rotation @ along

@@ -69,8 +69,8 @@ def plan_of(scene: Any) -> Any:
 def findings_of(scene: Any) -> tuple[Finding, ...]:
     """Doubts about what a scene puts in, before anything is run; raises InputError for what cannot be."""
     look = getattr(plan_of(scene), "findings", None)
-    own = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
-    return (*(look(scene) if look else ()), *own)
+    unended = () if scene.system == "measured" else _unended(scene)  # whose files are remarked on as recordings
+    return (*(look(scene) if look else ()), *unended)
 
 
 def causes(scene: Any) -> list[str]:
@@ -142,9 +142,9 @@ def study_of(scene: Any) -> Any:
     if scene.study not in studies():
         raise InputError(scene.file, "study", scene.study, "no such study", studies())
     module = import_module(f"studies.{scene.study}")
-    own = getattr(module, "SYSTEM", DEFAULT)
-    if own not in (ANY, scene.system):
-        allowed = f"is a study of system {own!r}; this scene's system is {scene.system!r}"
+    systems = getattr(module, "SYSTEM", DEFAULT)
+    if systems not in (ANY, scene.system):
+        allowed = f"is a study of system {systems!r}; this scene's system is {scene.system!r}"
         raise InputError(scene.file, "study", scene.study, allowed)
     if hasattr(module, "Options"):
         read(module.Options, scene.options, scene.file, "options")

@@ -103,33 +103,33 @@ class Difference:
         return 0.0 if self.largest == 0.0 else self.largest / size if size > 0 else np.inf
 
 
-def compare(one: Path, two: Path) -> tuple[list[Difference], list[str]]:
+def compare(first: Path, two: Path) -> tuple[list[Difference], list[str]]:
     """Differences of all quantities that both hold, largest share first, and notes on what only one holds.
 
     Raises InputError for what is no result, and for two results that have nothing to compare.
     """
-    pairs, notes = _pairs(one, two)
-    found = list[Difference]()
+    pairs, notes = _pairs(first, two)
+    differences = list[Difference]()
     for name, *files in pairs:
         prefix = f"{name}: " if len(pairs) > 1 else ""
         a, b = (dict(_quantities(file)) for file in files)
         notes += _alone(prefix, (files[0], a), (files[1], b))
-        found += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
-    return _sorted(found, one, two), notes
+        differences += [_difference(prefix + key, a[key], b[key], files[1]) for key in a if key in b]
+    return _sorted(differences, first, two), notes
 
 
-def compare_runs(one: Result, two: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
+def compare_runs(first: Result, two: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
     """The same of two results in memory, which messages and notes call by ``names``."""
-    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (one, two))
-    found = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
-    return _sorted(found, *names), _alone("", (names[0], a), (names[1], b))
+    a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, two))
+    differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
+    return _sorted(differences, *names), _alone("", (names[0], a), (names[1], b))
 
 
-def _sorted(found: list[Difference], one: object, two: object) -> list[Difference]:
+def _sorted(differences: list[Difference], first: object, two: object) -> list[Difference]:
     """The largest share first; raises InputError where there is none."""
-    if not found:
-        raise InputError(two, "", None, f"has no quantity in common with {one}: compare two results of one study")
-    return sorted(found, key=lambda each: -each.share)
+    if not differences:
+        raise InputError(two, "", None, f"has no quantity in common with {first}: compare two results of one study")
+    return sorted(differences, key=lambda each: -each.share)
 
 
 def _alone(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
@@ -141,36 +141,38 @@ def _alone(prefix: str, *sides: tuple[object, Collection[str]]) -> list[str]:
     ]
 
 
-def _pairs(one: Path, two: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
+def _pairs(earlier: Path, later: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """Files to compare, the two themselves or those of the same name in both folders, and notes on the others."""
-    for path in (one, two):
+    for path in (earlier, later):
         if not path.exists():
             raise InputError(path, "", None, "no such file or folder")
         if path.is_file() and path.suffix not in SUFFIXES:
             raise InputError(path, "", None, "is no result: name a folder, a netCDF file (.nc) or a table (.csv)")
-    kinds = ["file" if path.is_file() else "folder" for path in (one, two)]
+    kinds = ["file" if path.is_file() else "folder" for path in (earlier, later)]
     if kinds[0] != kinds[1]:
-        raise InputError(two, "", None, f"is a {kinds[1]} and {one} a {kinds[0]}: name two of a kind")
-    if one.is_file():
-        return [("", one, two)], []
-    first, second = _files(one), _files(two)
+        raise InputError(later, "", None, f"is a {kinds[1]} and {earlier} a {kinds[0]}: name two of a kind")
+    if earlier.is_file():
+        return [("", earlier, later)], []
+    first, second = _files(earlier), _files(later)
     common = [name for name in first if name in second]
     if not common and len(first) == len(second) == 1:
         return [("", next(iter(first.values())), next(iter(second.values())))], []
     if not common:
-        raise InputError(two, "", None, f"has no results of the same names as {one}: compare two results of one study")
-    return [(name, first[name], second[name]) for name in common], _alone("", (one, first), (two, second))
+        raise InputError(
+            later, "", None, f"has no results of the same names as {earlier}: compare two results of one study"
+        )
+    return [(name, first[name], second[name]) for name in common], _alone("", (earlier, first), (later, second))
 
 
 def _files(folder: Path) -> dict[str, Path]:
     """Results of a folder by their names within it; netCDF files alone where there are any that no table repeats."""
-    found = [
+    files = [
         path
         for path in sorted(folder.rglob("*"))
         if path.suffix in SUFFIXES and not any(part.startswith(".") for part in path.relative_to(folder).parts)
     ]
-    netcdf = [path for path in found if path.suffix == ".nc" and not _tabled(path)]
-    chosen = netcdf or [path for path in found if path.suffix == ".csv"]
+    netcdf = [path for path in files if path.suffix == ".nc" and not _tabled(path)]
+    chosen = netcdf or [path for path in files if path.suffix == ".csv"]
     return {path.relative_to(folder).as_posix(): path for path in chosen}
 
 
@@ -179,11 +181,11 @@ def _tabled(path: Path) -> bool:
     return path.with_suffix(".csv").exists() and len(load(path).data.sizes) < 2
 
 
-def results_of(one: Path, two: Path) -> dict[str, Result]:
+def results_of(first: Path, two: Path) -> dict[str, Result]:
     """The results that are compared, by their files: those of tables are the netCDF files beside them."""
-    files = [file for _, *pair in _pairs(one, two)[0] for file in pair]
-    found = ((str(file), _result(file)) for file in files)
-    return {name: run for name, run in found if run is not None and all(said in run.data.attrs for said in SAID)}
+    files = [file for _, *pair in _pairs(first, two)[0] for file in pair]
+    results = ((str(file), _result(file)) for file in files)
+    return {name: run for name, run in results if run is not None and all(said in run.data.attrs for said in SAID)}
 
 
 def _result(path: Path) -> Result | None:
@@ -267,31 +269,41 @@ def _numbers(cells: tuple[str, ...]) -> np.ndarray | None:
     return values if np.isfinite(values).any() else None
 
 
-def _difference(name: str, one: Quantity, two: Quantity, file: object) -> Difference:
+def _difference(name: str, first: Quantity, two: Quantity, file: object) -> Difference:
     """Raises InputError where kinds of runs, units or rows do not fit."""
-    if one.kind != two.kind:
-        raise InputError(file, name, two.kind, f"the other run is of {one.kind}: compare two runs of one kind")
-    if (one.unit, one.over) != (two.unit, two.over):
-        raise InputError(file, name, f"{two.unit} over {two.over}", f"the other one is in {one.unit} over {one.over}")
-    for label, other in zip(one.labels, two.labels, strict=False):
+    if first.kind != two.kind:
+        raise InputError(file, name, two.kind, f"the other run is of {first.kind}: compare two runs of one kind")
+    if (first.unit, first.over) != (two.unit, two.over):
+        raise InputError(
+            file, name, f"{two.unit} over {two.over}", f"the other one is in {first.unit} over {first.over}"
+        )
+    for label, other in zip(first.labels, two.labels, strict=False):
         if label != other:
             raise InputError(file, name, other, f"has other rows than the first, which has {label!r} there")
-    near = NEAR * np.abs(one.grid).max(initial=0.0)
-    if one.grid.shape == two.grid.shape and np.allclose(one.grid, two.grid, rtol=0.0, atol=near):
+    near = NEAR * np.abs(first.grid).max(initial=0.0)
+    if first.grid.shape == two.grid.shape and np.allclose(first.grid, two.grid, rtol=0.0, atol=near):
         return Difference(
-            name, one.unit, one.over, one.grid, one.values, two.values, "", one.labels, one.error + two.error
+            name,
+            first.unit,
+            first.over,
+            first.grid,
+            first.values,
+            two.values,
+            "",
+            first.labels,
+            first.error + two.error,
         )
-    if one.over != "time [s]":
-        rows = "" if len(one.grid) == len(two.grid) else f", {len(two.grid)} instead of {len(one.grid)}"
-        raise InputError(file, name, None, f"has rows at other places ({one.over}) than the first{rows}")
-    return _in_time(name, one, two, file)
+    if first.over != "time [s]":
+        rows = "" if len(first.grid) == len(two.grid) else f", {len(two.grid)} instead of {len(first.grid)}"
+        raise InputError(file, name, None, f"has rows at other places ({first.over}) than the first{rows}")
+    return _in_time(name, first, two, file)
 
 
-def _in_time(name: str, one: Quantity, two: Quantity, file: object) -> Difference:
+def _in_time(name: str, first: Quantity, two: Quantity, file: object) -> Difference:
     """Runs with rows at other times: the denser one is read at the rows of the other by a cubic spline."""
     from scipy.interpolate import CubicSpline
 
-    fine, coarse = (one, two) if len(one.grid) > len(two.grid) else (two, one)
+    fine, coarse = (first, two) if len(first.grid) > len(two.grid) else (two, first)
     unread = "cannot be read at other times: the"
     if not (np.diff(fine.grid) > 0.0).all():
         raise InputError(file, name, None, f"{unread} times of the denser run do not increase")
@@ -303,69 +315,76 @@ def _in_time(name: str, one: Quantity, two: Quantity, file: object) -> Differenc
     times = coarse.grid[inside]
     pair = CubicSpline(fine.grid, fine.values)(times), coarse.values[inside]
     note = f"on {len(times)} common rows, the denser run by a cubic spline"
-    both = pair if fine is one else pair[::-1]
-    return Difference(name, one.unit, one.over, times, *both, note, stated=one.error + two.error)
+    both = pair if fine is first else pair[::-1]
+    return Difference(name, first.unit, first.over, times, *both, note, stated=first.error + two.error)
 
 
-def report(one: Path, two: Path, folder: Path) -> dict[str, Any]:
+def report(first: Path, two: Path, folder: Path) -> dict[str, Any]:
     """Compare, save ``compare.csv`` and ``compare.png``, and say it in lines."""
-    found, notes = compare(one, two)
+    differences, notes = compare(first, two)
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         heads = ("quantity", "unit", "largest difference", "at", "rms difference", "share of largest value")
         writer.writerow((*heads, "stated error of both"))
         writer.writerows(
-            (d.name, d.unit, d.largest, d.where, d.rms, d.share, "" if np.isnan(d.stated) else d.stated) for d in found
+            (d.name, d.unit, d.largest, d.where, d.rms, d.share, "" if np.isnan(d.stated) else d.stated)
+            for d in differences
         )
-    results = results_of(one, two)
-    _figure(one, two, found, results, folder / "compare.png")
+    results = results_of(first, two)
+    _figure(first, two, differences, results, folder / "compare.png")
     return {
-        "scene": f"{two} less {one}",
+        "scene": f"{two} less {first}",
         "folder": str(folder),
         "failed": {},
-        "names": [each.name for each in found],
-        "differences": {name: [getattr(each, name) for each in found] for name in ("largest", "rms", "at", "share")},
-        "within the stated error": [each.name for each in found if each.within],
-        "table": lines(found, notes),
+        "names": [each.name for each in differences],
+        "differences": {
+            name: [getattr(each, name) for each in differences] for name in ("largest", "rms", "at", "share")
+        },
+        "within the stated error": [each.name for each in differences if each.within],
+        "table": lines(differences, notes),
         "results": results,
     }
 
 
-def lines(found: list[Difference], notes: list[str]) -> list[str]:
+def lines(differences: list[Difference], notes: list[str]) -> list[str]:
     """Lines for the screen: what differs most, and the notes."""
-    return [*_lines(found), *(f"  {note}" for note in notes)]
+    return [*_lines(differences), *(f"  {note}" for note in notes)]
 
 
-def _lines(found: list[Difference]) -> list[str]:
-    differ = [each for each in found if each.largest > 0.0]
+def _lines(differences: list[Difference]) -> list[str]:
+    differ = [each for each in differences if each.largest > 0.0]
     if not differ:
-        return [f"  all {len(found)} quantities are the same to the last bit"]
-    shown = [each for each in found[:SHOWN] if each.largest > 0.0]
-    same, more = len(found) - len(differ), len(differ) - len(shown)
+        return [f"  all {len(differences)} quantities are the same to the last bit"]
+    shown = [each for each in differences[:SHOWN] if each.largest > 0.0]
+    same, more = len(differences) - len(differ), len(differ) - len(shown)
     return [
         f"  {'quantity':<44} {'largest':>11} {'rms':>11} {'unit':<9} {'share':>8}  where it is largest",
         *(f"  {d.name:<44} {d.largest:>11.4g} {d.rms:>11.4g} {d.unit:<9} {d.share:>8.1e}  {_told(d)}" for d in shown),
         *([f"  {more} more that differ less: compare.csv"] if more else []),
-        *([f"  the same to the last bit: {same} of {len(found)}"] if same else []),
-        *(f"  {note}" for note in dict.fromkeys(each.note for each in found if each.note)),
+        *([f"  the same to the last bit: {same} of {len(differences)}"] if same else []),
+        *(f"  {note}" for note in dict.fromkeys(each.note for each in differences if each.note)),
     ]
 
 
-def _told(one: Difference) -> str:
+def _told(difference: Difference) -> str:
     """Where a difference is largest, and whether it tells anything."""
-    return f"{one.where}; rms within the stated error of {one.stated:.2g}" if one.within else one.where
+    return (
+        f"{difference.where}; rms within the stated error of {difference.stated:.2g}"
+        if difference.within
+        else difference.where
+    )
 
 
-def _figure(one: Path, two: Path, found: list[Difference], results: Results, path: Path) -> None:
+def _figure(first: Path, two: Path, differences: list[Difference], results: Results, path: Path) -> None:
     """Both results and, below, their difference, of the three quantities that differ most, or one that is equal."""
     from models.drawing.figures import BLUE, DARK, TITLE, VERMILION, WIDE, heading, legend_below, plt, save, wrapped
 
-    differ = [each for each in found if each.largest != 0][:3]
-    shown = differ or found[:1]
+    differ = [each for each in differences if each.largest != 0][:3]
+    shown = differ or differences[:1]
     share = 0.95 * WIDE / len(shown) - 0.3
     figure, axes = plt.subplots(2 if differ else 1, len(shown), figsize=(WIDE, 4.8), sharex="col", squeeze=False)
     for top, each in zip(axes[0], shown, strict=True):
-        top.plot(each.grid, each.one, color=DARK, linewidth=2.0, label=str(one))
+        top.plot(each.grid, each.one, color=DARK, linewidth=2.0, label=str(first))
         top.plot(each.grid, each.two, color=VERMILION, linewidth=1.0, label=str(two))
         top.set_title(wrapped(f"{each.name} [{each.unit or '-'}]", share, TITLE))
     for below, each in zip(axes[-1], differ, strict=False):
@@ -377,5 +396,5 @@ def _figure(one: Path, two: Path, found: list[Difference], results: Results, pat
     for lowest, each in zip(axes[-1], shown, strict=True):
         lowest.set_xlabel(each.over)
     legend_below(figure, axes[0, 0], columns=1)
-    heading(figure, f"Largest differences of {len(found)} quantities", results)
+    heading(figure, f"Largest differences of {len(differences)} quantities", results)
     save(figure, path)

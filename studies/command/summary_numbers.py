@@ -36,13 +36,16 @@ def _walk(name: str, unit: str, value: Any) -> Iterator[tuple[str, float]]:
 
 def _list(name: str, unit: str, values: list[Any]) -> Iterator[tuple[str, float]]:
     if len(values) > LONGEST and all(isinstance(value, dict) for value in values):
-        columns = {key: [one[key] for one in values if key in one] for key in values[0] if key not in SKIPPED}
-        yield from _walk(name, unit, {key: own for key, own in columns.items() if all(map(_number, own))})
+        columns = {key: [record[key] for record in values if key in record] for key in values[0] if key not in SKIPPED}
+        yield from _walk(name, unit, {key: numbers for key, numbers in columns.items() if all(map(_number, numbers))})
     elif len(values) > LONGEST:
-        own = [float(value) for value in values if _number(value)]
-        if own:
-            yield f"{_joined(name, 'largest')}{unit}", max(map(abs, own))
-            yield f"{_joined(name, 'rms')}{unit}", math.sqrt(math.fsum(value * value for value in own) / len(own))
+        numbers = [float(value) for value in values if _number(value)]
+        if numbers:
+            yield f"{_joined(name, 'largest')}{unit}", max(map(abs, numbers))
+            yield (
+                f"{_joined(name, 'rms')}{unit}",
+                math.sqrt(math.fsum(value * value for value in numbers) / len(numbers)),
+            )
     else:
         leading = (takewhile(_is_text, value.values()) if isinstance(value, dict) else () for value in values)
         labels = [", ".join(texts) for texts in leading]

@@ -89,8 +89,8 @@ class Points:
         of themselves."""
         try:
             scene, engines, study = self.ready(i)
-            with whole_folder(self.folder / RUNS / f"{i:04d}") as own:
-                summary = study.run(scene, engines, own, lambda text, part: None)
+            with whole_folder(self.folder / RUNS / f"{i:04d}") as place:
+                summary = study.run(scene, engines, place, lambda text, part: None)
         except (InputError, RunFailed) as error:
             return _failed(error)
         said = told.attributes(summary.get("results", {}))
@@ -140,8 +140,8 @@ def asked(text: str) -> tuple[str, tuple[Any, ...]]:
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not key or not rest:
         raise InputError("--sweep", "", text, "must read KEY=FROM:TO:N or KEY=a,b,c, for example run.step=1e-4,2e-4")
-    found = _RANGE.fullmatch(rest)
-    values = _spaced(text, *found.groups()) if found else _listed(rest)
+    matched = _RANGE.fullmatch(rest)
+    values = _spaced(text, *matched.groups()) if matched else _listed(rest)
     for value in values:
         if not _writable(value):
             allowed = "must be a finite number, a text, true, false or a list of these"
@@ -200,8 +200,8 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
     with locked(job.folder):
         for part in (job.folder / RUNS).glob(".*.part"):
             shutil.rmtree(part, ignore_errors=True)  # of a process that was killed while it wrote
-        found = _records(job, progress)
-        swept = _swept(job, found)
+        records = _records(job, progress)
+        swept = _swept(job, records)
         _save(job.folder, swept)
         pages = draw(swept, job.folder)
     reasons = {
@@ -218,8 +218,8 @@ def run(job: Points, progress: Callable[[str, float], None]) -> dict[str, Any]:
         "table": _table(swept.columns, pages),
         "results": {
             f"{job.key}={value} {name}".rstrip(): run
-            for value, own in zip(job.values, swept.results, strict=True)
-            for name, run in own.items()
+            for value, results in zip(job.values, swept.results, strict=True)
+            for name, run in results.items()
         },
     }
 
@@ -254,8 +254,8 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
         return _array(_failed(reason) for _ in points)
 
     with processes(min(WORKERS, os.cpu_count() or 1, len(job.values))) as pool:
-        found = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
-    records = [json.loads(str(one)) for one in found]
+        kept = run_paths(job, len(job.values), job.folder / RECORDS, pool, Blocks(1), tell, lost)["record"]
+    records = [json.loads(str(text_of_record)) for text_of_record in kept]
     if not any(record["numbers"] or record["failed"] for record in records):
         raise InputError("--sweep", job.key, None, f"the study of {job.scene} gives no numbers to draw over it")
     return records
@@ -263,7 +263,7 @@ def _records(job: Points, progress: Callable[[str, float], None]) -> list[Record
 
 def _save(folder: Path, swept: Swept) -> None:
     """``sweep.csv`` and ``sweep.json``: the same bytes from the same points."""
-    errors, broken = [_largest(own) for own in swept.results], [_broken(own) for own in swept.results]
+    errors, broken = [_largest(results) for results in swept.results], [_broken(results) for results in swept.results]
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([swept.key, *swept.columns, "failed", "largest error [-]", "broken assumptions"])
@@ -272,27 +272,28 @@ def _save(folder: Path, swept: Swept) -> None:
         writer.writerow([value, *(column[i] for column in swept.columns.values()), failed, errors[i], broken[i]])
     write_whole(folder / "sweep.csv", text.getvalue().encode())
     content = {"key": swept.key, "values": list(swept.values), "numbers": swept.columns, "failed": swept.failures}
-    content |= {"results": [told.as_json(own) for own in swept.results]}
+    content |= {"results": [told.as_json(results) for results in swept.results]}
     write_whole(folder / "sweep.json", json.dumps(content, indent=1).encode())
 
 
 def _largest(results: told.Results) -> float | None:
     """The largest error of a point's results, by its channel's deviation; None where none was estimated."""
-    return max((one.share for run in results.values() if (one := worst_of(run)) is not None), default=None)
+    return max((error.share for run in results.values() if (error := worst_of(run)) is not None), default=None)
 
 
 def _broken(results: told.Results) -> str:
     """Assumptions that a point's results broke, with the share of the time."""
-    breaches = [(name, one) for name, run in results.items() for one in broken_of(run)]
-    return "; ".join(f"{name}: {one.name} ({100.0 * one.share:.2g} %)" for name, one in breaches)
+    breaches = [(name, breach) for name, run in results.items() for breach in broken_of(run)]
+    return "; ".join(f"{name}: {breach.name} ({100.0 * breach.share:.2g} %)" for name, breach in breaches)
 
 
 def _table(columns: Columns, pages: list[str]) -> list[str]:
     """The first quantities that change, from their least to their largest value."""
     moving = {name: there(column) for name, column in columns.items() if moves(column)}
     lines = [
-        f"    {name:<58} {own[0]:>12.5g} at first {own[-1]:>12.5g} at last {min(own):>12.5g} to {max(own):.5g}"
-        for name, own in list(moving.items())[:12]
+        f"    {name:<58} {values[0]:>12.5g} at first {values[-1]:>12.5g} at last "
+        f"{min(values):>12.5g} to {max(values):.5g}"
+        for name, values in list(moving.items())[:12]
     ]
     rest = f", {len(moving) - 12} more of them" if len(moving) > 12 else ""
     return [*lines, f"  {len(moving)} of {len(columns)} numbers change{rest}: sweep.csv, {', '.join(pages)}"]

@@ -61,12 +61,12 @@ class Swept:
 
     def broken(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", broke an assumption."""
-        return [i for i, own in enumerate(self.results) if any(map(broken_of, _of(own, engine).values()))]
+        return [i for i, results in enumerate(self.results) if any(map(broken_of, _of(results, engine).values()))]
 
     def warned(self, engine: str) -> list[int]:
         """Points at which a result of an engine, or any one for "", has an error that is a warning."""
-        shown = (map(worst_of, _of(own, engine).values()) for own in self.results)
-        return [i for i, worst in enumerate(shown) if any(one is not None and one.warned for one in worst)]
+        shown = (map(worst_of, _of(results, engine).values()) for results in self.results)
+        return [i for i, worst in enumerate(shown) if any(error is not None and error.warned for error in worst)]
 
 
 def _of(results: Results, engine: str) -> Results:

@@ -52,10 +52,10 @@ class Camera:
 
     def seen(self, points: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (..., 2) and inverse distances (...) of points (..., 3); not positive behind the eye."""
-        own = (points - self.eye) @ self.axes.T
-        near = -1.0 / own[..., 2]
+        seen = (points - self.eye) @ self.axes.T
+        near = -1.0 / seen[..., 2]
         scale = height / (2.0 * np.tan(self.opening / 2.0)) * near
-        return np.stack([width / 2.0 + scale * own[..., 0], height / 2.0 - scale * own[..., 1]], -1), near
+        return np.stack([width / 2.0 + scale * seen[..., 0], height / 2.0 - scale * seen[..., 1]], -1), near
 
 
 def picture(camera: Camera, layers: list[list[Surface]], width: int, height: int, sky: np.ndarray) -> np.ndarray:
@@ -121,13 +121,13 @@ def paint(corners, near, colours, image, nearest):
         top, bottom = max(0, math.ceil(min(y0, y1, y2))), min(height - 1, math.floor(max(y0, y1, y2)))
         for row in range(top, bottom + 1):
             # Shares of corners 1 and 2 at column 0, and their growth from column to column.
-            one, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
+            first, one_on = (-x0 * (y2 - y0) - (x2 - x0) * (row - y0)) / area, (y2 - y0) / area
             two, two_on = ((x1 - x0) * (row - y0) + x0 * (y1 - y0)) / area, -(y1 - y0) / area
-            left, right = within(one, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
+            left, right = within(first, one_on, max(0.0, min(x0, x1, x2)), min(width - 1.0, max(x0, x1, x2)))
             left, right = within(two, two_on, left, right)
-            left, right = within(1.0 - one - two, -one_on - two_on, left, right)
+            left, right = within(1.0 - first - two, -one_on - two_on, left, right)
             for column in range(math.ceil(left), math.floor(right) + 1):
-                b, c = one + column * one_on, two + column * two_on
+                b, c = first + column * one_on, two + column * two_on
                 a = 1.0 - b - c
                 here = a * near[k, 0] + b * near[k, 1] + c * near[k, 2]
                 if here > nearest[row, column]:

@@ -91,11 +91,11 @@ class Stage:
     struts: tuple[Strut, ...] = ()
 
 
-def gaps(one: Motion, two: Motion) -> tuple[float, float, float]:
+def gaps(first: Motion, two: Motion) -> tuple[float, float, float]:
     """Largest difference of places (m), of turns (elements of the matrices) and of forces (N) of two motions."""
-    places = [(place, two.places[name]) for name, place in one.places.items()]
-    turns = [(turn, two.turns[name]) for name, turn in one.turns.items()]
-    forces = [(a.vectors, b.vectors) for a, b in zip(one.arrows, two.arrows, strict=True)]
+    places = [(place, two.places[name]) for name, place in first.places.items()]
+    turns = [(turn, two.turns[name]) for name, turn in first.turns.items()]
+    forces = [(a.vectors, b.vectors) for a, b in zip(first.arrows, two.arrows, strict=True)]
     largest = (max((float(np.abs(a - b).max()) for a, b in pairs), default=0.0) for pairs in (places, turns, forces))
     return next(largest), next(largest), next(largest)
 

@@ -85,14 +85,16 @@ def _offset(assembly: Assembly, body: str) -> np.ndarray:
 
 def arrows(assembly: Assembly, channels: Channels, rows: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """The road's forces on the wheels and the suspension's on the chassis."""
-    up, (places, turns), found = np.array([0.0, 0.0, -1.0]), poses, []
+    up, (places, turns), arrows_drawn = np.array([0.0, 0.0, -1.0]), poses, []
     for axle, wheel, strut in zip(assembly.vehicle.axles, ("f1", "f2"), ("f3", "f4"), strict=True):
         road, mount = np.array([0.0, 0.0, RADIUS]), np.array([axle.x, 0.0, 0.0])
         on_wheel, on_chassis = (channels[name][2][rows, None] * up for name in (wheel, strut))
         mounts = places["chassis"] + turns["chassis"] @ mount
-        found.append(Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, places[axle.wheel] + road, on_wheel))
-        found.append(Arrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis))
-    return tuple(found)
+        arrows_drawn.append(
+            Arrow(f"wheel force, {axle.name}", "wheel force", axle.wheel, places[axle.wheel] + road, on_wheel)
+        )
+        arrows_drawn.append(Arrow(f"suspension force, {axle.name}", "suspension force", "chassis", mounts, on_chassis))
+    return tuple(arrows_drawn)
 
 
 def stage(assembly: Assembly, channels: Channels) -> Stage:

@@ -82,8 +82,10 @@ def _exudyn(model: Any, positions: np.ndarray) -> Poses:
 def arrows(vehicle: SpatialVehicle, run: Trajectory, road: np.ndarray, poses: Poses) -> tuple[Arrow, ...]:
     """Wheel loads, static ones included, and side forces, both at the road, from the states of a run (small motion)."""
     forces = [
-        run.rates @ one.rate + run.positions @ one.displacement + road @ np.concatenate([one.road, one.road_rate])
-        for one in linearise(vehicle, SPEED).outputs
+        run.rates @ output.rate
+        + run.positions @ output.displacement
+        + road @ np.concatenate([output.road, output.road_rate])
+        for output in linearise(vehicle, SPEED).outputs
     ]
     held, names = preloads(replace(vehicle, gravity=GRAVITY)).tyres, vehicle.coordinates()
     arrows = [

@@ -51,9 +51,9 @@ class PassingRoad:
 
     def _height(self, way: np.ndarray, y: np.ndarray | float) -> np.ndarray:
         """Drawn height (m) at a place on the way and across it."""
-        one, two = (np.interp(way, self.way, column) for column in self.heights.T)
+        left, two = (np.interp(way, self.way, column) for column in self.heights.T)
         share = (np.asarray(y) - self.tracks[0]) / (self.tracks[1] - self.tracks[0])
-        return self.magnified * (one + share * (two - one))
+        return self.magnified * (left + share * (two - left))
 
 
 def _tiles(net: np.ndarray, chosen: np.ndarray, colour: Colour) -> Surface:

@@ -44,9 +44,9 @@ def faceted(corners: np.ndarray, colour: Colour) -> Surface:
 
 def patches(points: np.ndarray) -> np.ndarray:
     """Triangles of a net of points (a, b, 3)."""
-    one, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    first, two, three, four = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate(
-        [np.stack([one, two, three], 2).reshape(-1, 3, 3), np.stack([one, three, four], 2).reshape(-1, 3, 3)]
+        [np.stack([first, two, three], 2).reshape(-1, 3, 3), np.stack([first, three, four], 2).reshape(-1, 3, 3)]
     )
 
 

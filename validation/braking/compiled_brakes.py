@@ -62,9 +62,9 @@ def lag_on(
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
     """A vehicle on its suspension in an engine, around the compiled forces; ``held_in`` its table is what its wheels
     hold."""
-    own = vehicle.handling
-    table = np.concatenate((own.numbers, np.zeros(HELD * len(own.vehicle.tyres))))
-    return free_model(engine, Driven(own.vehicle, own.gravity, table, held, set_held))
+    handling = vehicle.handling
+    table = np.concatenate((handling.numbers, np.zeros(HELD * len(handling.vehicle.tyres))))
+    return free_model(engine, Driven(handling.vehicle, handling.gravity, table, held, set_held))
 
 
 def held_in(numbers: np.ndarray) -> Held:

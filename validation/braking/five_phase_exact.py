@@ -123,6 +123,6 @@ def cycle(wheel: Wheel, phases: list[tuple[float, float, float]], cycles: int = 
     phase(wheel, at, *phases[0])
     for _ in range(cycles):
         at[2:] = [0.0, 0.0]
-        for one in phases[1:]:
-            phase(wheel, at, *one)
+        for later in phases[1:]:
+            phase(wheel, at, *later)
     return at[2], at[3] / at[2] / float(wheel.forces.max())

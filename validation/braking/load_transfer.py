@@ -34,14 +34,14 @@ def transfer(drive: Drive) -> np.ndarray:
 
 def asked(drive: Drive, accelerations: np.ndarray) -> np.ndarray:
     """(2,) N m: what ``transfer`` must be at accelerations (2,) ahead and to the left in m/s^2."""
-    own, free = drive.handling, drive.handling.vehicle
+    handling, free = drive.handling, drive.handling.vehicle
     masses, heights = np.array([(body.mass, body.position[2]) for body in free.bodies]).T
     radii = np.array([tyre.point[2] for tyre in free.tyres])
     roll, pitch = (drive.run.positions[-1, free.coordinates().index((SWAY, turn))] for turn in ("rx", "ry"))
     spins = sum(
-        own.tyres.spin_inertia / r
+        handling.tyres.spin_inertia / r
         for r, tyre in zip(radii, free.tyres, strict=True)
-        if tyre.name not in own.tyres.fixed
+        if tyre.name not in handling.tyres.fixed
     )
     leaning = GRAVITY * float(masses @ heights - masses.sum() * radii.mean())
     return leaning * np.array([pitch, -roll]) - accelerations * (masses @ heights + spins)

@@ -29,8 +29,8 @@ BY_LOAD = np.array([1.1, 1.0, 0.8])
 
 def by_load(on: str) -> TyreTable:
     """A surface's tyre whose friction falls with the load."""
-    own = surface(on)
-    spread = own.refined(own.angles, own.slips, LOADS)
+    tables_of = surface(on)
+    spread = tables_of.refined(tables_of.angles, tables_of.slips, LOADS)
     return replace(spread, mu_x=spread.mu_x * BY_LOAD[None, :, None], h=spread.h * BY_LOAD)
 
 
@@ -48,8 +48,8 @@ def largest(compiled: np.ndarray, plain: np.ndarray) -> float:
 
 def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Reports (count, 7) of wheels over a step, compiled and plain: rolling, locked, freed, thrown backwards."""
-    random, own = np.random.default_rng(seed), tables()
-    found, plain = np.empty((2, count, 7))
+    random, tyre_tables = np.random.default_rng(seed), tables()
+    reports, plain = np.empty((2, count, 7))
     for i in range(count):
         u, rate, across = random.uniform(-3.0, 30.0), random.uniform(-9.0, 3.0), random.normal(0.0, 1.0)
         slip = random.choice([0.0, 1.0, random.uniform(-0.3, 1.2), random.uniform(-3.0, 2.0)])
@@ -57,28 +57,28 @@ def tyre_reports(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.
         load, level = random.uniform(0.0, 12e3), random.choice([0.0, 300.0, 2e3, 1e5])
         load *= random.choice([1.0, 1.0, 0.03])  # of light loads the slip decays so slowly that a series stands for it
         torques = level * random.uniform(0.5, 1.0), level * random.uniform(0.0, 1.0)
-        one, other = map(int, random.integers(0, 3, 2))
-        under = plain_tyre.Surface(one, other, float(random.choice([0.0, random.uniform()])))
+        first, other = map(int, random.integers(0, 3, 2))
+        under = plain_tyre.Surface(first, other, float(random.choice([0.0, random.uniform()])))
         turning = u * (1.0 - slip) / radius
         motion = plain_tyre.Motion(u, rate, u + 0.5 * step * rate, across, 0.1)
         braked = plain_tyre.Braked(torques, step, radius, inertia, turning)
-        plain[i] = plain_tyre.tyre(own, under, motion, load, braked)
-        found[i] = compiled.tyre(own, under, motion, load, braked)
-    return found, plain
+        plain[i] = plain_tyre.tyre(tyre_tables, under, motion, load, braked)
+        reports[i] = compiled.tyre(tyre_tables, under, motion, load, braked)
+    return reports, plain
 
 
 def surfaces(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Tables and shares (4 count, 3) under wheels of a truck that passes seams and lines, compiled and plain."""
-    random, found, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
-    own: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
+    random, shares, plain = np.random.default_rng(seed), list[np.ndarray](), list[list[float]]()
+    stretched: Road = road([Stretch(0.0, 0, 1), Stretch(1.0, 2, 2), Stretch(1.7, 1, 0)], 0.3, 2)
     kind = np.array([0, 0, 1, 1])
     for _ in range(count):
         state = np.array([random.uniform(-2.0, 4.0, 3), random.uniform(-30.0, 30.0, 3)]) * [1.0, 0.5, 1.0]
         step = random.choice([5.5e-3, 1e-3])
-        found.append(compiled.under_wheels(own, state, step, kind))
-        under = plain_road.under_wheels(own, plain_road.ways(state[0], state[1], PLANE.place, step), kind)
-        plain += [[one.first, one.second, one.share] for one in under]
-    return np.concatenate(found), np.array(plain)
+        shares.append(compiled.under_wheels(stretched, state, step, kind))
+        under = plain_road.under_wheels(stretched, plain_road.ways(state[0], state[1], PLANE.place, step), kind)
+        plain += [[each.first, each.second, each.share] for each in under]
+    return np.concatenate(shares), np.array(plain)
 
 
 def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
@@ -96,17 +96,17 @@ def torques_by_commands(samples: int = 60, seed: int = SEED) -> tuple[np.ndarray
             0.15 * four, np.array([0.1, 0.1, 0.0, 0.2]), 8.0, four * [0.5, 0.4, 0.3, 0.6], 40.0, delay, 0.6 * four
         )
         airs = still(chambers, 5.5e-3), still(chambers, 5.5e-3)
-        own = plain_pressure.Pressures(chambers, brakes, 5.5e-3, airs[1])
+        pressures = plain_pressure.Pressures(chambers, brakes, 5.5e-3, airs[1])
         for n in range(samples):
             valves = random.choice([RELEASE, HOLD, APPLY, APPLY, SLOW], 4)
             torques = np.empty((2, 5, 4))
             if n % 20 == 19:
                 levels = random.uniform(0.0, 6.0, 4)
                 by_pressures(levels, airs[0], brakes, torques[0])
-                own.by_pressures(levels, torques[1])
+                pressures.by_pressures(levels, torques[1])
             else:
                 by_valves(valves, 5.5e-3, airs[0], chambers, brakes, torques[0])
-                own.by_valves(valves, torques[1])
+                pressures.by_valves(valves, torques[1])
             for k in range(2):
                 rows[k].append(_air_row(airs[k], torques[k]))
     return np.array(rows[0]), np.array(rows[1])
@@ -119,29 +119,29 @@ def _air_row(air: Air, torques: np.ndarray) -> np.ndarray:
 def lags(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """Lagging slips and what the step is given of them (count, 8), compiled and plain."""
     random, steer = np.random.default_rng(seed), np.array([0.1, 0.1, 0.0, 0.0])
-    found, plain = np.empty((2, count, 8))
+    lags, plain = np.empty((2, count, 8))
     for i in range(count):
         state = np.array([random.uniform(-3.0, 3.0, 3), random.normal(0.0, 1.0, 3)])
         state[1, :2] *= random.choice([0.0, 0.3, 20.0])
         length, time, slope = random.uniform(0.1, 2.0, 4), random.choice([5.5e-3, 0.5]), random.uniform(5.0, 30.0)
         lag = np.where(random.uniform(size=4) < 0.2, np.nan, random.normal(0.0, 0.1, 4))
         lag = lag if state[1].any() else np.nan_to_num(lag)
-        found[i] = np.concatenate(compiled.lag_on(state, time, steer, slope, length, lag))
+        lags[i] = np.concatenate(compiled.lag_on(state, time, steer, slope, length, lag))
         plain[i] = np.concatenate(plain_lag_on(state, time, steer, PLANE.place, slope, length, lag))
-    return found, plain
+    return lags, plain
 
 
 def frictions(count: int = STATES, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
     """mu_x and mu_y (count, 2): of stacked tables by compiled code, and of each table on
     its nodes by plain code."""
     random, tyres = np.random.default_rng(seed), [surface("dry"), by_load("wet"), by_load("ice")]
-    all_tables, (found, plain) = stacked(tyres), np.empty((2, count, 2))
+    all_tables, (coefficients, plain) = stacked(tyres), np.empty((2, count, 2))
     for i in range(count):
         which, angle, load = int(random.integers(len(tyres))), random.uniform(0.0, 1.7), random.uniform(0.0, 12e3)
-        slip, own = random.uniform(), tyres[which]
-        found[i] = compiled.friction(all_tables, which, angle, load, slip)
-        alone = Tables(own.angles, own.slips, own.loads, own.mu_x[None], own.g[None], own.h[None])
+        slip, chosen = random.uniform(), tyres[which]
+        coefficients[i] = compiled.friction(all_tables, which, angle, load, slip)
+        alone = Tables(chosen.angles, chosen.slips, chosen.loads, chosen.mu_x[None], chosen.g[None], chosen.h[None])
         friction = plain_tyre.Friction(alone, plain_tyre.Surface(0, 0, 0.0), angle, load)
         ahead = friction.ahead()
         plain[i] = np.interp(slip, ahead.slips, ahead.forces) / load, friction.aside(slip) / load
-    return found, plain
+    return coefficients, plain

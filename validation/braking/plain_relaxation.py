@@ -31,7 +31,9 @@ def lag_on(
     """
     velocity, turning = state[1, :2], state[1, 2]
     centres = velocity + turning * (places @ rotation(state[0, 2] + 0.5 * np.pi).T)
-    speeds = np.array([rotation(state[0, 2] + own).T @ centre for own, centre in zip(steer, centres, strict=True)]).T
+    speeds = np.array(
+        [rotation(state[0, 2] + angle).T @ centre for angle, centre in zip(steer, centres, strict=True)]
+    ).T
     return plain.lag_on(lag, speeds, time, length, slope)
 
 

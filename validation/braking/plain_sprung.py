@@ -71,19 +71,19 @@ def states(size: int, count: int = STATES, seed: int = SEED) -> tuple[np.ndarray
 @cache
 def plain_accelerations(vehicle: str, count: int = STATES) -> np.ndarray:
     """(count, n) by plain code."""
-    own = Suspension(VEHICLES[vehicle]())
-    both, kept = states(own.size, count)
-    return np.array([own.acceleration(q, v, one) for (q, v), one in zip(both, kept, strict=True)])
+    suspension = Suspension(VEHICLES[vehicle]())
+    both, kept = states(suspension.size, count)
+    return np.array([suspension.acceleration(q, v, kept_state) for (q, v), kept_state in zip(both, kept, strict=True)])
 
 
 def accelerations(vehicle: Sprung, engine: str, count: int = STATES) -> np.ndarray:
     """(count, n) by an engine around the compiled forces."""
-    model, found = in_engine(vehicle, engine), np.empty((count, vehicle.size))
+    model, computed = in_engine(vehicle, engine), np.empty((count, vehicle.size))
     rows = held_in(model.numbers)
-    for i, (state, one) in enumerate(zip(*states(vehicle.size, count), strict=True)):
-        rows.steer[:], rows.forces[:], rows.spun[:] = one.steer, one.forces, one.spun
-        found[i] = model.acceleration(0.0, *state)
-    return found
+    for i, (state, kept_state) in enumerate(zip(*states(vehicle.size, count), strict=True)):
+        rows.steer[:], rows.forces[:], rows.spun[:] = kept_state.steer, kept_state.forces, kept_state.spun
+        computed[i] = model.acceleration(0.0, *state)
+    return computed
 
 
 def apart(compiled: np.ndarray, plain: np.ndarray) -> float:
@@ -132,11 +132,13 @@ def plain_run(vehicle: str, duration: float, valves: bool = True, speed: float =
     return run(VEHICLES[vehicle](), "reference", duration, valves, speed, lags)
 
 
-def paths_apart(one: Path, other: Path) -> float:
+def paths_apart(first: Path, other: Path) -> float:
     """Largest difference of positions, rates and rims (m, rad, per s) at common times; infinite if one ended early."""
-    if len(one.times) != len(other.times):
+    if len(first.times) != len(other.times):
         return np.inf
-    off = max(float(np.abs(one.states - other.states).max()), 0.3 * float(np.abs(one.turning - other.turning).max()))
+    off = max(
+        float(np.abs(first.states - other.states).max()), 0.3 * float(np.abs(first.turning - other.turning).max())
+    )
     return off if np.isfinite(off) else np.inf
 
 
@@ -145,8 +147,8 @@ def turns(vehicle: Sprung, speed: float = 8.0, radius: float = 30.0) -> tuple[np
     code; a row of no numbers where there is none."""
     rows = []
     for engine in ("mujoco", "reference"):
-        own = vehicle_on(vehicle, engine, False)
-        turn = steady_turn(replace(own, road=EVEN), speed, radius)
+        on_suspension = vehicle_on(vehicle, engine, False)
+        turn = steady_turn(replace(on_suspension, road=EVEN), speed, radius)
         if turn is None:
             rows.append(np.full(8 + 2 * vehicle.size, np.nan))
         else:

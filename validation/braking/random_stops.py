@@ -71,16 +71,16 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
 
 def procedure(draw: Draw, kind: str) -> dict[str, Any]:
     """What the driver does."""
-    own: dict[str, Any] = {"kind": kind, "speed": draw.within(2.0, 25.0)}
+    options: dict[str, Any] = {"kind": kind, "speed": draw.within(2.0, 25.0)}
     if kind == "split":
-        own["right"] = draw.one(*SURFACES)
+        options["right"] = draw.one(*SURFACES)
     if kind == "turn":
-        own |= {"radius": draw.one(-1.0, 1.0) * draw.within(60.0, 200.0), "speed": draw.within(2.0, 7.0)}
+        options |= {"radius": draw.one(-1.0, 1.0) * draw.within(60.0, 200.0), "speed": draw.within(2.0, 7.0)}
     if kind == "j_turn" and draw.chance(0.5):
-        own["steer"] = draw.within(-0.05, 0.05)
+        options["steer"] = draw.within(-0.05, 0.05)
     elif kind == "j_turn":
-        own["steering"] = [[0.0, 0.0], [0.5, draw.within(-0.05, 0.05)], [1.5, draw.within(-0.05, 0.05)]]
-    return own
+        options["steering"] = [[0.0, 0.0], [0.5, draw.within(-0.05, 0.05)], [1.5, draw.within(-0.05, 0.05)]]
+    return options
 
 
 def road(draw: Draw) -> dict[str, Any]:
@@ -137,5 +137,5 @@ def trailer(draw: Draw) -> dict[str, Any]:
         "drawbar_mass": draw.within(300.0, 800.0),
         "drawbar_inertia": draw.within(150.0, 600.0),
         "hook": draw.within(-4.0, -2.8),
-        **{name: {**own, "roll_share": 0.5} for name, own in axles.items()},
+        **{name: {**axle_table, "roll_share": 0.5} for name, axle_table in axles.items()},
     }

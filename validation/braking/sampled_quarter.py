@@ -110,13 +110,13 @@ def _sample(y: np.ndarray, law: Any, quarter: Quarter, stretches: Stretches, opt
         event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
     while now < SAMPLE:
         held = y[2] <= 1e-12 and law(now)[1] > radius * force(1.0)
-        found = solve_ivp(
+        solution = solve_ivp(
             sliding if held else turning, (now, SAMPLE), y, **options, events=(lets_go if held else stops, passes)
         )
-        now, y = float(found.t[-1]), found.y[:, -1].copy()
-        if found.t_events[1].size:
+        now, y = float(solution.t[-1]), solution.y[:, -1].copy()
+        if solution.t_events[1].size:
             mu, end = _under(y[0], stretches)
-        elif found.status == 1:
+        elif solution.status == 1:
             y[2] = 0.0
             if held:
                 y[2] = 1e-9  # free again: the road turns it on

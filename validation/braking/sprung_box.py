@@ -71,10 +71,10 @@ def pitch_and_transfer(deceleration: float) -> tuple[float, float]:
     About the ground, m a h + m g (h - r) theta = K theta: the contacts go forwards with their wheels. Each axle bears
     K theta / L of it. To first order in theta.
     """
-    own = box().plane
+    plane = box().plane
     stiffness = 4.0 * HALF**2 / (1.0 / SPRING + 1.0 / TYRE)
-    pitch = own.mass * deceleration * own.height / (stiffness - own.mass * GRAVITY * (own.height - RADIUS))
-    return pitch, stiffness * pitch / own.wheelbase
+    pitch = plane.mass * deceleration * plane.height / (stiffness - plane.mass * GRAVITY * (plane.height - RADIUS))
+    return pitch, stiffness * pitch / plane.wheelbase
 
 
 def constant(mu: float) -> TyreTable:
@@ -91,7 +91,7 @@ def steady(*torques: float) -> Pressures:
 
 
 def braked(
-    own: Sprung,
+    sprung: Sprung,
     tyre: TyreTable,
     engine: str | None = "mujoco",
     steer: float = 0.0,
@@ -105,15 +105,15 @@ def braked(
     """
     brake, none = Brake(push_out=0.0, release=0.0, rising=gradient, falling=gradient), np.zeros(4)
     return on_tyres(
-        truck(own.plane),
+        truck(sprung.plane),
         [tyre],
         of_wheels(brake, brake, brake, brake),
         Chambers(none + 0.03, none + 0.02, SUPPLY),
         steer=np.array([steer, steer, 0.0, 0.0]),
         substeps=substeps,
         sample=step,
-        engine=None if engine is None else OnSprings(engine, own),
-        sprung=None if engine is None else own,
+        engine=None if engine is None else OnSprings(engine, sprung),
+        sprung=None if engine is None else sprung,
     )
 
 

@@ -68,9 +68,9 @@ def write_files(folder: Path) -> None:
     write_time_series(folder / "motion.csv", {"z3": ("m", 0.06 + 0.01 * wave), **pitch}, STEP)
 
 
-def model(own: Scene, engine: str) -> Model:
+def model(bare: Scene, engine: str) -> Model:
     """A scene built in an engine."""
-    return build(engine, assemble(own), settings_of(own, engine))
+    return build(engine, assemble(bare), settings_of(bare, engine))
 
 
 def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
@@ -82,14 +82,14 @@ def pair(effect: str, steps: int, folder: Path) -> tuple[Scene, Scene]:
     return less, scene({**base, effect: module.EXAMPLE}, steps, folder, guided)
 
 
-def counts(own: Scene, engine: str) -> dict[str, int]:
+def counts(bare: Scene, engine: str) -> dict[str, int]:
     """What a scene builds in an engine, and how many channels it saves."""
-    return {**model(own, engine).plan(), "channels": len(run(own, engine).data.data_vars)}
+    return {**model(bare, engine).plan(), "channels": len(run(bare, engine).data.data_vars)}
 
 
 def change(effect: str, engine: str, folder: Path) -> dict[str, int]:
     """What an effect adds to the counts, without the zeros."""
-    before, after = (counts(own, engine) for own in pair(effect, 20, folder))
+    before, after = (counts(bare, engine) for bare in pair(effect, 20, folder))
     return {key: after[key] - before[key] for key in after if after[key] != before[key]}
 
 
@@ -117,10 +117,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _imports() -> list[Row]:
     """Modules and compiled kernels of a fresh process that ran a bare scene in all engines."""
-    found = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START})
-    foreign = [name for name in found["modules"] if belongs_to_effects(name)]
+    probed = probe({"title": TITLE, "run": {"duration": 20 * STEP, "step": STEP}, "start": START})
+    foreign = [name for name in probed["modules"] if belongs_to_effects(name)]
     why = "a fresh process ran a scene without effects in all engines; counted in its list of modules"
-    kernels = len(found["marches"]) + len(found["derivatives"])
+    kernels = len(probed["marches"]) + len(probed["derivatives"])
     return [
         Observed(
             "absent.imports", SYSTEM, "number of modules of effects that a bare scene imports", len(foreign), ""
@@ -137,8 +137,8 @@ def _imports() -> list[Row]:
 
 def _absence(engine: str, folder: Path) -> list[Row]:
     """Frames, memory and callbacks of a bare march, short and long."""
-    for own in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
-        march(engine, model(own, engine))
+    for bare in (scene({}, steps, folder) for steps in (20, 20)):  # wrappers cache on their first calls
+        march(engine, model(bare, engine))
     short, long = (quietest(engine, partial(model, scene({}, steps, folder), engine)) for steps in (20, 2000))
     callbacks = max(short.callbacks, installed())
     if engine == "exudyn":
@@ -167,23 +167,23 @@ def _absence(engine: str, folder: Path) -> list[Row]:
 
 def _control(effect: str, folder: Path, engines: Sequence[str] = ENGINES) -> Row:
     """Positive control: each effect changes the counts of every engine by exactly what it declares."""
-    found = {engine: change(effect, engine, folder) for engine in engines}
+    changed = {engine: change(effect, engine, folder) for engine in engines}
     wanted = {engine: declared(effect, engine) for engine in engines}
     return behaves(
         f"absent.present.{effect}",
         SYSTEM,
         f"counts that the effect {effect} adds to a bare scene",
-        _text(found),
+        _text(changed),
         _text(wanted),
         "positive control: the counts that are zero above do move, and by as much as they should",
     )
 
 
 def _text(table: dict[str, dict[str, int]]) -> str:
-    parts = [f"{engine} {changes(own)}" for engine, own in table.items() if own]
+    parts = [f"{engine} {changes(more)}" for engine, more in table.items() if more]
     return "; ".join(parts) or "nothing"
 
 
-def changes(own: dict[str, int]) -> str:
+def changes(more: dict[str, int]) -> str:
     """Counts that an effect changes, in words."""
-    return ", ".join(f"{value:+d} {key}" for key, value in sorted(own.items()))
+    return ", ".join(f"{value:+d} {key}" for key, value in sorted(more.items()))

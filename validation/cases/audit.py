@@ -27,8 +27,8 @@ def scene(parameters: str, geometry: str = "exact"):
 
 def difference(engine: str, parameters: str, geometry: str = "exact") -> float:
     """Largest difference to the reference, relative to the largest acceleration, over all states."""
-    own = scene(parameters, geometry)
-    return acceleration_gap(checks.engine(engine), assemble(own), settings_of(own, engine), STATES)
+    audited = scene(parameters, geometry)
+    return acceleration_gap(checks.engine(engine), assemble(audited), settings_of(audited, engine), STATES)
 
 
 def measure(quick: bool, folder: Path) -> CaseAnswer:

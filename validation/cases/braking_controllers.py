@@ -60,7 +60,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
     if "stops" not in data:
         return []
     shown = (("distance", 2), ("time", 2), ("used", 3), ("locked", 0))
-    rows = [(name, *(f"{one[key]:.{digits}f}" for key, digits in shown)) for name, one in data["stops"].items()]
+    rows = [(name, *(f"{each[key]:.{digits}f}" for key, digits in shown)) for name, each in data["stops"].items()]
     return [
         Table(
             "Straight stops by controller",
@@ -148,28 +148,28 @@ def _frozen(inertia: float = FRONT.spin_inertia) -> Frozen:
 
 
 def _cycle_rows(name: str) -> list[Row]:
-    own, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
+    cycle, (period, used) = limit_cycle(_frozen(), PHASES[name]), exact_cycle(_frozen(), PHASES[name])
     wrong = exact_cycle(_frozen(FRONT.spin_inertia * 1.001), PHASES[name])[0]
     return [
         Observed(
             f"braking_controllers.period_{name}",
             SYSTEM,
             f"relative difference of the period of the five-phase limit cycle from the exact period, {name}",
-            own.period / period - 1.0,
+            cycle.period / period - 1.0,
             "",
         ).at_most(1e-4, "frozen speed; every switch is located", "closed form"),
         Observed(
             f"braking_controllers.utilisation_{name}",
             SYSTEM,
             f"difference of the limit cycle's mean friction, as a share of the peak, from the exact mean, {name}",
-            own.utilisation - used,
+            cycle.utilisation - used,
             "",
         ).at_most(1e-3, "as above", "closed form"),
         behaves(
             f"braking_controllers.planted_{name}",
             SYSTEM,
             f"a planted error of 0.1 % in the spin inertia is noticed in the period, {name}",
-            "told" if abs(own.period / wrong - 1.0) > 1e-4 else "missed",
+            "told" if abs(cycle.period / wrong - 1.0) > 1e-4 else "missed",
             "told",
             "a planted fault",
         ),
@@ -178,7 +178,7 @@ def _cycle_rows(name: str) -> list[Row]:
             SYSTEM,
             "relative difference of the period with samples of 5.5 ms from the period of the "
             f"continuous controller, {name}",
-            sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / own.period - 1.0,
+            sampled(_frozen(), replace(PHASES[name]), cycles=5, skip=3).period / cycle.period - 1.0,
             "",
         ).beside(0.0, "each switch comes up to a sample late", "native"),
     ]
@@ -217,14 +217,14 @@ def _stop_rows(stops: dict[str, dict[str, float]]) -> list[Row]:
             "braking_controllers.locks",
             SYSTEM,
             f"longest time for which a wheel locks above 15 km/h in {len(stops)} stops of four controllers",
-            max(one["locked"] for one in stops.values()),
+            max(each["locked"] for each in stops.values()),
             "ms",
         ).at_most(1e3 * BRIEF, "ice, snow and dry at 11.11 and 22.2 m/s; only briefly", "published"),
         behaves(
             "braking_controllers.stands",
             SYSTEM,
             f"how {len(stops)} stops of four controllers end",
-            "at rest" if all(one["stands"] for one in stops.values()) else "moving",
+            "at rest" if all(each["stands"] for each in stops.values()) else "moving",
             "at rest",
             "below 1.5 m/s all brakes are applied",
         ),
@@ -236,14 +236,14 @@ def _substep_rows() -> list[Row]:
     for on, speed in (("snow", 13.9), ("dry", 22.22)):
         tight = reference_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed)
         for n in SUBSTEPS:
-            own = own_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
+            distance = own_distance(FRONT, PAPER_FRONT, on, CONTROLLERS["slip_bang_bang"](1), speed, n)
             rows.append(
                 Observed(
                     f"braking_controllers.stop_{on}_{n}",
                     SYSTEM,
                     "relative difference of a quarter vehicle's stopping distance from the "
                     f"reference, sampled controller on {on}, {n} substeps",
-                    own / tight - 1.0,
+                    distance / tight - 1.0,
                     "",
                 ).at_most(1e-2, "DOP853 at 1e-10 with locking as an event", "native")
             )
@@ -254,20 +254,20 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
     """Two ensembles on ice from speeds drawn apart: one run proves nothing there."""
     random = np.random.default_rng(SEED)
     speeds = 11.11 * (1.0 + random.uniform(-0.002, 0.002, (2, runs)))
-    found = [
+    distances = [
         np.array(
             [own_distance(FRONT, PAPER_FRONT, "ice", CONTROLLERS["slip_bang_bang"](1), speed, n) for speed in some]
         )
         for some, n in zip(speeds, (4, fine), strict=True)
     ]
-    level = float(ttest_ind(*found, equal_var=False).pvalue)
+    level = float(ttest_ind(*distances, equal_var=False).pvalue)
     return [
         Observed(
             "braking_controllers.ice_mean",
             SYSTEM,
             f"relative difference of the mean stopping distance on ice of {runs} runs with 4 substeps "
             f"from {runs} others with {fine}",
-            float(found[0].mean() / found[1].mean() - 1.0),
+            float(distances[0].mean() / distances[1].mean() - 1.0),
             "",
         ).at_most(1e-2, "speeds drawn within 0.2 %; on ice single runs do not repeat", "shared kernel"),
         Observed(
@@ -281,7 +281,7 @@ def _ensemble_rows(runs: int = 24, fine: int = 32) -> list[Row]:
             "braking_controllers.ice_scatter",
             SYSTEM,
             "standard deviation of the stopping distance on ice",
-            float(found[0].std(ddof=1)),
+            float(distances[0].std(ddof=1)),
             "m",
-        ).beside(float(found[1].std(ddof=1)), "4 substeps beside more", "none"),
+        ).beside(float(distances[1].std(ddof=1)), "4 substeps beside more", "none"),
     ]

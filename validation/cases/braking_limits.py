@@ -43,7 +43,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     ends = [finished(number) for number in range(STOPS[quick])]
     rows = [_stops_row(ends), _jackknife_row(), *_roll_rows(), _slow_apply_row(), _cycle_row()]
     rows += [_yaw_row(speed) for speed in ((1.0,) if quick else (0.5, 1.0, 3.0))]
-    return rows + [_refused_row(*one) for one in REFUSED.items()], {"ends": ends}
+    return rows + [_refused_row(*each) for each in REFUSED.items()], {"ends": ends}
 
 
 def finished(number: int) -> str:

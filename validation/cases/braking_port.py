@@ -94,7 +94,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     told = [_process(kind, folder) for kind in (QUICK if quick else FAULTS)]
     told += [_class(kind, folder) for kind in (("catches everything",) if quick else CLASSES)]
     told += [] if quick else [_slave(kind, folder) for kind in SLAVES]
-    return rows + [row for one in told for row in _fault_rows(one)], {"costs": costs, "faults": told}
+    return rows + [row for each in told for row in _fault_rows(each)], {"costs": costs, "faults": told}
 
 
 def _scene(folder: Path, duration: float, table: dict[str, Any]) -> Any:
@@ -152,8 +152,8 @@ def _bits(ways: dict[str, dict[str, Any] | str], folder: Path, duration: float) 
         if isinstance(table, str):
             rows.append(not_run(key, SYSTEM, what, table))
             continue
-        found = _same(first, run(_scene(folder, duration, table)).detail)
-        rows.append(behaves(key, SYSTEM, what, found, "same bits", "doubles pass every way whole", "none"))
+        ended = _same(first, run(_scene(folder, duration, table)).detail)
+        rows.append(behaves(key, SYSTEM, what, ended, "same bits", "doubles pass every way whole", "none"))
     return [*rows, _alive(first)]
 
 
@@ -245,14 +245,14 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """How a run with a controller that fails ended, and how long after its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
-    found = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
+    told = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:
         with watched:
             run(_scene(folder, 1.0, {**table, "timeout": timeout}))
     except ControllerFailed as error:
         kept = 0 if error.partial is None else len(error.partial.times) - 1
-        found |= {"name": error.name, "number": error.number, "kept": kept, "message": str(error)}
-    return {**found, "seconds": time.perf_counter() - watched.last}
+        told |= {"name": error.name, "number": error.number, "kept": kept, "message": str(error)}
+    return {**told, "seconds": time.perf_counter() - watched.last}
 
 
 class _Watch:
@@ -273,26 +273,26 @@ class _Watch:
         return self._ask(controller, given, *more)
 
 
-def _fault_rows(one: dict[str, Any]) -> list[Row]:
+def _fault_rows(fault: dict[str, Any]) -> list[Row]:
     well = misbehaving_client.WELL
-    slow = one["name"] == one["expected"] == "silence" and one["number"] <= well  # a busy machine is silent, too
-    whole = one["kept"] == one["number"] and (one["number"] == well or slow)
-    found = one["name"] if whole else f"{one['name']} at {one['number']}, {one['kept']} samples kept"
-    key = f"braking_port.fault.{_id(one['kind'])}"
+    slow = fault["name"] == fault["expected"] == "silence" and fault["number"] <= well  # a busy machine is silent, too
+    whole = fault["kept"] == fault["number"] and (fault["number"] == well or slow)
+    ended = fault["name"] if whole else f"{fault['name']} at {fault['number']}, {fault['kept']} samples kept"
+    key = f"braking_port.fault.{_id(fault['kind'])}"
     return [
         behaves(
             key,
             SYSTEM,
-            f"end of a run whose controller fails, {one['kind']}, after {well} samples that are kept",
-            found,
-            one["expected"],
+            f"end of a run whose controller fails, {fault['kind']}, after {well} samples that are kept",
+            ended,
+            fault["expected"],
             "named, at its sample, with the path until then",
         ),
         Observed(
             f"{key}.seconds",
             SYSTEM,
-            f"time until a run whose controller fails has ended, {one['kind']}, measured once",
-            one["seconds"],
+            f"time until a run whose controller fails has ended, {fault['kind']}, measured once",
+            fault["seconds"],
             "s",
         ).aim(2.0 * TIMEOUT, f"twice the time-out of {TIMEOUT:g} s"),
     ]
@@ -305,7 +305,7 @@ def _id(name: str) -> str:
 def tables(data: dict[str, Any]) -> list[Table]:
     """Costs, and every fault with its message."""
     costs = tuple((name, f"{cost:.1f} ({low:.1f} to {high:.1f})") for name, (cost, low, high) in data["costs"].items())
-    faults = tuple((one["kind"], one["message"], f"{one['seconds']:.3f}") for one in data["faults"])
+    faults = tuple((each["kind"], each["message"], f"{each['seconds']:.3f}") for each in data["faults"])
     return [
         Table(
             "Cost of one exchange",

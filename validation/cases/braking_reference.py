@@ -57,13 +57,13 @@ def _law_row(name: str) -> Row:
 
 
 def _acceleration_row(vehicle: str, engine: str) -> Row:
-    found = whole.accelerations(whole.VEHICLES[vehicle](), engine)
+    accelerations = whole.accelerations(whole.VEHICLES[vehicle](), engine)
     return Observed(
         f"braking_reference.accelerations.{vehicle}.{engine}",
         SYSTEM,
         f"largest difference of the {vehicle}'s accelerations in {engine} from plain code at "
         f"{whole.STATES} states of any heading",
-        whole.apart(found, whole.plain_accelerations(vehicle)),
+        whole.apart(accelerations, whole.plain_accelerations(vehicle)),
         "by the largest",
     ).at_most(1e-12, WHY, "native")
 
@@ -82,24 +82,24 @@ def _relaxing_row() -> Row:
 
 
 def _turn_row(vehicle: str) -> Row:
-    found, plain = whole.turns(whole.VEHICLES[vehicle]())
+    computed, plain = whole.turns(whole.VEHICLES[vehicle]())
     return Observed(
         f"braking_reference.turn.{vehicle}",
         SYSTEM,
         f"largest difference of a steady circle of the {vehicle} from plain code: steer angles, state "
         "and yaw, 30 m at 8 m/s",
-        float(np.nan_to_num(np.abs(found - plain).max(), nan=np.inf)),
+        float(np.nan_to_num(np.abs(computed - plain).max(), nan=np.inf)),
         "rad, m, per s",
     ).at_most(1e-10, "the same equations, solved to rounding", "native")
 
 
 def _stop_row(vehicle: str, engine: str, duration: float) -> Row:
-    found = whole.run(whole.VEHICLES[vehicle](), engine, duration)
+    path = whole.run(whole.VEHICLES[vehicle](), engine, duration)
     return Observed(
         f"braking_reference.stop.{vehicle}.{engine}",
         SYSTEM,
         f"largest difference of {duration:g} s of a stop of the {vehicle} in {engine} from plain "
         "code, slip controller on split and changing friction",
-        whole.paths_apart(found, whole.plain_run(vehicle, duration)),
+        whole.paths_apart(path, whole.plain_run(vehicle, duration)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps, in another code from the valves to the bodies", "native")

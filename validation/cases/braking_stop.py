@@ -55,10 +55,10 @@ AFTER = 2.0
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """All rows; quick: the four headline cases, two steps, two surfaces."""
     steps = tuple(step for step in STEPS[quick] if step >= FINE)
-    curves = {name: _curve(*one, steps) for name, one in HEADLINE.items()}
+    curves = {name: _curve(*each, steps) for name, each in HEADLINE.items()}
     rows = [row for name, curve in curves.items() for row in _headline_rows(name, curve)]
     if not quick:
-        rows += [_further_row(name, *one) for name, one in FURTHER.items()]
+        rows += [_further_row(name, *each) for name, each in FURTHER.items()]
     rows += [
         _sweep_row(("ice", "dry") if quick else tuple(SURFACES), LEVELS[SOME] if quick else LEVELS, STEPS[quick]),
         _locked_row(),
@@ -134,17 +134,17 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
     ).at_most(BOUND, "as the four above", "closed form")
 
 
-def faults_of(found: Stop, radius: float, brakes: bool) -> list[str]:
+def faults_of(stopped: Stop, radius: float, brakes: bool) -> list[str]:
     """What is wrong with a stop: names of rules it breaks."""
-    path, speed = found.path, found.path.speed
+    path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {
         "no number": not all(np.isfinite(part).all() for part in path),
         "turns backwards": rim.min() < 0.0,
         "turns faster than it rolls": (rim - speed).max() > 1e-12 * speed[0],
-        "does not stop": brakes and found.rest < 0,
-        "creeps": found.rest >= 0
-        and bool(np.abs(speed[found.rest :]).max() > 0.0 or np.ptp(path.place[found.rest :]) > 0.0),
+        "does not stop": brakes and stopped.rest < 0,
+        "creeps": stopped.rest >= 0
+        and bool(np.abs(speed[stopped.rest :]).max() > 0.0 or np.ptp(path.place[stopped.rest :]) > 0.0),
     }
     return [name for name, wrong in broken.items() if wrong]
 
@@ -156,8 +156,8 @@ def _sweep_row(surfaces: tuple[str, ...], levels: np.ndarray, steps: tuple[float
         lock = float(tyre[0].mu_x.max()) * FRONT.mass * GRAVITY * FRONT.radius
         speed = 11.11 if step >= 1e-3 else SLOW
         for level in levels if on in ASKED or step >= STEP else levels[SOME]:
-            found = faults_of(stop(FRONT, tyre, level * lock, speed, step, AFTER), FRONT.radius, bool(level))
-            wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(found)}"] if found else []
+            faults = faults_of(stop(FRONT, tyre, level * lock, speed, step, AFTER), FRONT.radius, bool(level))
+            wrong += [f"{on}, {level:g} of lock, {1e3 * step:g} ms: {', '.join(faults)}"] if faults else []
             runs += 1
     some = f" (below {1e3 * STEP:g} ms every fifth level, but on {', '.join(ASKED)} all)"
     some = "" if set(surfaces) <= set(ASKED) else some
@@ -195,8 +195,8 @@ def _release_row() -> Row:
         tyre, tables = met(on)
         sliding = FRONT.mass * GRAVITY * float(tyre.mu_x[0, 0, -1]) * FRONT.radius
         times = step * np.arange(math.ceil(0.8 / step) + 1)
-        found = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
-        errors.append(abs(found.released - 0.5 * 0.8037))
+        braked_stop = braked(FRONT, tables, EVEN, np.maximum(sliding * (1.5 - times / 0.8037), 0.0), step, 20.0, 0.0)
+        errors.append(abs(braked_stop.released - 0.5 * 0.8037))
     return Observed(
         "braking_stop.release",
         SYSTEM,

@@ -41,17 +41,17 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 def _locked_rows(mu: float) -> list[Row]:
     """Of the box and of the car from a speed at which they brake for 4 s."""
-    speed, found = 4.0 * mu * GRAVITY, []
-    for name, own in (("box", box()), ("car", car())):
-        vehicle, place = braked(own, constant(mu)), f"{name}.{mu:g}"
+    speed, rows = 4.0 * mu * GRAVITY, []
+    for name, vehicle_kind in (("box", box()), ("car", car())):
+        vehicle, place = braked(vehicle_kind, constant(mu)), f"{name}.{mu:g}"
         path = vehicle.run(steady(*4 * (LOCKS,)), speed)
         way, exact = float(path.states[-1, 0, 0]), speed**2 / (2.0 * mu * GRAVITY)
         late = -len(path.times) // 8
         gained = float(path.reports.load[late, :2].sum() - path.reports.load[0, :2].sum())
-        plane, pitch = own.plane, float(path.states[late, 0, PITCH])
+        plane, pitch = vehicle_kind.plane, float(path.states[late, 0, PITCH])
         moment = plane.mass * GRAVITY * (mu * plane.height + (plane.height - plane.front.radius) * pitch)
         weight = float(path.reports.load[late].sum()) / (plane.mass * GRAVITY)
-        found += [
+        rows += [
             Observed(
                 f"braking_suspension.locked.{place}",
                 SYSTEM,
@@ -85,8 +85,8 @@ def _locked_rows(mu: float) -> list[Row]:
             ).at_most(1e-3, "what stands has no slip, and friction holds it", "closed form"),
         ]
         if name == "box":
-            found += _pitch_rows(mu, pitch, gained)
-    return found
+            rows += _pitch_rows(mu, pitch, gained)
+    return rows
 
 
 def _pitch_rows(mu: float, pitch: float, gained: float) -> list[Row]:
@@ -182,8 +182,8 @@ def _ice_rows() -> list[Row]:
 class _Timed:
     """A controller that keeps the seconds which the vehicle took before each of its samples."""
 
-    def __init__(self, own: Controller) -> None:
-        self.own, self.answered, self.seconds = own, math.nan, list[float]()
+    def __init__(self, controller: Controller) -> None:
+        self.own, self.answered, self.seconds = controller, math.nan, list[float]()
 
     def sample(self, given: Sample) -> Command:
         """As the controller answers."""
@@ -213,15 +213,15 @@ def _speed_row(wet: TyreTable) -> Row:
 
 def limit(tyre: TyreTable) -> list[list[float]]:
     """Stiffness, and how far from the plane vehicle with load transfer the box ends a J-turn (m), wheels light."""
-    found = []
+    distances = []
     for stiffer in (1.0, 10.0, 100.0):
-        own = box(stiffer, 0.01)
+        stiff_box = box(stiffer, 0.01)
         ends = [
-            braked(own, tyre, engine, 0.015, substeps=4).run(steady(*TURNING), 10.0).states[-1, 0, :2]
+            braked(stiff_box, tyre, engine, 0.015, substeps=4).run(steady(*TURNING), 10.0).states[-1, 0, :2]
             for engine in ("mujoco", None)
         ]
-        found.append([stiffer, float(np.hypot(*(ends[1] - ends[0])))])
-    return found
+        distances.append([stiffer, float(np.hypot(*(ends[1] - ends[0])))])
+    return distances
 
 
 def _limit_rows(ends: list[list[float]]) -> list[Row]:

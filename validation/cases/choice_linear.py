@@ -64,12 +64,12 @@ def judged(scene: Drawn, second: bool) -> Judged:
     chooser = asked(scene)
     choice, whole = chooser.choose(), chooser.wholes[0]
     rest = whole.reduced(without(scene.scene, choice.left_out))
-    two, one = Screen(whole.full, chooser.rows).identity(rest)
+    two, deviation = Screen(whole.full, chooser.rows).identity(rest)
     chosen, none = frozenset(choice.left_out), frozenset[Effect]()
     return Judged(
         scene,
         choice,
-        float(abs(two / one - 1).max()),
+        float(abs(two / deviation - 1).max()),
         changes_by_frequency(chooser, choice) if second else None,
         worst_nearby(chooser, chosen, DRAWS if chosen else 0, DRAWS),
         measured_step(chooser, chosen) / measured_step(chooser, none) if chosen else 1.0,
@@ -81,27 +81,27 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     pair.
     """
     seeds = FIRST if quick else range(SCENES_DRAWN)
-    found = [
+    choices = [
         judged(drawn(seed, TOLERANCE if seed % 2 == 0 else None, detailed=seed % 4 != 0), quick or seed < SECOND_ROUTE)
         for seed in seeds
     ]
-    rows = [*_kept_rows(found), _identity_row(found), *_equal_rows(found)]
+    rows = [*_kept_rows(choices), _identity_row(choices), *_equal_rows(choices)]
     if not quick:
-        rows += [_prediction_row(found), _saving_row(found)]
+        rows += [_prediction_row(choices), _saving_row(choices)]
     pair_rows, pair = _pair()
-    return [*rows, *pair_rows, *_activity_rows()], {"scenes": [_shown(one) for one in found], "pair": pair}
+    return [*rows, *pair_rows, *_activity_rows()], {"scenes": [_shown(choice) for choice in choices], "pair": pair}
 
 
-def _kept_rows(found: list[Judged]) -> list[Row]:
-    share = float(np.mean([one.choice.kept for one in found]))
-    lies = sum(not one.honest for one in found)
-    second = [one for one in found if one.by_frequency is not None]
-    gap = max(float(abs(one.by_frequency - one.choice.confirmed).max()) for one in second)
+def _kept_rows(choices: list[Judged]) -> list[Row]:
+    share = float(np.mean([each.choice.kept for each in choices]))
+    lies = sum(not each.honest for each in choices)
+    second = [each for each in choices if each.by_frequency is not None]
+    gap = max(float(abs(each.by_frequency - each.choice.confirmed).max()) for each in second)
     return [
         Observed(
             "choice_linear.kept",
             SYSTEM,
-            f"share of {len(found)} random scenes whose tolerance is kept after confirmation",
+            f"share of {len(choices)} random scenes whose tolerance is kept after confirmation",
             share,
             "",
         ).within(1.0, 0.05, "asked: 95 of 100", "none"),
@@ -125,9 +125,9 @@ def _kept_rows(found: list[Judged]) -> list[Row]:
     ]
 
 
-def _prediction_row(found: list[Judged]) -> Row:
+def _prediction_row(choices: list[Judged]) -> Row:
     """Predicted by confirmed changes of all choices and quantities that are told from zero and below 5 %."""
-    predicted, confirmed_ = (np.concatenate([getattr(one.choice, part) for one in found]) for part in PARTS)
+    predicted, confirmed_ = (np.concatenate([getattr(each.choice, part) for each in choices]) for part in PARTS)
     told = (abs(confirmed_) > TOLD[0]) & (abs(confirmed_) < TOLD[1])
     ratios = predicted[told] / confirmed_[told]
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0)))
@@ -145,37 +145,37 @@ def _prediction_row(found: list[Judged]) -> Row:
     )
 
 
-def _identity_row(found: list[Judged]) -> Row:
+def _identity_row(choices: list[Judged]) -> Row:
     return Observed(
         "choice_linear.identity",
         SYSTEM,
         "difference of the variance of what is left, from the whole scene's covariance and the "
         "reduced adjoint, from the reduced covariance, worst of all scenes",
-        max(one.identity for one in found),
+        max(each.identity for each in choices),
         "",
     ).at_most(1e-12, "asked; an identity", "closed form")
 
 
-def _equal_rows(found: list[Judged]) -> list[Row]:
+def _equal_rows(choices: list[Judged]) -> list[Row]:
     """Of all scenes: the tolerance nearby, and what is saved, by routes that the choice does not go."""
-    told = sum(bool(one.choice.said) and not one.choice.left_out for one in found)
-    gaps = [abs(one.saving / one.measured - 1.0) for one in found]
-    saving = [one for one in found if one.choice.left_out]
+    told = sum(bool(each.choice.said) and not each.choice.left_out for each in choices)
+    gaps = [abs(each.saving / each.measured - 1.0) for each in choices]
+    saving = [each for each in choices if each.choice.left_out]
     return [
         Observed(
             "choice_linear.nearby",
             SYSTEM,
-            f"largest ratio of the change to the tolerance in {len(saving)} of {len(found)} scenes in "
+            f"largest ratio of the change to the tolerance in {len(saving)} of {len(choices)} scenes in "
             f"which effects were left out, {DRAWS} random speeds each, every mass, stiffness and "
             "damping up to 5 % off at random",
-            max(one.nearby for one in found),
+            max(each.nearby for each in choices),
             "",
         ).at_most(1.0, "the tolerance holds nearby, too, or nothing is left out", "native"),
         Observed(
             "choice_linear.said",
             SYSTEM,
-            f"share of {len(found)} scenes in which all effects that could go were refused with a reason",
-            told / len(found),
+            f"share of {len(choices)} scenes in which all effects that could go were refused with a reason",
+            told / len(choices),
             "",
         ).at_most(0.1, "asked: at most a tenth", "none"),
         Observed(
@@ -196,7 +196,7 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
             "choice_linear.saves",
             SYSTEM,
             "choices that leave effects out and save no calls",
-            str(sum(one.saving < 1.0 + WORTH for one in saving)),
+            str(sum(each.saving < 1.0 + WORTH for each in saving)),
             "0",
             "what saves nothing stays in",
             "none",
@@ -204,8 +204,8 @@ def _equal_rows(found: list[Judged]) -> list[Row]:
     ]
 
 
-def _saving_row(found: list[Judged]) -> Row:
-    saved = [one.saving for one in found if one.scene.tolerance == TOLERANCE]
+def _saving_row(choices: list[Judged]) -> Row:
+    saved = [each.saving for each in choices if each.scene.tolerance == TOLERANCE]
     return Observed(
         "choice_linear.saving",
         SYSTEM,
@@ -284,16 +284,16 @@ def _activity_rows() -> list[Row]:
     ]
 
 
-def _shown(one: Judged) -> dict[str, Any]:
-    choice = one.choice
+def _shown(judged_choice: Judged) -> dict[str, Any]:
+    choice = judged_choice.choice
     return {
-        "tolerance": one.scene.tolerance,
+        "tolerance": judged_choice.scene.tolerance,
         "predicted": choice.predicted.tolist(),
         "confirmed": choice.confirmed.tolist(),
-        "saving": one.saving,
+        "saving": judged_choice.saving,
         "kept": choice.kept,
-        "nearby": one.nearby,
-        "measured": one.measured,
+        "nearby": judged_choice.nearby,
+        "measured": judged_choice.measured,
         "said": list(choice.said),
         "left out": len(choice.left_out),
         "of": len(choice.candidates),
@@ -304,7 +304,7 @@ def _shown(one: Judged) -> dict[str, Any]:
 def tables(data: dict[str, Any]) -> list[Table]:
     """The choices by how they fared."""
     scenes = data["scenes"]
-    saved = np.array([one["saving"] for one in scenes])
+    saved = np.array([each["saving"] for each in scenes])
     rows = tuple((f"{share:g} %", f"{np.percentile(saved, share):.3g}") for share in (10, 25, 50, 75, 90))
     note = (
         f"Ratio of calls of the whole scene to calls of what is left, at equal accuracy, {len(scenes)} scenes with "
@@ -318,7 +318,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from models.drawing.figures import BLUE, VERMILION, WIDE, heading, plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(WIDE, 3.8))
-    predicted, confirmed_ = (100 * abs(np.array([v for one in data["scenes"] for v in one[key]])) for key in PARTS)
+    predicted, confirmed_ = (100 * abs(np.array([v for each in data["scenes"] for v in each[key]])) for key in PARTS)
     ends = np.array([1e-4, 12.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     left.plot(confirmed_.clip(ends[0]), predicted.clip(ends[0]), "o", ms=4, color=BLUE, label="a quantity")
@@ -330,7 +330,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
         title="All that was left out, together",
     )
     left.legend(loc="upper left")
-    tolerance, saving = (np.array([one[key] for one in data["scenes"]]) for key in ("tolerance", "saving"))
+    tolerance, saving = (np.array([each[key] for each in data["scenes"]]) for key in ("tolerance", "saving"))
     right.plot(100 * tolerance, saving, "o", ms=4, color=VERMILION)
     right.set(xscale="log", yscale="log", xlabel="tolerance [%]", ylabel="times fewer calls [-]", title="What it saves")
     heading(figure, "Choice in ride: changes as predicted and as confirmed, and calls saved")

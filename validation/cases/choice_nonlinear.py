@@ -67,23 +67,27 @@ def _sure(whole: np.ndarray, rest: np.ndarray) -> float:
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Random scenes of four systems; the quick share has three of the pitch plane."""
     seeds = {"pitch-plane": QUICK} if quick else {system: range(count) for system, count in COUNTS.items()}
-    found = [judged(system, seed) for system, own in seeds.items() for seed in own]
-    rows = [*_kept(found), _predictions(found, quick), *(row for system in seeds for row in _saving(found, system))]
+    choices = [judged(system, seed) for system, seeds_of in seeds.items() for seed in seeds_of]
+    rows = [
+        *_kept(choices),
+        _predictions(choices, quick),
+        *(row for system in seeds for row in _saving(choices, system)),
+    ]
     rows += [] if quick else [_refused()]
-    return rows, {"scenes": [_shown(one) for one in found], "systems": list(seeds)}
+    return rows, {"scenes": [_shown(each) for each in choices], "systems": list(seeds)}
 
 
-def _kept(found: list[JudgedByRuns]) -> list[Row]:
-    kept = float(np.mean([one.choice.kept and one.honest for one in found]))
+def _kept(choices: list[JudgedByRuns]) -> list[Row]:
+    kept = float(np.mean([each.choice.kept and each.honest for each in choices]))
     return [
         Observed(
-            "choice_nonlinear.kept", SYSTEM, f"share of {len(found)} random scenes whose tolerance is kept", kept, ""
+            "choice_nonlinear.kept", SYSTEM, f"share of {len(choices)} random scenes whose tolerance is kept", kept, ""
         ).within(1.0, 0.05, "asked: at least 95 of 100", "none"),
         Observed(
             "choice_nonlinear.honest",
             SYSTEM,
             "choices that are reported as kept although two more runs show that they are not",
-            float(sum(not one.honest for one in found)),
+            float(sum(not each.honest for each in choices)),
             "",
         ).at_most(0.0, "asked: never", "none"),
     ]
@@ -106,14 +110,14 @@ def _refused() -> Row:
     )
 
 
-def _pairs(found: list[JudgedByRuns]) -> np.ndarray:
+def _pairs(choices: list[JudgedByRuns]) -> np.ndarray:
     """Predicted and confirmed changes (n, 2) of all quantities whose change is told from zero and below 5 %."""
-    pairs = [(p, c) for one in found for p, c in zip(one.choice.predicted, one.choice.confirmed, strict=True)]
+    pairs = [(p, c) for each in choices for p, c in zip(each.choice.predicted, each.choice.confirmed, strict=True)]
     return np.array([pair for pair in pairs if TOLD[0] < pair[1] < TOLD[1]]).reshape(-1, 2)
 
 
-def _predictions(found: list[JudgedByRuns], quick: bool) -> Row:
-    ratios = np.divide(*_pairs(found).T)
+def _predictions(choices: list[JudgedByRuns], quick: bool) -> Row:
+    ratios = np.divide(*_pairs(choices).T)
     share = float(np.mean((ratios >= 0.5) & (ratios <= 2.0))) if len(ratios) else 1.0
     name, asked = "choice_nonlinear.predictions", "asked: within a factor of 2"
     said = f"share of {len(ratios)} predicted changes below 5 % within a factor of 2 of the confirmed ones"
@@ -124,17 +128,17 @@ def _predictions(found: list[JudgedByRuns], quick: bool) -> Row:
     return Observed(name, SYSTEM, said, share, "").within(1.0, 0.05, asked, "none")
 
 
-def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
-    own = [one for one in found if one.system == system]
-    calls = np.array([one.choice.calls for one in own], float)
-    seconds = np.array([one.choice.seconds for one in own])
+def _saving(choices: list[JudgedByRuns], system: str) -> list[Row]:
+    of_system = [each for each in choices if each.system == system]
+    calls = np.array([each.choice.calls for each in of_system], float)
+    seconds = np.array([each.choice.seconds for each in of_system])
     name = f"choice_nonlinear.saving.{system}"
     note = "steps within a sample alone may grow" if system == "braking" else "it depends on the step that a scene has"
     return [
         Observed(
             name,
             SYSTEM,
-            f"ratio of calls before and after the choice, median of {len(own)} scenes of {system}",
+            f"ratio of calls before and after the choice, median of {len(of_system)} scenes of {system}",
             float(np.median(calls[:, 0] / calls[:, 2])),
             "times",
         ).aim(5.0, note, "at least"),
@@ -142,7 +146,7 @@ def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
             f"{name}.step",
             SYSTEM,
             "ratio of calls before and after longer steps alone, with all effects, median of "
-            f"{len(own)} scenes of {system}",
+            f"{len(of_system)} scenes of {system}",
             float(np.median(calls[:, 0] / calls[:, 1])),
             "times",
         ).beside("", "what is left is due to effects", "none"),
@@ -156,13 +160,13 @@ def _saving(found: list[JudgedByRuns], system: str) -> list[Row]:
     ]
 
 
-def _shown(one: JudgedByRuns) -> Saved:
-    choice = one.choice
+def _shown(judged_choice: JudgedByRuns) -> Saved:
+    choice = judged_choice.choice
     return {
-        "system": one.system,
-        "engine": one.engine,
-        "tolerance": one.asked.tolerance,
-        "quantities": list(one.asked.quantities),
+        "system": judged_choice.system,
+        "engine": judged_choice.engine,
+        "tolerance": judged_choice.asked.tolerance,
+        "quantities": list(judged_choice.asked.quantities),
         "left out": list(choice.left_out),
         "times": choice.times,
         "predicted": choice.predicted.tolist(),
@@ -177,17 +181,17 @@ def tables(data: Saved) -> list[Table]:
     """Savings by system, and which effects went how often."""
     rows = []
     for system in data["systems"]:
-        own = [one for one in data["scenes"] if one["system"] == system]
-        saved = [one["calls"][0] / one["calls"][2] for one in own]
-        alone = [one["calls"][0] / one["calls"][1] for one in own]
-        faster = [one["seconds"][0] / one["seconds"][2] for one in own]
-        went = sorted({name for one in own for name in one["left out"]})
+        of_system = [each for each in data["scenes"] if each["system"] == system]
+        saved = [each["calls"][0] / each["calls"][2] for each in of_system]
+        alone = [each["calls"][0] / each["calls"][1] for each in of_system]
+        faster = [each["seconds"][0] / each["seconds"][2] for each in of_system]
+        went = sorted({name for each in of_system for name in each["left out"]})
         rows.append(
             (
                 system,
-                str(len(own)),
+                str(len(of_system)),
                 *(f"{np.median(values):.3g}" for values in (saved, alone, faster)),
-                ", ".join(f"{name} {sum(name in one['left out'] for one in own)}" for name in went) or "none",
+                ", ".join(f"{name} {sum(name in each['left out'] for each in of_system)}" for name in went) or "none",
             )
         )
     heads = ("system", "scenes", "fewer calls", "by steps alone", "fewer CPU seconds", "effects left out, how often")
@@ -206,15 +210,15 @@ def draw(data: Saved) -> Drawn:
     ends = np.array([1e-4, 6.0])
     left.fill_between(ends, ends / 2, ends * 2, color="#999999", alpha=0.25, label="factor 2")
     for i, system in enumerate(data["systems"]):
-        own = [one for one in data["scenes"] if one["system"] == system]
+        of_system = [each for each in data["scenes"] if each["system"] == system]
         predicted, confirmed = (
-            100 * np.array([value for one in own for value in one[key]]) for key in ("predicted", "confirmed")
+            100 * np.array([value for each in of_system for value in each[key]]) for key in ("predicted", "confirmed")
         )
         left.plot(confirmed.clip(ends[0]), predicted.clip(ends[0]), "os^D"[i], ms=4, color=f"C{i}", label=system)
         shift = 1.06 ** (i - 1)
         right.plot(
-            [100 * one["tolerance"] * shift for one in own],
-            [one["calls"][0] / one["calls"][2] for one in own],
+            [100 * each["tolerance"] * shift for each in of_system],
+            [each["calls"][0] / each["calls"][2] for each in of_system],
             "os^D"[i],
             ms=4,
             color=f"C{i}",

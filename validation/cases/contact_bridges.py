@@ -93,10 +93,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     if quick:
         return rows, data
     setups = every()
-    told = [one for one in setups if one.told]
-    rows += _price_rows(Prices([*told, *(one.without for one in told)], ROUNDS))
+    told = [each for each in setups if each.told]
+    rows += _price_rows(Prices([*told, *(each.without for each in told)], ROUNDS))
     shown = Prices(setups, SHOWN)
-    return rows, {**data, "points": [shown.point(one) for one in setups]}
+    return rows, {**data, "points": [shown.point(each) for each in setups]}
 
 
 def every() -> list[Setup]:
@@ -116,36 +116,40 @@ class Prices:
 
     def __init__(self, setups: list[Setup], rounds: int) -> None:
         self.setups = setups
-        kernels = sorted({(one.law, one.count) for one in setups if one.law is not None})
-        runs, loops = [_job(one) for one in setups], [_kernel_job(law, count) for law, count in kernels]
+        kernels = sorted({(each.law, each.count) for each in setups if each.law is not None})
+        runs, loops = [_job(each) for each in setups], [_kernel_job(law, count) for law, count in kernels]
         jobs = [part for march, steps in runs for part in (partial(march, steps), partial(march, 1))]
         seconds = interleave([*jobs, *(job for job, _ in loops)], rounds, LEAST, clock=time.process_time)
         whole, first, alone = seconds[: len(jobs) : 2], seconds[1 : len(jobs) : 2], seconds[len(jobs) :]
-        self._steps = {one: (a, b, steps - 1) for one, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)}
-        self._calls = {kernel: one / calls for kernel, one, (_, calls) in zip(kernels, alone, loops, strict=True)}
+        self._steps = {
+            each: (a, b, steps - 1) for each, a, b, (_, steps) in zip(setups, whole, first, runs, strict=True)
+        }
+        self._calls = {kernel: each / calls for kernel, each, (_, calls) in zip(kernels, alone, loops, strict=True)}
 
-    def rounds(self, one: Setup) -> tuple[Any, Any, Any]:
+    def rounds(self, setup: Setup) -> tuple[Any, Any, Any]:
         """Seconds of each round: of a step, of the same without contact (the engine's own), of the kernel in it."""
-        step, own = ((whole - first) / steps for whole, first, steps in (self._steps[one], self._steps[one.without]))
-        calls = 1 if one.bridge == "before each step" else EVALUATIONS[one.method]
-        return step, own, 0.0 if one.law is None else calls * self._calls[one.law, one.count]
+        step, bare = (
+            (whole - first) / steps for whole, first, steps in (self._steps[setup], self._steps[setup.without])
+        )
+        calls = 1 if setup.bridge == "before each step" else EVALUATIONS[setup.method]
+        return step, bare, 0.0 if setup.law is None else calls * self._calls[setup.law, setup.count]
 
-    def point(self, one: Setup) -> dict[str, Any]:
+    def point(self, setup: Setup) -> dict[str, Any]:
         """A step and what it is made of, in seconds: engine, kernel, bridge; the share of the bridge."""
-        a, b, c = self.rounds(one)
-        step, own, kernel = (float(np.median(part)) for part in (a, b, c))
+        a, b, c = self.rounds(setup)
+        step, bare, kernel = (float(np.median(part)) for part in (a, b, c))
         share = median((a - b - c) / a)
         return {
-            "engine": one.engine,
-            "method": one.method,
-            "bridge": one.bridge,
-            "law": one.what(),
-            "wheels": one.count,
-            "main": one.law == MAIN,
+            "engine": setup.engine,
+            "method": setup.method,
+            "bridge": setup.bridge,
+            "law": setup.what(),
+            "wheels": setup.count,
+            "main": setup.law == MAIN,
             "step": step,
-            "own": own,
+            "own": bare,
             "kernel": kernel,
-            "over": step - own - kernel,
+            "over": step - bare - kernel,
             "share": share,
             "range": median(a)[1:],
         }
@@ -164,26 +168,26 @@ def _repeat(numbers, q, v, f, times):
         forces(start(numbers), 0.0, start(q), start(v), start(f))
 
 
-def _job(one: Setup) -> tuple[Callable[[int], Any], int]:
+def _job(setup: Setup) -> tuple[Callable[[int], Any], int]:
     """Function that marches some steps, and how many are to be timed."""
-    wheels = one.wheels()
-    kind = one.bridge if one.bridge in STEPS else "native"
+    wheels = setup.wheels()
+    kind = setup.bridge if setup.bridge in STEPS else "native"
     if wheels.theory == "simplified":
-        kind = "plain simplified" if one.bridge == "plain" else "simplified"
-    law = plain(wheels) if one.bridge == "plain" else None
-    march = (_mujoco_job if one.engine == "mujoco" else _exudyn_job)(one, wheels, law)
-    return march, max(2, STEPS[kind] // EVALUATIONS[one.method])
+        kind = "plain simplified" if setup.bridge == "plain" else "simplified"
+    law = plain(wheels) if setup.bridge == "plain" else None
+    march = (_mujoco_job if setup.engine == "mujoco" else _exudyn_job)(setup, wheels, law)
+    return march, max(2, STEPS[kind] // EVALUATIONS[setup.method])
 
 
-def _mujoco_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
-    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, one.method))
+def _mujoco_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+    start, march = np.concatenate(wheels.state())[None], Marcher(model(wheels, STEP, setup.method))
     callback = {
         "none": lambda: None,
         "empty": lambda: empty_law().ctypes,
         "native": lambda: kernel_law(forces).ctypes,
         "jitted": lambda: python_law(add_forces),
         "plain": lambda: python_law(law),
-    }[one.bridge]()
+    }[setup.bridge]()
 
     def job(steps: int) -> None:
         mujoco.set_mjcb_passive(callback)
@@ -195,14 +199,14 @@ def _mujoco_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     return job
 
 
-def _exudyn_job(one: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
+def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
     zeros, of = [0.0] * wheels.size, None
-    if one.bridge == "empty":
+    if setup.bridge == "empty":
         of = lambda q, v: zeros  # noqa: E731
-    elif one.bridge != "none":
+    elif setup.bridge != "none":
         of = Forces(wheels, law).of
-    rolling, state = Rolling(wheels, of, one.bridge if one.bridge in ROUTES else ROUTES[0]), wheels.state()
-    return lambda steps: rolling.run(*state, steps, STEP, one.method)
+    rolling, state = Rolling(wheels, of, setup.bridge if setup.bridge in ROUTES else ROUTES[0]), wheels.state()
+    return lambda steps: rolling.run(*state, steps, STEP, setup.method)
 
 
 def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
@@ -229,19 +233,19 @@ def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
 
 def _price_rows(prices: Prices) -> list[Row]:
     rows = []
-    for one in prices.setups:
-        if not one.told:
+    for setup in prices.setups:
+        if not setup.told:
             continue
-        step, own, kernel = prices.rounds(one)
-        name, calls = f"contact_bridges.{one.engine}.{one.method}", EVALUATIONS[one.method]
-        if one.engine == "mujoco":
-            value, low, high = median(step / (own + kernel))
+        step, bare, kernel = prices.rounds(setup)
+        name, calls = f"contact_bridges.{setup.engine}.{setup.method}", EVALUATIONS[setup.method]
+        if setup.engine == "mujoco":
+            value, low, high = median(step / (bare + kernel))
             what, bound = f"ratio to the step without contact plus {4 * calls} kernel times", 1.3
         else:
-            value, low, high = median((step - own - kernel) / step)
+            value, low, high = median((step - bare - kernel) / step)
             what, bound = "share of the bridge", 0.25
         what = (
-            f"{ENGINE_NAMES[one.engine]}, {one.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
+            f"{ENGINE_NAMES[setup.engine]}, {setup.method}: {what}, step with FASTSIM at four wheels (21 x 21, native, "
             f"{spelled(step, 1e6)} us), 95 % interval {low:.3f} to {high:.3f}"
         )
         rows.append(Observed(name, SYSTEM, what, value, "").aim(bound, WHY))
@@ -253,8 +257,8 @@ def _threads_row() -> Row:
     wheels = Wheels()
     states, built = np.array([np.concatenate(wheels.state(seed)) for seed in range(10)]), model(wheels, 1e-4, "RK4")
     with installed(kernel_law(forces)):
-        one, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
-    same = "identical" if np.isfinite(one).all() and one.tobytes() == two.tobytes() else "different"
+        first, two = (Marcher(built, threads).run(states, 100) for threads in (1, 2))
+    same = "identical" if np.isfinite(first).all() and first.tobytes() == two.tobytes() else "different"
     return behaves(
         "contact_bridges.threads",
         SYSTEM,

@@ -50,10 +50,10 @@ WHY = "the same continuum problem solved on cells, extrapolated to none"
 def exact(ratio: float, nu: float, cells: int = CELLS) -> Array:
     """C11, C22, C23, C33 (4,) by the exact theory."""
     coarse, middle, fine = (_on_grid(ratio, nu, n) for n in (cells, 2 * cells, 4 * cells))
-    found = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
+    limit = (coarse - 6.0 * middle + 8.0 * fine) / 3.0
     if ratio > RATIOS[-1]:  # C33 of long patches changes by a fourth from grid to grid: second order alone
-        found[3] = fine[3] + (fine[3] - middle[3]) / 3.0
-    return found
+        limit[3] = fine[3] + (fine[3] - middle[3]) / 3.0
+    return limit
 
 
 def _on_grid(ratio: float, nu: float, cells: int) -> Array:
@@ -167,14 +167,14 @@ def _beyond_rows(beyond: Array) -> list[Row]:
     """Slender patches; C33 of long ones is what is left of large parts, and has nodes of its own at 20 and 50."""
     off = np.abs(deviation(beyond))
     long = beyond[:, 0] > 1.0
-    asymptotes, own = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
+    asymptotes, nodes = "Kalker's asymptotes, led on from the table", "nodes by the same theory; 30 lies between them"
     parts = [
         (f"beyond.{name}", f"{name} at a/b {_span(beyond)}", off[:, i], 0.03, asymptotes)
         for i, name in enumerate(NAMES[:3])
     ]
     parts += [
         ("beyond.C33", f"C33 at a/b {_span(beyond[~long])}", off[~long, 3], 0.03, asymptotes),
-        ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, own),
+        ("beyond.C33.long", f"C33 at a/b {_span(beyond[long])}", off[long, 3], 0.1, nodes),
     ]
     return [
         Observed(

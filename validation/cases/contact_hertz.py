@@ -93,7 +93,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     """Worst relative error of every quantity at each ratio, along x and along y, by load and by approach."""
     truth = [ellipse(g) for g in ratios]
     flat, steep, load, approach = (
-        np.array([float(one[name]) for one in truth]) for name in ("flat", "steep", "load", "approach")
+        np.array([float(each[name]) for each in truth]) for name in ("flat", "steep", "load", "approach")
     )
     touching = [
         by_load(flat, steep, load, PAIR),
@@ -104,7 +104,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
     named = {"a": "long", "b": "short", "p0": "p0", "approach": "approach", "load": "load"}
     return {
         name: [
-            max(float(abs(Decimal(float(getattr(one, field)[i])) / exact[name] - 1)) for one in touching)
+            max(float(abs(Decimal(float(getattr(each, field)[i])) / exact[name] - 1)) for each in touching)
             for i, exact in enumerate(truth)
         ]
         for field, name in named.items()
@@ -148,7 +148,7 @@ def _published() -> list[Row]:
 def _behaviour() -> list[Row]:
     """Zero and negative load, and what is no Hertzian contact."""
     nothing = [by_load(1.0, 2.0, load, PAIR) for load in (0.0, -1.0, -1e6)] + [by_approach(1.0, 2.0, -1e-3, PAIR)]
-    exact = all(value == 0.0 for one in nothing for value in (one.a, one.b, one.p0, one.approach, one.load))
+    exact = all(value == 0.0 for each in nothing for value in (each.a, each.b, each.p0, each.approach, each.load))
     why = "a silent number would be wrong"
     asked: dict[str, Callable[[], object]] = {
         "flat": lambda: by_load(0.0, 1.0, LOAD, PAIR),

@@ -196,7 +196,7 @@ def _beyond(cases: list[Case], cells: int, choices: dict[str, str]) -> list[floa
 
 
 def _program_rows(answers: dict[str, Any]) -> list[Row]:
-    t = {name: np.array(own) for name, own in answers["seconds"].items()}
+    t = {name: np.array(values) for name, values in answers["seconds"].items()}
     why = "the paper's figure is of a computer and a Fortran program of 1983"
     what = "ratio of the time of contact and forces by the program of 1983 to that of the program of 1982"
     ratio, low, high = paired_ratio(t["1983"] + t["press"], t["1982"])

@@ -66,9 +66,9 @@ def _at(shift: float, yaw: float, exact: bool) -> dict[str, Any]:
         }
         for touch in touches
     ]
-    found = {"shift": shift, "yaw": yaw, "places": places, "area": 1e6 * pressed.area, "peak": pressed.peak / 1e6}
+    told = {"shift": shift, "yaw": yaw, "places": places, "area": 1e6 * pressed.area, "peak": pressed.peak / 1e6}
     heaviest = max(pressed.patches, key=lambda part: part.load)
-    return found | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
+    return told | {"exact": _exact_peak(heaviest.patch, heaviest.load, heaviest.box) if exact else None}
 
 
 def _exact_peak(patch: Any, load: float, box: tuple[float, float, float, float]) -> float | None:
@@ -112,21 +112,21 @@ def _file_rows() -> list[Row]:
 
 def wheel_off(wheel: Profile) -> float:
     """Largest difference in height (m) where both are known."""
-    own = s1002()
-    inside = (wheel.y >= own.y[0]) & (wheel.y <= own.y[-1])
-    return float(np.abs(own.curve(wheel.y[inside]) - wheel.z[inside]).max())
+    rail_profile = s1002()
+    inside = (wheel.y >= rail_profile.y[0]) & (wheel.y <= rail_profile.y[-1])
+    return float(np.abs(rail_profile.curve(wheel.y[inside]) - wheel.z[inside]).max())
 
 
 def rail_off(rail: Profile) -> float:
     """Largest distance (m) of the file's points from the inclined rail, after the best shift: its origin is its own."""
-    own = uic60().turned(Track().inclination)
-    tree = KDTree(np.column_stack([own.y, own.z]))
+    laid = uic60().turned(Track().inclination)
+    tree = KDTree(np.column_stack([laid.y, laid.z]))
     points = np.column_stack([rail.y, rail.z])[rail.z < 0.036]
 
     def far(shift: np.ndarray) -> float:
         return float(tree.query(points - shift)[0].max())
 
-    start = np.array([rail.y[np.argmin(rail.z)] - own.y[np.argmin(own.z)], 0.0])
+    start = np.array([rail.y[np.argmin(rail.z)] - laid.y[np.argmin(laid.z)], 0.0])
     return float(minimize(far, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-8}).fun)
 
 

@@ -74,13 +74,13 @@ def _hertz(ratio: float, options: Options) -> dict[str, float]:
     """Errors of approach, area and peak on Hertz's ellipse, as shares."""
     exact = by_load(CURVATURE, CURVATURE * ratio, 1e5, PAIR)
     a, b = float(exact.a), float(exact.b)
-    found = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
-    return _errors(found, float(exact.approach), np.pi * a * b, float(exact.p0))
+    contact = press(quadratic(CURVATURE, CURVATURE * ratio, 2.5 * a, 2.5 * b), PAIR, load=1e5, options=options)
+    return _errors(contact, float(exact.approach), np.pi * a * b, float(exact.p0))
 
 
-def _errors(found: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
+def _errors(contact: NormalContact, approach: float, area: float, peak: float) -> dict[str, float]:
     exact = {"approach": approach, "area": area, "peak": peak}
-    return {key: getattr(found, key) / value - 1.0 for key, value in exact.items()}
+    return {key: getattr(contact, key) / value - 1.0 for key, value in exact.items()}
 
 
 def largest_jump(patch: Patch, steps: int) -> float:
@@ -116,8 +116,8 @@ def _against_exact(shape: Shape) -> dict[str, Any]:
     ways = {}
     for name, contact in contacts.items():
         forces = [
-            float(100.0 * np.hypot(own.fx - true.fx, own.fy - true.fy) / (FRICTION * shape.load))
-            for own, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
+            float(100.0 * np.hypot(rolled.fx - true.fx, rolled.fy - true.fy) / (FRICTION * shape.load))
+            for rolled, true in ((roll(contact, FRICTION, *motions[key]), true) for key, true in solved.items())
         ]
         mean, most = (float(np.mean(forces)), float(np.max(forces))) if forces else (np.nan, np.nan)
         ways[name] = _errors(contact, **figures) | {"force": mean, "force_max": most}
@@ -135,14 +135,15 @@ def _approach_of(shape: Shape) -> dict[str, float]:
 
 def _placed() -> dict[str, dict[str, float]]:
     """The same of wheels on rails, which have no common net."""
-    found = {}
-    for one in placed():
-        pressed = press([touch.patch for touch in one.touches], PAIR, load=one.load)
+    errors = {}
+    for position in placed():
+        pressed = press([touch.patch for touch in position.touches], PAIR, load=position.load)
         along = np.cos(min(part.patch.lean for part in pressed.patches))
-        name = f"S1002 on UIC 60, {1e3 * one.shift:g} mm, yaw {1e3 * one.yaw:g} mrad, {1e-3 * one.load:g} kN"
-        error = pressed.approach * along / exact_placed(one, pressed, FULL).approach - 1.0
-        found[name] = {"each": float(error), "one": np.nan}
-    return found
+        name = f"S1002 on UIC 60, {1e3 * position.shift:g} mm, yaw {1e3 * position.yaw:g} mrad, "
+        name += f"{1e-3 * position.load:g} kN"
+        error = pressed.approach * along / exact_placed(position, pressed, FULL).approach - 1.0
+        errors[name] = {"each": float(error), "one": np.nan}
+    return errors
 
 
 def _around(pressed: NormalContact) -> Box:
@@ -230,12 +231,12 @@ def _shape_rows(shapes: dict[str, dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def _grown_rows(found: dict[str, dict[str, float]]) -> list[Row]:
+def _grown_rows(grown: dict[str, dict[str, float]]) -> list[Row]:
     """Areas that have grown together and wheels on rails: the worst of each."""
     rows = []
     kinds = (("grown", "distances with several valleys", False), ("wheels", "wheels on rails", True))
     for place, what, chosen in kinds:
-        errors = {name: abs(case["each"]) for name, case in found.items() if name.startswith("S1002") == chosen}
+        errors = {name: abs(case["each"]) for name, case in grown.items() if name.startswith("S1002") == chosen}
         worst = max(errors, key=errors.__getitem__)
         rows.append(
             Observed(
@@ -271,8 +272,8 @@ def _time_rows(times: dict[str, list[float]]) -> list[Row]:
     ]
 
 
-def _ratio(times: dict[str, list[float]], one: str, other: str) -> float:
-    return float(np.median(times[one]) / np.median(times[other]))
+def _ratio(times: dict[str, list[float]], first: str, other: str) -> float:
+    return float(np.median(times[first]) / np.median(times[other]))
 
 
 def tables(data: dict[str, Any]) -> list[Table]:
@@ -283,9 +284,9 @@ def tables(data: dict[str, Any]) -> list[Table]:
         for ratio, case in data["hertz"].items()
     )
     heads: tuple[str, ...] = ("B/A", "approach [%]", "area [%]", "peak pressure [%]", "approach, paper [%]")
-    found = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
+    tables = [Table("Theory of 1983 on Hertz's ellipses", "Error by ratio of curvatures, 15 x 15 net.", heads, hertz)]
     if "shapes" not in data:
-        return found
+        return tables
     rows = tuple(
         (
             name,
@@ -312,7 +313,7 @@ def tables(data: dict[str, Any]) -> list[Table]:
         for name, case in data["grown"].items()
     )
     return [
-        *found,
+        *tables,
         Table("Theory of 1983 against the exact contact", note + " " + _said(data["shapes"]), heads, rows),
         Table(
             "Size of the crude net",

@@ -74,22 +74,26 @@ COMBINATIONS = (
 @allowing("that runs drift off is what is shown", "upright")
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per combination; quick: the first one, by few paths."""
-    found = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
-    return [_row(figures) for figures in found], {"combinations": found}
+    combinations = [_combination(each, folder, quick) for each in (COMBINATIONS[:1] if quick else COMBINATIONS)]
+    return [_row(figures) for figures in combinations], {"combinations": combinations}
 
 
-def _combination(one: Combination, folder: Path, quick: bool) -> Saved:
+def _combination(combination: Combination, folder: Path, quick: bool) -> Saved:
     """Predicted and measured times of all members; a member that never drifts off is infinitely late."""
-    members = {"noise": _noise, "interpolation": _between, "model": _models}[one.source]
-    predicted, measured = members(one, folder, QUICK_PATHS if quick else PATHS)
+    members = {"noise": _noise, "interpolation": _between, "model": _models}[combination.source]
+    predicted, measured = members(combination, folder, QUICK_PATHS if quick else PATHS)
     late = [np.inf if time is None else time for time in predicted]
     median, low, high = quantile(np.array(measured), 0.5)
     inner = [quantile(np.array(measured), level)[0] for level in (0.25, 0.75)]
-    said = one.source + (f" {one.size:g} N" if one.size else "") + ("" if one.interpolation == "linear" else ", held")
+    said = (
+        combination.source
+        + (f" {combination.size:g} N" if combination.size else "")
+        + ("" if combination.interpolation == "linear" else ", held")
+    )
     return {
-        "name": one.name,
+        "name": combination.name,
         "source": said,
-        "rate": one.rate,
+        "rate": combination.rate,
         "predicted": quantile(np.array(late), 0.5)[0],
         "median": median,
         "low": low,
@@ -99,36 +103,38 @@ def _combination(one: Combination, folder: Path, quick: bool) -> Saved:
     }
 
 
-def _noise(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _noise(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """One prediction, and the drift-off time of every path."""
-    true = drive(folder, one.duration, 1 / one.rate, road=one.road)
-    effects = {"force_noise": {"deviation": one.size, "seed": SEED}}
-    scene = force_scene(folder, duration=one.duration, effects=effects)
+    true = drive(folder, combination.duration, 1 / combination.rate, road=combination.road)
+    effects = {"force_noise": {"deviation": combination.size, "seed": SEED}}
+    scene = force_scene(folder, duration=combination.duration, effects=effects)
     times = run_paths(noise_paths(scene, np.array([]), true["pitch"], ANGLE), paths)["drift_off"]
-    quiet = assemble(force_scene(folder, duration=one.duration))
-    return [noise(quiet, one.size).passes()], times.tolist()
+    quiet = assemble(force_scene(folder, duration=combination.duration))
+    return [noise(quiet, combination.size).passes()], times.tolist()
 
 
-def _between(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _between(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Neighbouring speeds, or seeds, each predicted and run."""
-    speed = one.road["speed"]
+    speed = combination.road["speed"]
     roads = [
-        one.road | ({"seed": i} if one.road["source"] == "iso8608" else {"speed": speed * factor})
+        combination.road | ({"seed": i} if combination.road["source"] == "iso8608" else {"speed": speed * factor})
         for i, factor in enumerate(SPEEDS)
     ]
     predicted, measured = [], []
     for road in roads:
-        true = drive(folder, one.duration, 1 / one.rate, STEP, road=road)
-        assembly = assemble(force_scene(folder, step=STEP, duration=one.duration, interpolation=one.interpolation))
+        true = drive(folder, combination.duration, 1 / combination.rate, STEP, road=road)
+        assembly = assemble(
+            force_scene(folder, step=STEP, duration=combination.duration, interpolation=combination.interpolation)
+        )
         predicted.append(interpolation(assembly).passes())
         measured.append(_drift_off(assembly, true))
     return predicted, measured
 
 
-def _models(one: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
+def _models(combination: Combination, folder: Path, paths: int) -> tuple[list[float | None], list[float]]:
     """Random models, each predicted and run from the true start."""
-    true = drive(folder, one.duration, 1 / one.rate, STEP, road=one.road)
-    assembly = assemble(force_scene(folder, step=STEP, duration=one.duration))
+    true = drive(folder, combination.duration, 1 / combination.rate, STEP, road=combination.road)
+    assembly = assemble(force_scene(folder, step=STEP, duration=combination.duration))
     p, others = assembly.parameters, list[Parameters]()
     for i in range(MODELS):
         factors = np.random.Generator(np.random.Philox(key=[SEED, i])).uniform(0.9, 1.1, len(PAPER))
@@ -146,32 +152,37 @@ def _drift_off(assembly: Assembly, true: Result) -> float:
     return np.inf if time is None else time
 
 
-def _row(found: Saved) -> Row:
-    key = f"drift_off.{found['source']}.{found['name']}.{found['rate']:g}Hz".replace(" ", "-").replace(",", "")
-    scatter = "{:.1f} to {:.1f} s".format(*found["quartiles"])
+def _row(combination: Saved) -> Row:
+    key = f"drift_off.{combination['source']}.{combination['name']}.{combination['rate']:g}Hz".replace(
+        " ", "-"
+    ).replace(",", "")
+    scatter = "{:.1f} to {:.1f} s".format(*combination["quartiles"])
     what = (
-        f"drift-off of {found['name']}, {found['source']}, {found['rate']:g} Hz: median of {found['members']} runs "
-        f"(half of them {scatter}) over the prediction {found['predicted']:.2f} s"
+        f"drift-off of {combination['name']}, {combination['source']}, {combination['rate']:g} Hz: "
+        f"median of {combination['members']} runs "
+        f"(half of them {scatter}) over the prediction {combination['predicted']:.2f} s"
     )
-    why = f"10 % is asked; the median lies in {found['low']:.2f} to {found['high']:.2f} s at 95 %"
-    return Observed(key, SYSTEM, what, found["median"] / found["predicted"], "").within(1.0, 0.1, why, "closed form")
+    why = f"10 % is asked; the median lies in {combination['low']:.2f} to {combination['high']:.2f} s at 95 %"
+    return Observed(key, SYSTEM, what, combination["median"] / combination["predicted"], "").within(
+        1.0, 0.1, why, "closed form"
+    )
 
 
 def tables(data: Saved) -> list[Table]:
     """All combinations."""
     rows = tuple(
         (
-            one["name"],
-            one["source"],
-            f"{one['rate']:g}",
-            f"{one['predicted']:.2f}",
-            f"{one['median']:.2f}",
-            f"{one['low']:.2f} to {one['high']:.2f}",
-            "{:.1f} to {:.1f}".format(*one["quartiles"]),
-            str(one["members"]),
-            f"{one['median'] / one['predicted']:.3f}",
+            each["name"],
+            each["source"],
+            f"{each['rate']:g}",
+            f"{each['predicted']:.2f}",
+            f"{each['median']:.2f}",
+            f"{each['low']:.2f} to {each['high']:.2f}",
+            "{:.1f} to {:.1f}".format(*each["quartiles"]),
+            str(each["members"]),
+            f"{each['median'] / each['predicted']:.3f}",
         )
-        for one in data["combinations"]
+        for each in data["combinations"]
     )
     heads = (
         "road",
@@ -193,14 +204,14 @@ def draw(data: Saved) -> Drawn:
     from models.drawing.figures import BLUE, DARK, GREEN, VERMILION, heading, plt
 
     figure, axis = plt.subplots(figsize=(5.2, 4.2))
-    ends = [one["predicted"] for one in data["combinations"]]
+    ends = [each["predicted"] for each in data["combinations"]]
     line = np.array([0.9 * min(ends), 1.1 * max(ends)])
     axis.fill_between(line, 0.9 * line, 1.1 * line, alpha=0.15, color=DARK, linewidth=0, label="within 10 %")
     for source, colour in (("noise", BLUE), ("interpolation", VERMILION), ("model", GREEN)):
-        own = [one for one in data["combinations"] if one["source"].startswith(source)]
-        if own:
+        of_source = [each for each in data["combinations"] if each["source"].startswith(source)]
+        if of_source:
             predicted, middle, quartiles = (
-                np.array([one[k] for one in own]) for k in ("predicted", "median", "quartiles")
+                np.array([each[k] for each in of_source]) for k in ("predicted", "median", "quartiles")
             )
             spread = np.abs(quartiles.T - middle)
             axis.errorbar(predicted, middle, spread, fmt="o", color=colour, label=source, markersize=4, elinewidth=0.8)

@@ -96,13 +96,13 @@ FIGURES = (
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows for drift-off times, enforced moments, inertia term of the reference; quick: 15 s, one sampling rate."""
     scene = load(SCENE, QUICK if quick else ())
-    found, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
+    runs, rate = _run(scene), f"{scene.options['sampling_rate']:g} Hz, linear in between"
     rows = [
-        Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", found[which][what], unit).beside(paper, why)
+        Observed(f"drift.{name}", SYSTEM, f"{words}, {rate}", runs[which][what], unit).beside(paper, why)
         for name, which, what, words, unit, paper, why in FIGURES
-        if found[which][what] is not None
+        if runs[which][what] is not None
     ]
-    lacking = found["guided, perturbed"]
+    lacking = runs["guided, perturbed"]
     rows.append(
         Observed(
             "drift.moment.ratio",
@@ -130,7 +130,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         )
     return rows, {
         "duration": scene.run.duration,
-        "rows": list(found.values()),
+        "rows": list(runs.values()),
         "rates": [[rate, *row.values()] for rate, row in rates.items()],
     }
 
@@ -164,13 +164,13 @@ def tables(data: Saved) -> list[Table]:
     )
     heads = ("run", "drift-off [s]", "heave error [m]", "moment rms [N m]", "moment max [N m]", "I beta'' max [N m]")
     note = "A run has drifted off when its pitch is 0.05 rad wrong."
-    found = [Table(f"The six runs, {data['duration']:g} s on the study road", note, heads, rows)]
+    tables = [Table(f"The six runs, {data['duration']:g} s on the study road", note, heads, rows)]
     if data["rates"]:
         rates = tuple((f"{rate:g}", _cell(when, ".1f") or "never", f"{most:.1f}") for rate, when, most in data["rates"])
         note = "Undisturbed forces, linear between the samples. The paper's 70 N m fits a rate of about 400 Hz."
         columns = ("sampling rate [Hz]", "drift-off [s]", "moment max [N m]")
-        found.append(Table("What the sampling rate does", note, columns, rates))
-    return found
+        tables.append(Table("What the sampling rate does", note, columns, rates))
+    return tables
 
 
 def _cell(value: float | None, form: str) -> str:

@@ -89,9 +89,9 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
     """
     true = drive(folder, DURATION, 1 / RATE, 2.5e-4)
     noise = {"force_noise": {"deviation": NOISE, "seed": SEED}}
-    found = []
+    drifted = []
     tight = solvers[1::2]
-    fixed = tuple(one for one in tight if one[1] not in ADAPTIVE)
+    fixed = tuple(each for each in tight if each[1] not in ADAPTIVE)
     inputs: tuple[tuple[str, str, Saved, Any], ...] = (
         ("linear", "linear", {}, solvers),
         ("smooth", "smooth", {}, tight),
@@ -102,8 +102,8 @@ def _solvers(folder: Path, solvers: Any) -> list[Saved]:
         assembly = assemble(scene)
         for engine, method, value in chosen:
             solver = {"engine": engine, "method": method, "value": value, "input": name}
-            found.append(solver | _drift(assembly, engine, method, value, true))
-    return found
+            drifted.append(solver | _drift(assembly, engine, method, value, true))
+    return drifted
 
 
 def _drift(assembly: Assembly, engine: str, method: str, value: float, true: Result) -> dict[str, float]:
@@ -121,11 +121,11 @@ def _smoothing(folder: Path) -> list[Saved]:
     """Each way to treat one set of noise files: growth of the pitch's spread, and what the section forces lose."""
     true = drive(folder, NOISY, 1 / NOISY_RATE, 2.5e-4)
     quiet = assemble(force_scene(folder, step=1e-3, duration=NOISY))
-    found = [
+    treatments = [
         _treated(f"low-pass {cutoff:g} Hz, order 4", true, quiet, cutoff, "reference", "RK4", 1e-3)
         for cutoff in CUTOFFS
     ]
-    return found + [
+    return treatments + [
         _treated(f"not smoothed, order {order}", true, quiet, None, "exudyn", method, step)
         for method, order, step in SCHEMES
     ]
@@ -144,7 +144,7 @@ def _treated(
         noise = NOISE * normal(SEED, path, len(forces.values), 2)
         spread += (_run(engine, quiet, forces.values + noise, cutoff, settings)[rows, 3] - clean[rows, 3]) ** 2
     spread, law = np.sqrt(spread / PATHS), _law(_low_pass(forces.values, cutoff), quiet)
-    growth, expected = (float(np.log(one[1] / one[0]) / np.diff(WINDOW)[0]) for one in (spread, law))
+    growth, expected = (float(np.log(each[1] / each[0]) / np.diff(WINDOW)[0]) for each in (spread, law))
     return {
         "name": name,
         "law": expected,
@@ -174,8 +174,8 @@ def _bias(states: np.ndarray, true: Result, assembly: Assembly) -> dict[str, flo
     end = round(SCORED * NOISY_RATE)
     wanted = section_forces(*(true[name][::4][:end] for name in ("f3", "f4", "pitch")))
     f3, f4, _ = suspension_loads(states[:end].T, assembly.parameters, "exact")
-    found = section_forces(f3, f4, states[:end, 3])
-    return {f"damage {name}": damage_ratio(found[name], wanted[name]) for name in ("f3x", "f3z")}
+    loads = section_forces(f3, f4, states[:end, 3])
+    return {f"damage {name}": damage_ratio(loads[name], wanted[name]) for name in ("f3x", "f3z")}
 
 
 def _law(forces: np.ndarray, assembly: Assembly) -> np.ndarray:
@@ -190,26 +190,26 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
     """Who drifts off when."""
     rows = []
     for name in ("linear", "noisy"):
-        own = [one for one in solvers if one["input"] == name]
-        first = own[0]["drift-off"]
-        for one in own[1:]:
-            solver = f"{one['engine']} {one['method']} {one['value']:g}"
+        of_input = [each for each in solvers if each["input"] == name]
+        first = of_input[0]["drift-off"]
+        for each in of_input[1:]:
+            solver = f"{each['engine']} {each['method']} {each['value']:g}"
             rows.append(
                 Observed(
                     f"drift_solvers.{name}.{solver.replace(' ', '.')}",
                     SYSTEM,
                     f"ratio of the drift-off time of the {name} run to that of the first solver "
                     f"({first:.2f} s), {solver}",
-                    one["drift-off"] / first,
+                    each["drift-off"] / first,
                     "",
                 ).within(
                     1.0,
-                    LOOSE if one["value"] >= 1e-5 and one["method"] in ADAPTIVE else TIGHT,
+                    LOOSE if each["value"] >= 1e-5 and each["method"] in ADAPTIVE else TIGHT,
                     "the samples make the error, so accurate solvers agree; a loose tolerance adds to it",
                     "native",
                 )
             )
-    smooth = [one["error"] for one in solvers if one["input"] == "smooth"]
+    smooth = [each["error"] for each in solvers if each["input"] == "smooth"]
     linear = solvers[0]["error"]
     return [
         *rows,
@@ -227,29 +227,29 @@ def _solver_rows(solvers: list[Saved]) -> list[Row]:
 def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
     """Smoothing and schemes only rescale: the spread follows the law of the forces that are left."""
     rows = []
-    for one in smoothing:
-        key = one["name"].replace(" ", "-").replace(",", "")
+    for each in smoothing:
+        key = each["name"].replace(" ", "-").replace(",", "")
         rows += [
             Observed(
                 f"drift_solvers.growth.{key}",
                 SYSTEM,
                 f"ratio of the growth of the pitch's spread from {WINDOW[0]:g} to {WINDOW[1]:g} s to "
-                f"the closed law, {one['name']}",
-                one["growth"] / one["law"],
+                f"the closed law, {each['name']}",
+                each["growth"] / each["law"],
                 "",
             ).within(1.0, 0.1, f"the same {PATHS} noise files in all; their own chance is 3 %", "closed form")
         ]
         for axis, what in (
             (
                 "f3z",
-                f"ratio of the damage of the front section force, body z, to the true damage, {one['name']}, no noise",
+                f"ratio of the damage of the front section force, body z, to the true damage, {each['name']}, no noise",
             ),
             (
                 "f3x",
-                f"ratio of the damage of the front section force, body x, to the true damage, {one['name']}, no noise",
+                f"ratio of the damage of the front section force, body x, to the true damage, {each['name']}, no noise",
             ),
         ):
-            id, damage = f"drift_solvers.bias.{key}.{axis}", one[f"damage {axis}"]
+            id, damage = f"drift_solvers.bias.{key}.{axis}", each[f"damage {axis}"]
             rows.append(Observed(id, SYSTEM, what, damage, "").beside("1", "what smoothing takes away", "none"))
     return rows
 
@@ -257,19 +257,19 @@ def _smoothing_rows(smoothing: list[Saved]) -> list[Row]:
 def tables(data: Saved) -> list[Table]:
     """Drift-off by solver, and what smoothing and schemes do."""
     rows = tuple(
-        (one["input"], one["engine"], one["method"], f"{one['value']:g}", _when(one), f"{one['error']:.2e}")
-        for one in data["solvers"]
+        (each["input"], each["engine"], each["method"], f"{each['value']:g}", _when(each), f"{each['error']:.2e}")
+        for each in data["solvers"]
     )
     note = (
         f"Study road at 20 m/s, {RATE:g} Hz, {DURATION:g} s. Value: step (s), or relative tolerance of an adaptive "
         f"solver. Linear and smooth: undisturbed; noisy: {NOISE} N, linear."
     )
     heads = ("input", "engine", "method", "value", "drift-off [s]", "pitch error at the end [rad]")
-    found = [Table("Drift-off by solver and interpolation", note, heads, rows)]
+    tables = [Table("Drift-off by solver and interpolation", note, heads, rows)]
     if data["smoothing"]:
         shown = {"growth": ".3f", "law": ".3f", "spread": ".4f", "damage f3z": ".3f", "damage f3x": ".3f"}
         lines = tuple(
-            (one["name"], *(f"{one[name]:{form}}" for name, form in shown.items())) for one in data["smoothing"]
+            (each["name"], *(f"{each[name]:{form}}" for name, form in shown.items())) for each in data["smoothing"]
         )
         columns = (
             "treatment",
@@ -283,9 +283,9 @@ def tables(data: Saved) -> list[Table]:
             f"{PATHS} noise files of {NOISE} N at {NOISY_RATE:g} Hz; damage without noise, first {SCORED:g} s, "
             "front section force in the chassis' frame."
         )
-        found.append(Table("Smoothing before the run, and schemes", about, columns, lines))
-    return found
+        tables.append(Table("Smoothing before the run, and schemes", about, columns, lines))
+    return tables
 
 
-def _when(one: Saved) -> str:
-    return "never" if one["drift-off"] >= DURATION else f"{one['drift-off']:.2f}"
+def _when(solver: Saved) -> str:
+    return "never" if solver["drift-off"] >= DURATION else f"{solver['drift-off']:.2f}"

@@ -64,9 +64,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     return rows, {"price": price, "ratios": ratios}
 
 
-def hand_built(engine: str, own: Scene) -> Any:
+def hand_built(engine: str, bare: Scene) -> Any:
     """The bare vehicle written directly for an engine."""
-    assembly, settings = assemble(own), settings_of(own, engine)
+    assembly, settings = assemble(bare), settings_of(bare, engine)
     run = {"exudyn": exudyn_run, "mujoco": mujoco_run}[engine]
     return run(assembly.parameters, assembly.initial, settings.step, settings.steps)
 
@@ -76,10 +76,10 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
 
     Every run of the machinery passes the guard; the hand-built model is timed with it and without it.
     """
-    own = scene({}, steps, folder)
-    ours, theirs, times = model(own, engine), hand_built(engine, own), STEP * np.arange(steps + 1)
+    bare = scene({}, steps, folder)
+    ours, theirs, times = model(bare, engine), hand_built(engine, bare), STEP * np.arange(steps + 1)
     gap = float(np.abs(ours.run().states - theirs()).max())
-    jobs = [ours.run, lambda: guard(engine, times, theirs(), own.run.duration), theirs]
+    jobs = [ours.run, lambda: guard(engine, times, theirs(), bare.run.duration), theirs]
     seconds = interleave(jobs, rounds, every=(1, 1, SELDOM), clock=time.process_time)
     return {
         "ratio": paired_ratio(seconds[0], seconds[1]),
@@ -88,7 +88,7 @@ def _ratio(engine: str, folder: Path, steps: int, rounds: int) -> Saved:
     }
 
 
-def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
+def _machinery(engine: str, machinery: Saved, steps: int) -> list[Row]:
     why = (
         f"interleaved runs of {steps:,} steps, seconds of the processor, median of paired ratios: what the "
         "machinery costs where no effect is named"
@@ -98,20 +98,20 @@ def _machinery(engine: str, found: Saved, steps: int) -> list[Row]:
             f"effect_prices.same.{engine}",
             SYSTEM,
             f"{engine}: largest difference of the states of a bare scene from those of a hand-built model",
-            found["gap"],
+            machinery["gap"],
             "m, rad, m/s, rad/s",
         ).at_most(0.0, "the same items in the same order give the same numbers", "native"),
         slower(
             f"effect_prices.ratio.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model "
             "whose result passes the same guard",
-            found["ratio"],
+            machinery["ratio"],
             why,
         ),
         slower(
             f"effect_prices.unchecked.{engine}",
             f"{engine}: ratio of the time of a bare scene to that of a hand-built model whose result nobody checks",
-            found["unchecked"],
+            machinery["unchecked"],
             why,
         ),
     ]
@@ -250,7 +250,7 @@ def _contact(quick: bool) -> list[Row]:
 
 def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
     """One line of the price list."""
-    seconds = interleave([_job(own, engine) for own in pair(effect, SHORT, folder)], rounds, 5e-3)
+    seconds = interleave([_job(bare, engine) for bare in pair(effect, SHORT, folder)], rounds, 5e-3)
     added = (seconds[1] - seconds[0]) / SHORT * 1e6
     return {
         "effect": effect,
@@ -262,10 +262,10 @@ def _price(effect: str, engine: str, folder: Path, rounds: int) -> Saved:
     }
 
 
-def _job(own: Scene, engine: str) -> Any:
+def _job(bare: Scene, engine: str) -> Any:
     """A run with its channels, built beforehand."""
-    assembly = assemble(own)
-    built = build(engine, assembly, settings_of(own, engine))
+    assembly = assemble(bare)
+    built = build(engine, assembly, settings_of(bare, engine))
     return lambda: outputs(assembly, built.run(), built)
 
 

@@ -57,8 +57,8 @@ def manoeuvre(folder: Path, parameters: str, abrupt: bool = False) -> None:
 
 def moment(scene: Scene, engine: str, settings: Settings) -> np.ndarray:
     """Enforced moment (n,) in N m at every millisecond of a scene."""
-    own = replace(settings, duration=scene.run.duration)
-    return simulate(scene, engine, own)["enforced_moment"][:: round(PERIOD / settings.step)]
+    finer = replace(settings, duration=scene.run.duration)
+    return simulate(scene, engine, finer)["enforced_moment"][:: round(PERIOD / settings.step)]
 
 
 def truth(scene: Scene) -> np.ndarray:
@@ -66,9 +66,9 @@ def truth(scene: Scene) -> np.ndarray:
     return moment(scene, "reference", Settings("RK4", PERIOD / 16, scene.run.duration))
 
 
-def relative(found: np.ndarray, true: np.ndarray) -> float:
+def relative(computed: np.ndarray, true: np.ndarray) -> float:
     """Rms of the difference by the rms of the true moment."""
-    return float(np.sqrt(np.mean((found - true) ** 2) / np.mean(true**2)))
+    return float(np.sqrt(np.mean((computed - true) ** 2) / np.mean(true**2)))
 
 
 @on_paper_road()
@@ -165,9 +165,9 @@ def _inconsistent(scene: Scene, settings: Settings) -> np.ndarray:
     model: Any = build("exudyn", assemble(scene), settings)
     model._first = 0.0
     model._consistent_start = lambda options: None
-    found = model.run().moment
-    assert found is not None
-    return found
+    moment = model.run().moment
+    assert moment is not None
+    return moment
 
 
 def _study_road(folder: Path, steps: tuple[float, ...]) -> tuple[list[Row], list[list[Any]]]:

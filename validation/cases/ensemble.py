@@ -50,22 +50,22 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         if quick:
             return _quick(forces, scene, job, times), {}
         large = _alone(_large, job, MANY, forces / "large")
-        found = large.pop("found")
-        rows = [_path_row(forces, duration, found), *_scale_rows(large)]
+        paths = large.pop("found")
+        rows = [_path_row(forces, duration, paths), *_scale_rows(large)]
         with processes(2) as pool:
             again, half = pool.submit(run_paths, job, SOME), pool.submit(_half_step_row, forces)
-            killed = _killed_row(job, found, forces / "killed")
+            killed = _killed_row(job, paths, forces / "killed")
             rows += [
                 _same_row(
-                    "workers", f"{SOME} paths have the same bits with 1 worker and with 2", found, again.result()
+                    "workers", f"{SOME} paths have the same bits with 1 worker and with 2", paths, again.result()
                 ),
                 killed,
             ]
             halved = half.result()  # nothing else runs while the engines are timed
-            engines, prices = _engines(scene, truth, times, found, 4, pool)
+            engines, prices = _engines(scene, truth, times, paths, 4, pool)
         prices = {"reference, 2 processes": large["seconds"] / large["path-steps"], **prices}
         rows += [*engines, halved, *_price_rows(prices)]
-        return rows, _data(measured.states, times, found, large, prices)
+        return rows, _data(measured.states, times, paths, large, prices)
 
 
 def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> Scene:
@@ -75,22 +75,22 @@ def _scene(forces: Path, duration: float, path: int = 0, step: float = STEP) -> 
 
 def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> list[Row]:
     """The same rows on a few paths of a second, in threads, which start at once."""
-    found = run_paths(job, 12)
+    paths = run_paths(job, 12)
     with ThreadPoolExecutor(2) as pool:
         two = run_paths(job, 12, executor=pool, blocks=Blocks(3))
-    engines, _ = _engines(scene, job.truth, times, found, 2, None)
+    engines, _ = _engines(scene, job.truth, times, paths, 2, None)
     return [
-        _path_row(forces, 1.0, found),
-        _same_row("workers", "12 paths have the same bits with 1 worker and with 2", found, two),
-        _interrupted_row(job, found, forces / "stopped"),
+        _path_row(forces, 1.0, paths),
+        _same_row("workers", "12 paths have the same bits with 1 worker and with 2", paths, two),
+        _interrupted_row(job, paths, forces / "stopped"),
         *engines,
     ]
 
 
-def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
+def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
     """Path 7 is the scene that names it."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
-    worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - found["states"][7]).max())
+    worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
         "ensemble.path",
         SYSTEM,
@@ -100,10 +100,10 @@ def _path_row(forces: Path, duration: float, found: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
+def _same_row(id: str, what: str, first: Arrays, other: Arrays) -> Row:
     """Whether two ensembles are equal to the last bit."""
     count = len(other["drift_off"])
-    equal = all(np.array_equal(one[name][:count], other[name], equal_nan=True) for name in one)
+    equal = all(np.array_equal(first[name][:count], other[name], equal_nan=True) for name in first)
     return behaves(
         f"ensemble.{id}",
         SYSTEM,
@@ -115,7 +115,7 @@ def _same_row(id: str, what: str, one: Arrays, other: Arrays) -> Row:
     )
 
 
-def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
+def _interrupted_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     def stop(state: Any) -> None:
         if state.done >= 6:
             raise KeyboardInterrupt
@@ -125,12 +125,12 @@ def _interrupted_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
     except KeyboardInterrupt:
         again = run_paths(job, 12, blocks, blocks=Blocks(3))
         return _same_row(
-            "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", found, again
+            "resumed", "12 paths have the same bits if they are interrupted half-way and resumed", paths, again
         )
     raise AssertionError("the interrupt was lost")
 
 
-def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
+def _killed_row(job: NoisePaths, paths: Arrays, blocks: Path) -> Row:
     """Kill a run without warning once two of its blocks are there, then resume it."""
     child = get_context("spawn").Process(target=_slowly, args=(job, blocks))
     child.start()
@@ -146,7 +146,7 @@ def _killed_row(job: NoisePaths, found: Arrays, blocks: Path) -> Row:
         "resumed",
         f"{SOME} paths, killed half-way and resumed: the kept blocks are not touched, the "
         "whole is compared with a run in one piece",
-        found,
+        paths,
         again,
     )
 
@@ -167,20 +167,20 @@ def _large(job: NoisePaths, many: int, blocks: Path) -> Saved:
 
     start = time.perf_counter()
     with processes(2) as pool:
-        found = run_paths(job, many, blocks, pool)
+        paths = run_paths(job, many, blocks, pool)
     seconds = time.perf_counter() - start
-    own, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    busy = own.ru_utime + own.ru_stime + child.ru_utime + child.ru_stime
-    kept = sum(values.nbytes for values in found.values()) / len(found["drift_off"])
-    most = 1024 * (own.ru_maxrss + 2 * child.ru_maxrss)
+    parent, child = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    busy = parent.ru_utime + parent.ru_stime + child.ru_utime + child.ru_stime
+    kept = sum(values.nbytes for values in paths.values()) / len(paths["drift_off"])
+    most = 1024 * (parent.ru_maxrss + 2 * child.ru_maxrss)
     return {
-        "found": found,
+        "found": paths,
         "seconds": seconds,
         "busy": busy,
         "kept": kept,
         "bytes": most,
-        "path-steps": len(found["drift_off"]) * job.settings.steps,
-        "failed": int((found["failed"] >= 0).sum()),
+        "path-steps": len(paths["drift_off"]) * job.settings.steps,
+        "failed": int((paths["failed"] >= 0).sum()),
     }
 
 
@@ -237,13 +237,13 @@ def _scale_rows(large: Saved) -> list[Row]:
 
 
 def _engines(
-    scene: Scene, truth: np.ndarray, times: np.ndarray, found: Arrays, count: int, pool: Executor | None
+    scene: Scene, truth: np.ndarray, times: np.ndarray, whole: Arrays, count: int, pool: Executor | None
 ) -> tuple[list[Row], dict[str, float]]:
     """The first paths in both engines: rows of agreement, and seconds per path and step of each way."""
     exudyn = noise_paths(scene, times, truth, engine="exudyn")
-    one, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
+    single, two = (mujoco_threads(scene, times, truth, threads=threads) for threads in (1, 2))
     ways: dict[str, Callable[[], Arrays]] = {
-        "mujoco, 1 thread": lambda: run_paths(one, count),
+        "mujoco, 1 thread": lambda: run_paths(single, count),
         "mujoco, 2 threads": lambda: run_paths(two, count),
         "exudyn, 2 processes" if pool else "exudyn": lambda: run_paths(exudyn, count, executor=pool, blocks=Blocks(1)),
     }
@@ -256,7 +256,7 @@ def _engines(
             f"largest difference of {count} paths in {way} from the reference before drift-off, over the largest state"
         )
         rows.append(
-            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(found, paths, times), "").at_most(
+            Observed(f"ensemble.engines.{_slug(way)}", SYSTEM, what, gap(whole, paths, times), "").at_most(
                 1e-9, "the same tableau on the same samples: rounding, grown by the instability", "native"
             )
         )
@@ -296,12 +296,12 @@ def _half_step_row(forces: Path) -> Row:
     ).at_most(1e-4, "the samples are the same, so only the integrator's error differs", "shared kernel")
 
 
-def _data(truth: np.ndarray, times: np.ndarray, found: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
+def _data(truth: np.ndarray, times: np.ndarray, paths: Arrays, large: Saved, prices: dict[str, float]) -> Saved:
     """What the tables and the figure show."""
-    errors = found["states"] - truth[:: round(1.0 / STEP)]
+    errors = paths["states"] - truth[:: round(1.0 / STEP)]
     spreads = [[when, *deviation(errors[:, round(when), 3]), *deviation(errors[:, round(when), 2])] for when in TIMES]
-    quantiles = [[level, *quantile(found["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
-    counts, edges = np.histogram(found["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
+    quantiles = [[level, *quantile(paths["drift_off"], level)] for level in (0.05, 0.5, 0.95)]
+    counts, edges = np.histogram(paths["drift_off"], bins=np.arange(0.0, 31.0, 0.5))
     fan = percentiles(errors[:, 1:, 3])
     return {
         "spreads": spreads,

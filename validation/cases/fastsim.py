@@ -298,11 +298,11 @@ def _model() -> tuple[list[Row], list[list[Any]]]:
     table, known = list[list[Any]](), read()
     for bound in POWERS:
         for kind in KINDS_OF_FLEXIBILITY:
-            one = held(f"{kind} {bound}", known, CONVERGED)
-            errors = one.error, one.moment_error
+            contacts = held(f"{kind} {bound}", known, CONVERGED)
+            errors = contacts.error, contacts.moment_error
             table.append([bound, kind, *(float(value) for e in errors for value in (e.mean(), e.max()))])
     why = "exact theory with its cells' first order taken out, kept; the case of the price solves some of them anew"
-    what = f"error of the model against the exact theory, {len(one.error)} contacts of five ellipses"
+    what = f"error of the model against the exact theory, {len(contacts.error)} contacts of five ellipses"
     return [
         Observed("fastsim.model.mean", SYSTEM, f"mean {what}", table[0][2], "mu N").at_most(0.02, why, "native"),
         Observed("fastsim.model.max", SYSTEM, f"largest {what}", table[0][3], "mu N").at_most(0.09, why, "native"),

@@ -81,11 +81,11 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     carried = covariance(quiet, DEVIATION)
     alone = pitch_rate_of_forces(_samples(quiet).values, 1 / RATE, p)
     rates = {"run": true["pitch_rate"], "forces": alone}
-    found = {
+    spreads = {
         f"law, {name}": np.sqrt(pitch_variance(times, growth_until(rate, 1 / RATE, p)[at], q))
         for name, rate in rates.items()
     }
-    found |= {
+    spreads |= {
         "time": times,
         "covariance": carried.deviation("pitch")[at],
         "t^1.5": np.sqrt(pitch_variance(times, 0.0, q)),
@@ -95,8 +95,8 @@ def _spread(true: Result, folder: Path, quick: bool) -> Saved:
     if not quick:
         job = noise_paths(_noisy(folder, LENGTH), times.astype(float), true["pitch"])
         off = run_paths(job, PATHS)["states"] - path_of(quiet).carry(np.zeros((1, 8)))[0][at]
-        found["pitch"], found["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
-    return {name: values.tolist() for name, values in found.items()}
+        spreads["pitch"], spreads["heave"] = off[:, :, 3].std(axis=0), off[:, :, 2].std(axis=0)
+    return {name: values.tolist() for name, values in spreads.items()}
 
 
 def _samples(assembly: Assembly) -> Sampled:
@@ -121,7 +121,7 @@ def _growth(folder: Path, road: Saved, windows: int = WINDOWS, parameters: str =
         mode: [_path(replace(assembly, mode=mode), true.states[i], i, round(WINDOW * RATE)) for i in starts]
         for mode in ("force", "force-body")
     }
-    measured = {mode: np.array([measured_growth(path) for path in own]).T for mode, own in paths.items()}
+    measured = {mode: np.array([measured_growth(path) for path in of_mode]).T for mode, of_mode in paths.items()}
     rigid = rigid_pitch(p)
     return {
         "run": growth_rate(rate, 1 / RATE, p),
@@ -147,10 +147,10 @@ def _spread_rows(spread: Saved) -> list[Row]:
             f"growth.spread.pitch.{t}s",
             SYSTEM,
             f"ratio of the pitch's standard deviation at {t} s, {by}, to the closed law",
-            found / expected,
+            spread_then / expected,
             "",
         ).within(1.0, 0.05, why, "closed form")
-        for t, found, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
+        for t, spread_then, expected in zip(spread["time"], spread[seen], spread["law, run"], strict=True)
     ]
     miss = spread[seen][-1] / spread["t^1.5"][-1]
     rows.append(
@@ -252,12 +252,12 @@ def _twin_row(folder: Path) -> Row:
     p, at = assembly.parameters, round(5.0 * RATE)
     q = rigid_pitch(p).intensity(DEVIATION, 1 / RATE)
     expected = np.sqrt(float(pitch_variance(5.0, growth_until(true["pitch_rate"], 1 / RATE, p)[at], q)))
-    found = covariance(assembly, DEVIATION).deviation("pitch")[at]
+    deviation = covariance(assembly, DEVIATION).deviation("pitch")[at]
     what, why = (
         "asymmetric twin: ratio of the covariance along the path at 5 s to the closed law",
         "as for the published vehicle",
     )
-    return Observed("growth.twin", SYSTEM, what, float(found / expected), "").within(1.0, 0.05, why, "closed form")
+    return Observed("growth.twin", SYSTEM, what, float(deviation / expected), "").within(1.0, 0.05, why, "closed form")
 
 
 def _engine_rows(folder: Path) -> list[Row]:

@@ -69,26 +69,26 @@ def unstable(engine: str, runner: Runner, quick: bool = False) -> dict[str, int]
 
 def _word(engine: str, name: str, step: float, duration: float, runner: Runner) -> str:
     try:
-        found = runner(engine, road(), step, duration, name).states
+        states = runner(engine, road(), step, duration, name).states
     except InputError:
         return "refused"
     except RunFailed:
         return "raised"
     truth = _truth(duration)[:: round(step / 1e-3)]
-    share = np.abs(found - truth).max() / np.abs(truth - truth[0]).max()
+    share = np.abs(states - truth).max() / np.abs(truth - truth[0]).max()
     return "right" if share <= WRONG else "SILENT"
 
 
 def not_a_number(engine: str) -> dict[str, str]:
     """A NaN in the force samples given past the file reader, every integrator, held and linear."""
-    base, found = setups.vehicle(), {}
+    base, endings = setups.vehicle(), {}
     for name in integrators(engine):
         for held in (True, False):
             forces = setups.static_forces(base, 102, 1e-3, held)
             forces.values[57, 0] = np.nan
             attempt = partial(setups.run, engine, setups.driven(base, forces), 1e-3, 0.1, name)
-            found[f"{name}, {'held' if held else 'linear'}"] = ending(attempt)
-    return found
+            endings[f"{name}, {'held' if held else 'linear'}"] = ending(attempt)
+    return endings
 
 
 def constrained(engine: str) -> dict[str, str]:
@@ -105,9 +105,9 @@ def constrained_unchecked() -> dict[str, str]:
     return {name: ending(partial(setups.unchecked, "exudyn", scene, 1e-3, 0.5, name)) for name in explicit}
 
 
-def _all(found: dict[str, str], word: str) -> str:
+def _all(endings: dict[str, str], word: str) -> str:
     """The expected word if all runs ended so, else the ones that did not."""
-    other = [f"{name}: {ended}" for name, ended in found.items() if ended != word]
+    other = [f"{name}: {ended}" for name, ended in endings.items() if ended != word]
     return "; ".join(other) or word
 
 
@@ -118,14 +118,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     for engine in CATALOGUE:
         rows += _unstable_rows(engine, endings, quick)
         rows += _input_rows(engine)
-    for name, found in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
+    for name, endings_of in (("refused", constrained("exudyn")), ("raised", constrained_unchecked())):
         how = "" if name == "refused" else ", with the check bypassed"
         rows.append(
             behaves(
                 f"guards.constraint.exudyn.{name}",
                 SYSTEM,
-                f"an integrator that ignores the active constraint, Exudyn, all {len(found)}{how}",
-                _all(found, name),
+                f"an integrator that ignores the active constraint, Exudyn, all {len(endings_of)}{how}",
+                _all(endings_of, name),
                 name,
                 "Exudyn's explicit solvers freeze or free the pitch without a word",
             )
@@ -196,8 +196,8 @@ def _unstable_rows(engine: str, endings: Saved, quick: bool) -> list[Row]:
 def _input_rows(engine: str) -> list[Row]:
     numbers = not_a_number(engine)
     caught = {name: "caught" if ended in ("raised", "refused") else ended for name, ended in numbers.items()}
-    with TemporaryDirectory() as own:
-        file = ending(lambda: sampled_input.damaged(engine, Path(own)))
+    with TemporaryDirectory() as place:
+        file = ending(lambda: sampled_input.damaged(engine, Path(place)))
     return [
         behaves(
             f"guards.nan-file.{engine}",

@@ -28,9 +28,9 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """A row per case and implementation; quick: the last case of each family and every twenty-fourth before it."""
     known, rows, data = cases_by_family(), list[Row](), list[Saved]()
     for family, case in some(known) if quick else known:
-        with TemporaryDirectory() as own:
-            outcomes = {name: judge(case, name, Path(own)) for name in case.judged()}
-            naive = case.naive(Path(own)) if case.naive else ""
+        with TemporaryDirectory() as place:
+            outcomes = {name: judge(case, name, Path(place)) for name in case.judged()}
+            naive = case.naive(Path(place)) if case.naive else ""
         rows += [_row(case, name, outcome) for name, outcome in outcomes.items()]
         told = {key: getattr(case, key) for key in ("name", "hard", "check", "unit", "tolerance")}
         said = {name: asdict(outcome) for name, outcome in outcomes.items()}
@@ -43,14 +43,14 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
             "hard.silent",
             SYSTEM,
             f"silent wrong answers in {share} hard cases, {sum(map(len, words))} outcomes",
-            sum(own.count("SILENT") for own in words),
+            sum(place.count("SILENT") for place in words),
             "",
         ).at_most(0.0, "a finite wrong answer without a word is never accepted", "none"),
         Observed(
             "hard.passed",
             SYSTEM,
             "hard cases that every implementation answers right, refuses or says it failed",
-            sum("SILENT" not in own for own in words),
+            sum("SILENT" not in place for place in words),
             "cases",
         ).within(len(data), 0, f"every one; {share} were run", "none"),
         Observed(
@@ -67,7 +67,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def some(known: Sequence[tuple[str, Case]]) -> list[tuple[str, Case]]:
     """The quick share: the last case of each family, and every EVERY-th before it."""
     families = dict.fromkeys(family for family, _ in known)
-    return [pair for name in families for pair in [own for own in known if own[0] == name][::-EVERY]]
+    return [pair for name in families for pair in [case for case in known if case[0] == name][::-EVERY]]
 
 
 def _row(case: Case, implementation: str, outcome: Outcome) -> Row:
@@ -110,11 +110,12 @@ def _counts(data: Saved) -> Table:
     groups["all"] = data["cases"]
     known["all"] = len(data["known"])
     ended = {
-        name: Counter(o["word"] for entry in own for o in entry["outcomes"].values()) for name, own in groups.items()
+        name: Counter(o["word"] for entry in in_group for o in entry["outcomes"].values())
+        for name, in_group in groups.items()
     }
     rows = tuple(
-        (name.replace("_", " "), f"{len(own)} of {known[name]}", *(str(ended[name][word]) for word in WORDS))
-        for name, own in groups.items()
+        (name.replace("_", " "), f"{len(in_group)} of {known[name]}", *(str(ended[name][word]) for word in WORDS))
+        for name, in_group in groups.items()
     )
     return Table(
         "Hard cases by family",

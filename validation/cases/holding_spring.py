@@ -68,13 +68,13 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """For each setting 0.6 of the law fails, 1.2 holds; in full also the stiffness by bisection; quick: one setting."""
     measured = _measure(folder)
     settings = JUDGED[2:3] if quick else JUDGED
-    rows = [row for one in settings for row in _ends(one, measured, "reference")]
-    found: list[Any] = []
+    rows = [row for setting in settings for row in _ends(setting, measured, "reference")]
+    smallest: list[Any] = []
     if not quick:
         rows += [row for engine in ("exudyn", "mujoco") for row in _ends(JUDGED[3], measured, engine)]
-        found = [(str(one), _smallest(one, measured)) for one in (*JUDGED, *TOLD)]
-        rows += [_found_row(i, name, stiffness, measured.law) for i, (name, stiffness) in enumerate(found)]
-    return rows, {"law": measured.law, "found": found}
+        smallest = [(str(setting), _smallest(setting, measured)) for setting in (*JUDGED, *TOLD)]
+        rows += [_found_row(i, name, stiffness, measured.law) for i, (name, stiffness) in enumerate(smallest)]
+    return rows, {"law": measured.law, "found": smallest}
 
 
 def _measure(folder: Path) -> FreeRuns:
@@ -86,25 +86,25 @@ def _measure(folder: Path) -> FreeRuns:
     return FreeRuns(true["pitch"], {False: quiet, True: replace(noisy, initial=quiet.initial)}, law)
 
 
-def _error(one: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
+def _error(setting: Setting, stiffness: float, measured: FreeRuns, engine: str = "reference") -> float:
     """Largest pitch error (rad) of a run on a spring (N m/rad)."""
-    free = measured.runs[one.disturbed]
-    damping = 2 * one.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
+    free = measured.runs[setting.disturbed]
+    damping = 2 * setting.damping * math.sqrt(stiffness * rigid_pitch(measured.runs[False].parameters).total)
     held = pitch_spring.extend(free, pitch_spring.Parameters(stiffness=stiffness, damping=damping))
     return float(np.abs(simulate(free.scene, engine, assembly=held)["pitch"] - measured.pitch).max())
 
 
-def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:
+def _ends(setting: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     """Too soft a spring fails and a little more than the law holds."""
     rows = []
     for factor, expected in ((0.6, "fails"), (1.2, "holds")):
-        off = _error(one, factor * measured.law, measured, engine)
-        key = f"holding_spring.{expected}.{engine}.{one.damping:g}{'.disturbed' if one.disturbed else ''}"
+        off = _error(setting, factor * measured.law, measured, engine)
+        key = f"holding_spring.{expected}.{engine}.{setting.damping:g}{'.disturbed' if setting.disturbed else ''}"
         rows.append(
             behaves(
                 key,
                 SYSTEM,
-                f"spring of {factor} of the predicted {measured.law:.1f} N m/rad, {one}, {engine}",
+                f"spring of {factor} of the predicted {measured.law:.1f} N m/rad, {setting}, {engine}",
                 "holds" if off <= HELD else "fails",
                 expected,
                 f"largest pitch error {off:.3f} rad in {DURATION:g} s, {HELD} allowed",
@@ -114,14 +114,14 @@ def _ends(one: Setting, measured: FreeRuns, engine: str) -> list[Row]:
     return rows
 
 
-def _smallest(one: Setting, measured: FreeRuns) -> float:
+def _smallest(setting: Setting, measured: FreeRuns) -> float:
     """Smallest stiffness (N m/rad) that holds, by bisection; not a number if the upper end does not hold."""
     low, high = 0.5 * measured.law, 1.3 * measured.law
-    if _error(one, high, measured) > HELD:
+    if _error(setting, high, measured) > HELD:
         return math.nan
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _error(one, middle, measured) <= HELD else (middle, high)
+        low, high = (low, middle) if _error(setting, middle, measured) <= HELD else (middle, high)
     return high
 
 
@@ -140,8 +140,8 @@ def _found_row(index: int, name: str, stiffness: float, law: float) -> Row:
 def tables(data: Saved) -> list[Table]:
     """Stiffness found in each setting."""
     rows = tuple(
-        (name, "none below 1.3 of the law" if math.isnan(found) else f"{found:.1f}", f"{data['law']:.1f}")
-        for name, found in data["found"]
+        (name, "none below 1.3 of the law" if math.isnan(stiffness) else f"{stiffness:.1f}", f"{data['law']:.1f}")
+        for name, stiffness in data["found"]
     )
     heads = ("setting", "smallest found [N m/rad]", "predicted [N m/rad]")
     note = f"Study road at 20 m/s, {DURATION:g} s; held is a pitch error of at most {HELD} rad."

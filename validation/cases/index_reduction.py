@@ -106,14 +106,14 @@ def _drive(folder: Path, duration: float) -> Files:
 def _paths(assembly: Assembly, files: Files) -> dict[str, np.ndarray]:
     """Pitch minus true pitch (n,) by formulation, each from the assembly's initial state."""
     duration = files.duration
-    found = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
+    paths = {name: IndexOne(assembly, **values).run(STEP, duration) for name, values in HAND.items()}
     for name, integrator in EXUDYN.items():
-        found[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
-    found |= {
+        paths[name] = AsItComes(assembly, Settings(integrator, STEP, duration, spectral_radius=0.6)).run().states
+    paths |= {
         f"eliminated, {engine}": build(engine, assembly, Settings("RK4", STEP, duration)).run().states
         for engine in ("reference", "mujoco")
     }
-    return {name: states[:, 3] - files.pitch for name, states in found.items()}
+    return {name: states[:, 3] - files.pitch for name, states in paths.items()}
 
 
 def _gaps(files: Files) -> dict[str, np.ndarray]:
@@ -126,14 +126,14 @@ def _gaps(files: Files) -> dict[str, np.ndarray]:
 
 def _loose(files: Files) -> dict[str, np.ndarray]:
     """Pitch minus true pitch (n,) under noisy forces and no guidance, by the solvers of both engines."""
-    own = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
+    noisy = assemble(files.scene(force_noise={"deviation": FORCE_NOISE, "seed": SEED}))
     solvers = {
         "Exudyn's solver of index 2": ("exudyn", "TrapezoidalIndex2"),
         "Exudyn's solver of index 3": ("exudyn", "GeneralizedAlpha"),
         "Runge-Kutta": ("reference", "RK4"),
     }
     return {
-        name: build(engine, own, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
+        name: build(engine, noisy, Settings(integrator, STEP, files.duration, spectral_radius=0.6)).run().states[:, 3]
         - files.pitch
         for name, (engine, integrator) in solvers.items()
     }
@@ -213,14 +213,14 @@ def _index_two_refused() -> Row:
     try:
         system.SolveDynamic(options, solverType=exu.DynamicSolverType.GeneralizedAlpha)
     except (exu.ExudynError, RuntimeError, ValueError) as error:
-        found = "refused" if "useNewmark" in str(error) else str(error)
+        ended = "refused" if "useNewmark" in str(error) else str(error)
     else:
-        found = "answered"
+        ended = "answered"
     return behaves(
         "index_reduction.exudyn.alpha_2",
         SYSTEM,
         "Exudyn's generalised-alpha solver is asked to run with its flag for index 2",
-        found,
+        ended,
         "refused",
         "index 2 is there with the trapezoidal rule alone",
     )

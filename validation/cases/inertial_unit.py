@@ -126,7 +126,7 @@ def _three_axes(paths: int) -> list[Row]:
     count = round(SPAN / PERIOD)
     rates, root = turning(count, PERIOD), PERIOD**0.5
     equal = errors(rates, PERIOD, EQUAL / root * np.ones(3), paths)
-    found = errors(rates, PERIOD, UNEQUAL / root, paths)
+    wandered = errors(rates, PERIOD, UNEQUAL / root, paths)
     trace, exact = np.trace(matrix(equal), axis1=1, axis2=2), mean_error(UNEQUAL, rates, PERIOD, START)
     resting = mean_error(UNEQUAL, np.zeros_like(rates), PERIOD, START)
     all_equal = np.full(3, EQUAL)
@@ -149,7 +149,7 @@ def _three_axes(paths: int) -> list[Row]:
         _mean(
             "scalar.unequal",
             "mean scalar part q1 of the error's quaternion, unequal axes, turning body",
-            found[:, 0],
+            wandered[:, 0],
             mean_scalar(UNEQUAL, SPAN),
             "exp(-sum of s^2 t / 8): the quaternion cannot see which axis is noisy",
         ),
@@ -163,7 +163,7 @@ def _three_axes(paths: int) -> list[Row]:
         _small(
             "matrix",
             "error of the mean rotation matrix with unequal noise, turning body, worst entry over its standard error",
-            standard_errors(found, exact),
+            standard_errors(wandered, exact),
             "",
             f"{paths:,} paths, seed {SEED}; entries differ from the identity by "
             f"up to {np.abs(exact - np.eye(3)).max():.2f}",
@@ -174,7 +174,7 @@ def _three_axes(paths: int) -> list[Row]:
             SYSTEM,
             "difference of the mean rotation matrix of a turning body from the law of a body at "
             "rest, worst entry over its standard error",
-            standard_errors(found, resting),
+            standard_errors(wandered, resting),
             "",
         ).beside(f"far beyond {LEVEL}", "the rows above can tell the laws apart", "closed form"),
     ]
@@ -265,14 +265,14 @@ def _ten_minutes(paths: int) -> CaseAnswer:
     t = np.arange(round(TEN_MINUTES * RATE)) / RATE
     rates = np.column_stack([0.05 * np.sin(5 * t), 0.08 * np.sin(7 * t), 0.1 * np.sin(0.2 * t)])  # a car on a road
     true = true_attitude(rates, 1 / RATE, START)[::every]
-    found = np.array([_path(path, rates, true) for path in range(paths)])
+    wandered = np.array([_path(path, rates, true) for path in range(paths)])
     rows.append(
         mean_square(
             Observed(
                 "inertial_unit.ten_minutes",
                 SYSTEM,
                 "mean square angle per axis of the ten-minute example by Monte Carlo",
-                float(np.mean(found[:, -1] ** 2)),
+                float(np.mean(wandered[:, -1] ** 2)),
                 "deg^2",
             ),
             axis**2,
@@ -280,13 +280,17 @@ def _ten_minutes(paths: int) -> CaseAnswer:
             f"{paths} paths of 600,000 steps, seed {SEED}",
         )
     )
-    return rows, {"paths": found[:8].tolist(), "rms": np.sqrt(np.mean(found**2, axis=(0, 2))).tolist(), "count": paths}
+    return rows, {
+        "paths": wandered[:8].tolist(),
+        "rms": np.sqrt(np.mean(wandered**2, axis=(0, 2))).tolist(),
+        "count": paths,
+    }
 
 
 def _path(path: int, rates: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Error angles (601, 3) in degrees about the global axes of one noisy path, at the times of ``true`` (601, 4)."""
-    found = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
-    return np.degrees(logarithm(error_rotation(found[:: len(rates) // (len(true) - 1), 0], true)))
+    attitudes = measured_attitude(rates, 1 / RATE, DEVIATION * np.ones(3), START, range(path, path + 1), SEED)
+    return np.degrees(logarithm(error_rotation(attitudes[:: len(rates) // (len(true) - 1), 0], true)))
 
 
 def _bias(paths: int) -> list[Row]:
@@ -329,13 +333,13 @@ def _section_forces() -> list[Row]:
         write_time_series(place / "wrong.csv", {"pitch": ("rad", wrong)}, scene.run.step)
         guided = simulate(follow({}, {"prescribed_pitch": {"file": "wrong.csv"}}), "reference")
     pairs = ((guided, guided), (true, guided), (true, true))
-    found, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
+    corrected, turned, before = (section_forces(run["f3"], run["f4"], pitched["pitch"]) for run, pitched in pairs)
     return [
         _small(
             f"section.{name}",
             f"difference of {name} of a run guided by a pitch that goes wrong by {size} rad in 10 s from "
             "the true force turned by that angle, over the change",
-            rms(found[name] - turned[name]) / rms(turned[name] - before[name]),
+            rms(corrected[name] - turned[name]) / rms(turned[name] - before[name]),
             "",
             "f3 and f4 are those of the true run: a slow angle error leaves no inertia force",
             0.01,
@@ -353,11 +357,11 @@ def _recording(paths: int) -> CaseAnswer:
             not_run(f"inertial_unit.recording{end}", SYSTEM, f"a minute in a real car: {what}", reason)
             for end, what in (("", "gyro against camera"), (".law", "noise law on its motion"))
         ], {}
-    own = recording.read(path)
-    off = np.degrees(recording.gyro_error(own))
-    rates, period = own.rates[::5], 5 * recording.PERIOD
+    recorded = recording.read(path)
+    off = np.degrees(recording.gyro_error(recorded))
+    rates, period = recorded.rates[::5], 5 * recording.PERIOD
     deviation = np.array([0.02, 0.05, 0.1]) / period**0.5
-    found = errors(rates, period, deviation, paths)
+    wandered = errors(rates, period, deviation, paths)
     law = mean_error(deviation * period**0.5, rates, period, START)
     return [
         Observed(
@@ -371,7 +375,7 @@ def _recording(paths: int) -> CaseAnswer:
         _small(
             "recording.law",
             "error of the mean rotation matrix of noise on the car's motion, worst entry over its standard error",
-            standard_errors(found, law),
+            standard_errors(wandered, law),
             "",
             f"the recorded rates, read each 50 ms, as the true motion; {paths:,} paths, seed {SEED}",
             LEVEL,
@@ -393,7 +397,7 @@ def draw(data: Saved) -> Drawn:
     """Like the paper's Figure 2, and the recorded minute, where they were measured."""
     from models.drawing.figures import BLUE, WIDE, heading, plt
 
-    found = []
+    figures = []
     if data["ten minutes"]:
         figure, axes = plt.subplots(1, 3, figsize=(WIDE, 3.0), sharey=True)
         paths, walk = np.array(data["ten minutes"]["paths"]), math.degrees(random_walk(DEVIATION, RATE))
@@ -405,11 +409,11 @@ def draw(data: Saved) -> Drawn:
             axis.set(title=f"about global {'xyz'[i]} [deg]", xlabel="time [s]")
         axes[0].legend(loc="upper left")
         heading(figure, "Error of the attitude from noisy rates, 8 paths: 0.1 rad/s at 1 kHz")
-        found.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
+        figures.append(("Error angles of the ten-minute example, as in the paper's Figure 2.", figure))
     if data["recording"]:
         figure, axis = plt.subplots(figsize=(6, 3.2))
         axis.plot(0.2 * np.arange(len(data["recording"]["off"])), data["recording"]["off"])
         axis.set(title="angle between gyro and camera [deg]", xlabel="time [s]")
         heading(figure, "A minute in a real car: attitude from the gyro alone")
-        found.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
-    return found
+        figures.append(("Attitude from a telephone's gyro against its camera's pose (comma2k19).", figure))
+    return figures

@@ -103,20 +103,20 @@ def _counted(folder: Path) -> np.ndarray:
     ]
     subprocess.run(command, env=settled, check=True, capture_output=True, timeout=PATIENCE)
     marches = len(CURVES) * len(STEPS)
-    found = [
+    counts = [
         [_total(path.with_name(f"{path.name}.{i}")) for i in range(2, marches + 2)]
         for path in folder.glob("count.*")
         if path.with_name(f"{path.name}.{marches + 1}").exists()
     ]
     shutil.rmtree(folder)
-    return np.array(found, float).reshape(2, -1, len(STEPS))
+    return np.array(counts, float).reshape(2, -1, len(STEPS))
 
 
 def _total(dump: Path) -> int:
     """Instructions of one dump."""
-    found = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
-    assert found is not None
-    return int(found[1])
+    matched = re.search(r"^totals: (\d+)", dump.read_text(errors="replace"), re.MULTILINE)
+    assert matched is not None
+    return int(matched[1])
 
 
 def tables(data: Saved) -> list[Table]:

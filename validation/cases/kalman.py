@@ -65,19 +65,20 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 def _consistency_rows(folder: Path, count: int, duration: float, filters: tuple[str, ...]) -> list[Row]:
     """Mean NEES and NIS per degree of freedom; the filters that are told a wrong noise get a quarter of the runs."""
-    found: dict[str, list[Any]] = {name: [] for name in filters}
+    by_filter: dict[str, list[Any]] = {name: [] for name in filters}
     for i in range(count):
         scales = {name: FILTERS[name] for name in filters if name == "right" or i < count // 4}
-        for name, one in runs.consistency(folder, duration, SEED + i, scales).items():
-            found[name].append(one)
+        for name, consistent in runs.consistency(folder, duration, SEED + i, scales).items():
+            by_filter[name].append(consistent)
     errors, surprises = (
-        {name: np.concatenate([one[j] for one in some]) for name, some in found.items()} for j in (0, 1)
+        {name: np.concatenate([consistent[j] for consistent in some]) for name, some in by_filter.items()}
+        for j in (0, 1)
     )
     each, every = f"{count} runs, once a second", f"{count} runs, all innovations"
     rows = [
         _band_row("nees", "normalised error squared of 6 states", errors["right"], 6, each),
         _band_row("nis", "normalised innovation squared", surprises["right"], 1, every),
-        *_named_rows([one[2] for one in found["right"]]),
+        *_named_rows([consistent[2] for consistent in by_filter["right"]]),
     ]
     if "Q" in filters:
         rows += [
@@ -94,7 +95,7 @@ BIAS, SLUGGISH = 0.2, 0.3
 def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
     """Right filters that are called inconsistent, and wrong ones that are not."""
     count = len(innovations)
-    alarms = sum(not consistency(one, ("pitch",)).consistent for one in innovations)
+    alarms = sum(not consistency(each, ("pitch",)).consistent for each in innovations)
     planted: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "larger by a quarter": lambda w: 1.25 * w,
         f"with a mean of {BIAS:g} deviations": lambda w: w + BIAS,
@@ -107,7 +108,7 @@ def _named_rows(innovations: list[np.ndarray]) -> list[Row]:
         )
     ]
     for words, plant in planted.items():
-        silent = sum(consistency(plant(one), ("pitch",)).consistent for one in innovations)
+        silent = sum(consistency(plant(each), ("pitch",)).consistent for each in innovations)
         id, what = f"kalman.named.{words.split()[0]}", f"filters whose innovations are {words} and that are not named"
         rows.append(Observed(id, SYSTEM, what, silent, "").at_most(0, f"of {count} runs", "closed form"))
     return rows
@@ -150,19 +151,19 @@ def _gap_rows(folder: Path, duration: float, outage: tuple[float, float] | None,
     """Angle, rate and both from a file with holes."""
     rows = []
     for name in sensors:
-        found = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
+        gaps = with_gaps(folder, duration, SEED, SENSORS[name], LOST, outage)
         held = f"{LOST:.0%} of the samples lost" + (f", none from {outage[0]:g} to {outage[1]:g} s" if outage else "")
         id, words = f"kalman.gaps.{name.replace(' ', '-')}", "largest ratio of the pitch error to its stated deviation"
-        why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {found['deviation']:.2g} rad"
+        why = f"Gaussian: 5 deviations are left once in 1.7 million; deviation up to {gaps['deviation']:.2g} rad"
         rows.append(
-            Observed(id, SYSTEM, f"{words}, {name}, {held}", found["error by deviation"], "").at_most(
+            Observed(id, SYSTEM, f"{words}, {name}, {held}", gaps["error by deviation"], "").at_most(
                 5.0, why, "closed form"
             )
         )
         rows.append(
             Observed(
-                f"{id}.count", SYSTEM, f"cells that hold no number and are not counted, {name}", found["miscounted"], ""
-            ).at_most(0.0, f"{found['missed']:.0f} were written", "closed form")
+                f"{id}.count", SYSTEM, f"cells that hold no number and are not counted, {name}", gaps["miscounted"], ""
+            ).at_most(0.0, f"{gaps['missed']:.0f} were written", "closed form")
         )
     return rows
 
@@ -179,7 +180,7 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     force = at_period(35.0, COARSE)
     step, covariance = closed_loop(folder, force)
     errors = [loop_errors(folder, force, LOOP, SEED + i) for i in range(LOOP_RUNS)]
-    squares = np.mean([np.mean(one**2, axis=0) for one in errors], axis=0)
+    squares = np.mean([np.mean(each**2, axis=0) for each in errors], axis=0)
     spread = spread_of_mean_square(step, covariance, sum(map(len, errors)))
     names = ("z1 - z3", "z2 - z3", "pitch", "z1' - z3'", "z2' - z3'", "pitch rate")
     rows, table = [], []
@@ -200,7 +201,7 @@ def _loop_rows(folder: Path) -> tuple[list[Row], list[list[float]]]:
     return rows, table
 
 
-def _gyro_rows(found: dict[str, float]) -> list[Row]:
+def _gyro_rows(gyro: dict[str, float]) -> list[Row]:
     words = "pitch deviation that a gyro of 0.1 rad/s at 1 kHz alone leaves after 600 s"
     why = "the instability makes the pitch visible in its rate; lambda from the true run is good to 5 %"
     return [
@@ -208,14 +209,14 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
             "kalman.gyro",
             SYSTEM,
             f"ratio of {words} to the averaged Riccati equation",
-            found["stated"] / found["law"],
+            gyro["stated"] / gyro["law"],
             "",
         ).within(1.0, 0.1, why, "closed form"),
         Observed(
             "kalman.gyro.error",
             SYSTEM,
             "ratio of the filter's actual error, rms from 100 s on, to the stated deviation",
-            found["error"] / found["stated"],
+            gyro["error"] / gyro["stated"],
             "",
         ).within(
             1.0,
@@ -228,9 +229,9 @@ def _gyro_rows(found: dict[str, float]) -> list[Row]:
             "kalman.gyro.level",
             SYSTEM,
             "pitch deviation after 600 s of a filter linearised about a level vehicle, A(0): a random walk",
-            found["walk"],
+            gyro["walk"],
             "rad",
-        ).beside(found["stated"], "nothing in A(0) shows the pitch", "closed form"),
+        ).beside(gyro["stated"], "nothing in A(0) shows the pitch", "closed form"),
     ]
 
 
@@ -238,7 +239,7 @@ def _damage_rows(damage: list[dict[str, dict[str, float]]]) -> list[Row]:
     rows = []
     for engine in ENGINES:
         for name in CHANNELS:
-            ratios = np.array([one[engine][name] for one in damage])
+            ratios = np.array([each[engine][name] for each in damage])
             why = (
                 f"wrong model, noise of 0.2 %, 0.1 degree white; {len(ratios)} noise samples, standard deviation "
                 f"{ratios.std(ddof=1):.2%}, from {ratios.min():.4f} to {ratios.max():.4f}"
@@ -258,11 +259,11 @@ ESTIMATED = "mean share by which the estimated 1/I is above the model's"
 
 def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str, float]]) -> list[Row]:
     """Moments by the inertia term: with a right model, and the part of a wrong one that is no inertia."""
-    own = [one["reference"] for one in damage]
+    reference = [each["reference"] for each in damage]
     rows = []
     for name, words, some, key in (
         ("right", "artificial moment, right model", right, "all"),
-        ("pull", "artificial moment without what the inertia lacks, wrong model", own, "pull"),
+        ("pull", "artificial moment without what the inertia lacks, wrong model", reference, "pull"),
     ):
         for band, range_ in (("", "all frequencies"), (", band", "up to 15 Hz")):
             rows.append(
@@ -270,11 +271,11 @@ def _moment_rows(damage: list[dict[str, dict[str, float]]], right: list[dict[str
                     f"kalman.moment.{name}{band.replace(', ', '.')}",
                     SYSTEM,
                     f"ratio of {words} to the rms of I beta'', {range_}",
-                    max(one[key + band] for one in some),
+                    max(each[key + band] for each in some),
                     "",
                 ).at_most(0.02, "largest of all samples; 0.4 % were seen when the settings were chosen", "none")
             )
-    total, inertia = (np.array([one[key] for one in own]) for key in ("all, band", "inertia"))
+    total, inertia = (np.array([each[key] for each in reference]) for key in ("all, band", "inertia"))
     shown = (
         ("moment.wrong", "all artificial moments, wrong model, up to 15 Hz", total, 0.05, 0.005, LACKS),
         ("inertia", ESTIMATED, inertia, -0.05, 3e-3, f"I is 5 % too small; samples spread by {np.std(inertia):.1e}"),
@@ -294,8 +295,8 @@ def tables(data: Saved) -> list[Table]:
         (
             engine,
             *(
-                f"{np.mean([one[engine][key] for one in data['damage']]):.4f} +- "
-                f"{np.std([one[engine][key] for one in data['damage']], ddof=1):.4f}"
+                f"{np.mean([each[engine][key] for each in data['damage']]):.4f} +- "
+                f"{np.std([each[engine][key] for each in data['damage']], ddof=1):.4f}"
                 for key in keys
             ),
         )
@@ -313,8 +314,8 @@ def tables(data: Saved) -> list[Table]:
         "pitch error",
     )
     loop = tuple(
-        (("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{found:.3e}")
-        for i, (law, found) in enumerate(data["deviations"])
+        (("estimate", "run")[i // 6], str(i % 6), f"{law:.3e}", f"{stated:.3e}")
+        for i, (law, stated) in enumerate(data["deviations"])
     )
     return [
         Table("Stabilised runs, wrong model and noisy forces", note, heads, rows),

@@ -76,10 +76,10 @@ def _accelerations(parameters: str) -> list[Row]:
     """Both engines beside the written equations, at states that are half a metre and 3 m/s wide."""
     rows = []
     for geometry in ("exact", "linear"):
-        own = scene(parameters, geometry, 2.0, 1e-3, road=True)
-        assembly = assemble(own)
+        lifting = scene(parameters, geometry, 2.0, 1e-3, road=True)
+        assembly = assemble(lifting)
         for engine in ENGINES:
-            error = acceleration_gap(checks.engine(engine), assembly, settings_of(own, engine))
+            error = acceleration_gap(checks.engine(engine), assembly, settings_of(lifting, engine))
             what = "acceleration at 100 random states, wheels in the air and hit among them"
             rows.append(
                 Observed(
@@ -96,8 +96,8 @@ def _accelerations(parameters: str) -> list[Row]:
 
 def _paths(parameters: str, duration: float) -> list[Row]:
     """Whole paths on the study road at the same step; the least load of any of them."""
-    own = scene(parameters, duration=duration, step=5e-4, road=True)
-    runs = {engine: simulate(own, engine) for engine in ALL}
+    lifting = scene(parameters, duration=duration, step=5e-4, road=True)
+    runs = {engine: simulate(lifting, engine) for engine in ALL}
     rows = [
         Observed(
             f"lift_off.path.{engine}.{parameters}",
@@ -136,12 +136,12 @@ def _exact(duration: float) -> list[Row]:
     rows = []
     dampers: dict[str, dict[str, float]] = {"as they are": {}, "of 5 kN s/m": {"d1": 5e3, "d2": 5e3}}
     for what, override in dampers.items():
-        own = scene(geometry="linear", duration=duration, override=override)
-        assembly = assemble(own)
+        lifting = scene(geometry="linear", duration=duration, override=override)
+        assembly = assemble(lifting)
         exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in ALL:
-            error = float(np.abs(simulate(own, engine).states - exact).max())
-            name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
+            error = float(np.abs(simulate(lifting, engine).states - exact).max())
+            name = f"lift_off.exact.{engine}.{'stiff' if override else 'lifting'}"
             rows.append(
                 Observed(
                     name,
@@ -162,12 +162,12 @@ def _exact(duration: float) -> list[Row]:
 )
 def _order(halvings: int) -> Row:
     """Slope of the error over the step."""
-    own = scene(geometry="linear")
+    lifting = scene(geometry="linear")
     steps, coarse = 1e-3 / 2.0 ** np.arange(halvings), 1e-3
-    exact = Bounces(assemble(own), coarse).path(assemble(own).initial, round(1.0 / coarse))
+    exact = Bounces(assemble(lifting), coarse).path(assemble(lifting).initial, round(1.0 / coarse))
     errors = []
     for step in steps:
-        states = simulate(own, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
+        states = simulate(lifting, "reference", Settings("RK4", step, 1.0)).states[:: round(coarse / step)]
         errors.append(float(np.abs(states - exact).max()))
     slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
     what = f"observed order of RK4 through landings, {halvings - 1} halvings of 1 ms"
@@ -184,22 +184,22 @@ def _energy(duration: float) -> list[Row]:
     """What a bouncing vehicle gains, and what one without dampers loses."""
     rows = []
     for engine in ALL:
-        own = scene(duration=duration, override=UNDAMPED)
-        states = simulate(own, engine).states
-        found = energy(assemble(own), states)
-        size = found[0] - energy(assemble(own), np.zeros((1, 8)))[0]  # by its fall to the road
+        undamped = scene(duration=duration, override=UNDAMPED)
+        states = simulate(undamped, engine).states
+        energies = energy(assemble(undamped), states)
+        size = energies[0] - energy(assemble(undamped), np.zeros((1, 8)))[0]  # by its fall to the road
         rows.append(
             Observed(
                 f"lift_off.energy.{engine}",
                 SYSTEM,
                 f"change of energy of a bouncing vehicle without dampers, {duration:g} s, {engine}",
-                float(np.abs(found - found[0]).max() / size),
+                float(np.abs(energies - energies[0]).max() / size),
                 "of the fall's",
             ).at_most(1e-4, "the error of the step", "closed form")
         )
         damped = scene(duration=duration, override=UNDAMPED | {"d1": 2e3, "d2": 500.0})
-        found = energy(assemble(damped), simulate(damped, engine).states)
-        gain = float((found - np.minimum.accumulate(found)).max() / size)
+        energies = energy(assemble(damped), simulate(damped, engine).states)
+        gain = float((energies - np.minimum.accumulate(energies)).max() / size)
         rows.append(
             Observed(
                 f"lift_off.gain.{engine}",
@@ -215,11 +215,11 @@ def _energy(duration: float) -> list[Row]:
 @allowing("what the linear tyre does is what is shown")
 def _pulls(quick: bool) -> list[Row]:
     """What the paper's linear tyre does on the study road, and what difference it makes."""
-    own = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
-    lifting, linear = simulate(own, "reference"), simulate(without(own, "lift_off"), "reference")
+    lifting_scene = scene(VEHICLES[0], duration=4.0 if quick else 20.0, step=5e-4, road=True)
+    lifting, linear = simulate(lifting_scene, "reference"), simulate(without(lifting_scene, "lift_off"), "reference")
     loads = _loads(linear)
     deviations = [rms(_loads(run) - loads.mean(axis=1)[:, None]) for run in (linear, lifting)]
-    what = f"the paper's vehicle and tyre on the study road, {own.run.duration:g} s"
+    what = f"the paper's vehicle and tyre on the study road, {lifting_scene.run.duration:g} s"
     share = 100.0 * float((loads < 0.0).any(axis=0).mean())
     words = "ratio of the rms of the dynamic wheel loads with tyres that lift to that of linear tyres"
     pulls = "share of time in which a wheel pulls on the road, the paper's vehicle and tyre on the study road, 4 s"
@@ -243,7 +243,7 @@ def _pulls(quick: bool) -> list[Row]:
 
 def _in_space(quick: bool) -> list[Row]:
     """R19-ride where its tyres lift: accelerations beside the written ones, and both engines on a random road."""
-    own = build_ride(
+    ride = build_ride(
         {
             "title": TITLE,
             "system": "ride",
@@ -253,7 +253,7 @@ def _in_space(quick: bool) -> list[Row]:
             "effects": {"lift_off": {}},
         }
     )
-    car, random, worst = vehicle_of(own), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
+    car, random, worst = vehicle_of(ride), np.random.default_rng(SEED), dict.fromkeys(ENGINES, 0.0)
     damped = replace(car, tyres=tuple(replace(tyre, damping=300.0 + i) for i, tyre in enumerate(car.tyres)))
     written, n, w = SpatialReference(damped), len(car.coordinates()), len(car.tyres)
     models = {engine: build_in_space(engine, damped) for engine in ENGINES}
@@ -264,9 +264,9 @@ def _in_space(quick: bool) -> list[Row]:
         for engine, model in models.items():
             error = float(np.abs(model.acceleration(0.0, q, v, road) - wanted).max() / np.abs(wanted).max())
             worst[engine] = max(worst[engine], error)
-    path = road_path(excitation_of(own, wheels(car)), SPEED, 1e-3)
-    one, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)
-    apart = max(np.abs(one.positions - two.positions).max(), np.abs(one.rates - two.rates).max())
+    path = road_path(excitation_of(ride, wheels(car)), SPEED, 1e-3)
+    first, two = (ridden(engine, car, path, 1.0 if quick else 10.0, seed=SEED, every=20).run for engine in ENGINES)
+    apart = max(np.abs(first.positions - two.positions).max(), np.abs(first.rates - two.rates).max())
     return [
         *(
             Observed(

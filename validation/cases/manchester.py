@@ -54,10 +54,10 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
             "",
         ).within(2.0, 0.0, "the gauge corner takes over from the head", "published")
     )
-    data: dict[str, Any] = {"A-2": [_told(one) for one in placed], "published": published.tolist()}
+    data: dict[str, Any] = {"A-2": [_told(each) for each in placed], "published": published.tolist()}
     if not quick:
         static, each_still = _placed("A-1", CONTACT[::2, 0])
-        data["A-1"] = [_told(one) for one in static]
+        data["A-1"] = [_told(each) for each in static]
         rows += [
             *_static_rows(static),
             *_split_rows(placed[10]),
@@ -72,8 +72,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def _placed(case: str, shifts: np.ndarray) -> tuple[list[Placed], float]:
     """Every position (mm), and the processor's seconds that each took: other cases run beside this one."""
     positions = Positions(start=1e-3 * float(shifts[0]), stop=1e-3 * float(shifts[-1]), count=len(shifts))
-    found = run(SCENE.model_copy(update={"positions": positions}), case=case)
-    return found.detail.placed, found.seconds / len(shifts)
+    placed_run = run(SCENE.model_copy(update={"positions": positions}), case=case)
+    return placed_run.detail.placed, placed_run.seconds / len(shifts)
 
 
 def _published_rows(wheel: str, placed: list[Placed], published: np.ndarray) -> list[Row]:
@@ -119,10 +119,10 @@ def _static_rows(placed: list[Placed]) -> list[Row]:
             for place in places:
                 y, u, angle = searched(contact.side, position, sign, place.wheel_y)
                 gaps.append((1e3 * abs(y - place.touch_y), 1e3 * abs(u - place.wheel_y), abs(angle - place.angle)))
-    one, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
+    first, two = contact.at(4e-3, 3e-3), contact.at(-4e-3, -3e-3)
     mirror = max(
         abs(a / b - 1.0)
-        for wheels in ((one.right, two.left), (one.left, two.right))
+        for wheels in ((first.right, two.left), (first.left, two.right))
         for x, y in zip(*wheels, strict=True)
         for a, b in ((x.y, y.y), (x.normal, y.normal))
     )
@@ -171,12 +171,12 @@ def _axle_row(placed: Placed) -> Row:
 
 def _split_rows(placed: Placed) -> list[Row]:
     """How two patches share the load at 5 mm, in case A-2."""
-    own = [place.normal for place in placed.right]
-    total = sum(own)
+    forces = [place.normal for place in placed.right]
+    total = sum(forces)
     contact = contact_of("A-2")
     alone, (mean, _, plane) = apart(contact, placed), on_one_plane(contact, placed)
     far = {
-        name: 100.0 * max(abs(a - b) for a, b in zip(own, other, strict=True)) / total
+        name: 100.0 * max(abs(a - b) for a, b in zip(forces, other, strict=True)) / total
         for name, other in (("apart", alone), ("one plane", plane))
     }
     return [
@@ -203,8 +203,8 @@ def _split_rows(placed: Placed) -> list[Row]:
 def _load_row(static: list[Placed]) -> Row:
     off = max(
         abs(sum(place.vertical for place in wheel) / SCENE.wheelset.load - 1.0)
-        for one in static
-        for wheel in (one.right, one.left)
+        for each in static
+        for wheel in (each.right, each.left)
     )
     return Observed(
         "manchester.load",
@@ -226,15 +226,15 @@ def _file_rows(placed: list[Placed]) -> list[Row]:
     rail = laid(read_profile(folder / RAIL_FILE, "rail"), Track(inclination=0.0))
     side = Side(read_profile(folder / WHEEL_FILE, "wheel"), rail, Wheelset())
     other = replace(contact_of("A-2"), side=side)
-    chosen = [(one, other.at(one.shift, one.yaw)) for one in placed if round(1e3 * one.shift, 6) in FILES]
-    pairs = [(sums(one, wheel), sums(theirs, wheel)) for one, theirs in chosen for wheel in WHEELS]
+    chosen = [(each, other.at(each.shift, each.yaw)) for each in placed if round(1e3 * each.shift, 6) in FILES]
+    pairs = [(sums(each, wheel), sums(theirs, wheel)) for each, theirs in chosen for wheel in WHEELS]
     off = [(abs(a[0] - b[0]), 100.0 * abs(a[1] / b[1] - 1.0)) for a, b in pairs]
     return [
         Observed(
             f"manchester.files.{name}",
             SYSTEM,
             f"{name}: largest difference of {words}",
-            max(one[k] for one in off),
+            max(each[k] for each in off),
             unit,
         ).at_most(bound, "the bound asked for", "published")
         for name, (unit, bound, k) in names.items()
@@ -284,10 +284,10 @@ def tables(data: dict[str, Any]) -> list[Table]:
             note,
             heads,
             tuple(
-                (f"{one['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
-                for one in data[name]
+                (f"{each['shift']:g}", wheel, *(f"{value:.3f}" for value in patch[:4]), f"{patch[4]:.0f}")
+                for each in data[name]
                 for wheel in WHEELS
-                for patch in one[wheel]
+                for patch in each[wheel]
             ),
         )
         for name in ("A-1", "A-2")
@@ -311,7 +311,7 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
             color=GREY,
             label="CONTACT, all patches together",
         )
-        points = [(one["shift"], patch[value]) for one in data["A-2"] for patch in one["right"]]
+        points = [(each["shift"], patch[value]) for each in data["A-2"] for patch in each["right"]]
         axis.plot(*np.array(points).T, "o", markersize=4, color=BLUE, label="every patch here")
         axis.set_xlabel("displacement of the wheelset [mm]")
     axes[0].set_ylabel("place of contact in the track [mm]")

@@ -119,9 +119,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     virtual = measurement(road=("C", 1, 20.0, 5.0)) if quick else measurement()
     rows, said = [], dict[str, str]()
     for fault in QUICK if quick else QUICK + FULL:
-        found = planted(virtual, folder, fault.spoil, **fault.faults)
-        rows += _rows(fault, found)
-        said[fault.name] = found[0].text if found else "nothing"
+        findings = planted(virtual, folder, fault.spoil, **fault.faults)
+        rows += _rows(fault, findings)
+        said[fault.name] = findings[0].text if findings else "nothing"
     rows.append(_quiet("quick", [planted(virtual, folder)]))
     if not quick:
         rows += [*_clean(folder), *_strangers(folder), *_together(virtual, folder), _spread(virtual, folder)]
@@ -130,9 +130,9 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"said": said}
 
 
-def _size(found: Sequence[Finding], check: str, place: str = "") -> float:
+def _size(findings: Sequence[Finding], check: str, place: str = "") -> float:
     """Size of the first finding of a check at a place; NaN where there is none."""
-    sizes = [one.size for one in found if one.check == check and place in one.place]
+    sizes = [finding.size for finding in findings if finding.check == check and place in finding.place]
     return float("nan") if not sizes or sizes[0] is None else sizes[0]
 
 
@@ -148,26 +148,31 @@ def _none(key: str, quantity: str, texts: list[str], why: str) -> Row:
     return Observed(id, SYSTEM, quantity, len(texts), "").within(0, 0, said, "closed form")
 
 
-def _rows(fault: Planted, found: tuple[Finding, ...]) -> list[Row]:
+def _rows(fault: Planted, findings: tuple[Finding, ...]) -> list[Row]:
     """Named at the right place, nothing else named, and its size."""
     key = fault.name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("^", "")
-    named = any(one.check == fault.check and fault.place in one.place for one in found)
-    alone = all(one.check == fault.check for one in found)
-    word = "named" if named and alone else f"{[one.check for one in found]}"
+    named = any(finding.check == fault.check and fault.place in finding.place for finding in findings)
+    alone = all(finding.check == fault.check for finding in findings)
+    word = "named" if named and alone else f"{[finding.check for finding in findings]}"
     why = f"'{fault.check}' at {fault.place or 'the vehicle'}, and nothing else"
     rows = [
         behaves(f"measured_checks.{key}.named", SYSTEM, f"the planted fault is named: {fault.name}", word, "named", why)
     ]
     if fault.check != "swapped":
-        size = _size(found, fault.check, fault.place)
+        size = _size(findings, fault.check, fault.place)
         rows.append(_sized(f"{key}.size", f"{fault.name}: its size", size, fault.unit, fault.size))
     return rows
 
 
-def _quiet(name: str, found: list[tuple[Finding, ...]]) -> Row:
+def _quiet(name: str, recordings: list[tuple[Finding, ...]]) -> Row:
     """No error and no doubt in clean recordings."""
-    what = f"errors and doubts in {len(found)} clean recordings"
-    return _none(f"clean.{name}", what, [one.text for own in found for one in own], "noise as stated, nothing planted")
+    what = f"errors and doubts in {len(recordings)} clean recordings"
+    return _none(
+        f"clean.{name}",
+        what,
+        [finding.text for findings in recordings for finding in findings],
+        "noise as stated, nothing planted",
+    )
 
 
 def _clean(folder: Path) -> list[Row]:
@@ -180,13 +185,18 @@ def _clean(folder: Path) -> list[Row]:
 
 def _strangers(folder: Path) -> list[Row]:
     """A car that is not the one of the file, R19-free: heavier, or with other springs."""
-    found = {
-        name: findings(replace(own, vehicle=r19()), own.samples(Faults(noise=NOISE), SEED), folder)
-        for name, own in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
+    findings_by_car = {
+        name: findings(replace(of_recording, vehicle=r19()), of_recording.samples(Faults(noise=NOISE), SEED), folder)
+        for name, of_recording in ((name, measurement(name)) for name in ("loaded", "stiff", "worn"))
     }
-    errors = [one.text for own in found.values() for one in own if one.weight == "error"]
+    errors = [
+        finding.text
+        for of_recording in findings_by_car.values()
+        for finding in of_recording
+        if finding.weight == "error"
+    ]
     what = "80 kg more on board than in the file: excess of weight"
-    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _size(found["loaded"], "weight")
+    wanted, excess = 100 * 80 / (r19().loads.sum() / GRAVITY), _size(findings_by_car["loaded"], "weight")
     id, why = "measured_checks.loaded", "what was loaded, 20 %"
     other = "errors named where the car is 80 kg heavier, has springs 20 % stiffer or dampers 30 % weaker than its file"
     return [
@@ -198,13 +208,13 @@ def _strangers(folder: Path) -> list[Row]:
 def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
     """Three faults at once: all of them named."""
     spoil = exchanged(("fl", "fr")), times(1e-3, "rr_fz")
-    found = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})
+    findings = planted(virtual, folder, *spoil, delay={"rl_fz": LATE})
     what, checks = (
         "wheels swapped, kN for N, 3 ms late at once: the findings",
-        ", ".join(sorted({f.check for f in found})),
+        ", ".join(sorted({f.check for f in findings})),
     )
     id = "measured_checks.together.named"
-    last = [one for one in found if one.check == "shift"][-1:]
+    last = [finding for finding in findings if finding.check == "shift"][-1:]
     return [
         behaves(id, SYSTEM, what, checks, "shift, swapped, unit", "each at its place"),
         _sized("together.size", "size of the delay among several faults", _size(last, "shift"), "s", LATE),
@@ -213,8 +223,10 @@ def _together(virtual: VirtualMeasurement, folder: Path) -> list[Row]:
 
 def _spread(virtual: VirtualMeasurement, folder: Path) -> Row:
     """The delay of one channel over samples of noise: its bias."""
-    found = [planted(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
-    late = 1e3 * float(np.mean([_size(own[:1], own[0].check) if own else np.nan for own in found]))
+    samples = [planted(virtual, folder, seed=seed, **QUICK[0].faults) for seed in range(SAMPLES)]
+    late = 1e3 * float(
+        np.mean([_size(findings[:1], findings[0].check) if findings else np.nan for findings in samples])
+    )
     what = f"3 ms late, one force: mean over {SAMPLES} samples of noise"
     why = "5 %: the response is linear, the vehicle is not"
     return Observed("measured_checks.spread", SYSTEM, what, late, "ms").within(3.0, 0.15, why, "closed form")
@@ -227,16 +239,19 @@ def _moving_car(folder: Path) -> list[Row]:
         return [
             not_run("measured_checks.car", SYSTEM, "what the inertial checks say of a moving car", "no recording here")
         ]
-    own = measured_car.samples(path)
-    degrees, down = own.copy(), own.copy()
+    clean = measured_car.samples(path)
+    degrees, down = clean.copy(), clean.copy()
     degrees[:, 4] *= DEGREES
     down[:, :6] *= np.tile(measured_car.TURNED, 2)
-    found = {
+    findings = {
         name: check(measured_car.recording(values, folder / f"{name}.columns"), None)
-        for name, values in (("clean", own), ("degrees", degrees), ("down", down))
+        for name, values in (("clean", clean), ("degrees", degrees), ("down", down))
     }
-    errors = {name: {one.place: one for one in ones if one.weight == "error"} for name, ones in found.items()}
-    turned = [one for place, one in errors["degrees"].items() if place == "q and pitch"]
+    errors = {
+        name: {finding.place: finding for finding in ones if finding.weight == "error"}
+        for name, ones in findings.items()
+    }
+    turned = [finding for place, finding in errors["degrees"].items() if place == "q and pitch"]
     size = turned[0].size if turned and turned[0].size is not None else float("nan")
     what = "moving car with axes right and down, taken for left and up: faults named"
     return [
@@ -261,7 +276,7 @@ def _moving_car(folder: Path) -> list[Row]:
             "measured_checks.car.ratio",
             SYSTEM,
             "ratio of the gyro's pitch rate to that of the camera's pose, moving car",
-            _size(found["clean"], "turning", "pitch"),
+            _size(findings["clean"], "turning", "pitch"),
             "1",
         ).beside(1.0, "a telephone beside a camera at 20 Hz"),
     ]

@@ -52,19 +52,19 @@ def written(path: Path, values: np.ndarray) -> Path:
     return write(path, [Group(NAMES, UNITS, COMMENTS, PERIOD, len(values), blocks)], START, COMMENT)
 
 
-def apart(found: np.ndarray, truth: np.ndarray) -> float:
+def apart(values: np.ndarray, truth: np.ndarray) -> float:
     """Largest difference by the size of the value; inf where gaps differ."""
-    if not np.array_equal(np.isnan(found), np.isnan(truth)):
+    if not np.array_equal(np.isnan(values), np.isnan(truth)):
         return float("inf")
-    return float(np.nanmax(np.abs(found - truth) / np.abs(truth)))
+    return float(np.nanmax(np.abs(values - truth) / np.abs(truth)))
 
 
 def kept(source: Source) -> dict[str, bool]:
     """Whether names, units, comments and start come back as they were given."""
     return {
-        "names": tuple(one.name for one in source.channels) == NAMES,
-        "units": tuple(one.unit for one in source.channels) == UNITS,
-        "comments": tuple(one.comment for one in source.channels) == COMMENTS and source.comment == COMMENT,
+        "names": tuple(channel.name for channel in source.channels) == NAMES,
+        "units": tuple(channel.unit for channel in source.channels) == UNITS,
+        "comments": tuple(channel.comment for channel in source.channels) == COMMENTS and source.comment == COMMENT,
         "start": source.start == START,
         "quiet": source.noticed == (),
     }
@@ -76,8 +76,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     lines: list[dict[str, Any]] = []
     with TemporaryDirectory() as name:
         for extension in FORMATS:
-            own, line = round_trip(Path(name) / f"trip{extension}", extension)
-            rows += own
+            format_rows, line = round_trip(Path(name) / f"trip{extension}", extension)
+            rows += format_rows
             lines.append(line)
         rows += [two_rates(Path(name) / f"rates{extension}", extension) for extension in (".mf4", ".tdms")]
         rows += resolution(Path(name))
@@ -98,12 +98,16 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
     source = open_source(written(path, truth))
     blocks = list(source.blocks(NAMES, LENGTH))
     seconds = time.perf_counter() - began
-    values, times = (np.concatenate([getattr(one, key) for one in blocks]) for key in ("values", "times"))
+    values, times = (np.concatenate([getattr(block, key) for block in blocks]) for key in ("values", "times"))
     library, reading = LIBRARIES[extension]
     foreign = reading(path)
     same = [foreign.get(name, (None, ""))[1] for name in NAMES] == list(UNITS)
     there = np.column_stack([foreign[name][0] for name in NAMES]) if same else np.full_like(truth, np.inf)
-    error, off, own = apart(values, truth), float(np.abs(times - PERIOD * np.arange(COUNT)).max()), apart(there, truth)
+    error, off, by_library = (
+        apart(values, truth),
+        float(np.abs(times - PERIOD * np.arange(COUNT)).max()),
+        apart(there, truth),
+    )
     lost = ", ".join(what for what, good in kept(source).items() if not good)
     key, why = f"measured_formats.{extension[1:]}", "what the format can hold; every bit where it is 0"
     return [
@@ -129,7 +133,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
             f"{key}.library",
             SYSTEM,
             f"{form}: difference of the values from those that {library} reads",
-            own,
+            by_library,
             "of the value",
         ).at_most(RESOLUTION[extension], f"{why}; names and units are compared, too", "native"),
     ], {
@@ -138,7 +142,7 @@ def round_trip(path: Path, extension: str) -> tuple[list[Row], dict[str, Any]]:
         "size": path.stat().st_size,
         "values": error,
         "times": off,
-        "own": own,
+        "own": by_library,
         "rate": COUNT * len(NAMES) / seconds,
     }
 
@@ -147,13 +151,17 @@ def two_rates(path: Path, extension: str) -> Row:
     """Two groups of different rates in one file."""
     values = {("fast",): (1e-3, np.arange(4000.0)), ("slow",): (2e-2, np.arange(200.0) ** 2)}
     write(
-        path, [Group(names, ("N",), ("",), period, len(own), [own[:, None]]) for names, (period, own) in values.items()]
+        path,
+        [
+            Group(names, ("N",), ("",), period, len(values_of), [values_of[:, None]])
+            for names, (period, values_of) in values.items()
+        ],
     )
-    found = read(open_source(path))
+    channels = read(open_source(path))
     errors = [
-        np.abs(found[name][k] - truth).max()
-        for (name,), (period, own) in values.items()
-        for k, truth in ((0, period * np.arange(len(own))), (1, own))
+        np.abs(channels[name][k] - truth).max()
+        for (name,), (period, values_of) in values.items()
+        for k, truth in ((0, period * np.arange(len(values_of))), (1, values_of))
     ]
     return Observed(
         f"measured_formats.{extension[1:]}.rates",
@@ -224,7 +232,7 @@ def resolution(folder: Path) -> list[Row]:
     floating = read(open_source(path))["Fz"][1]
     step = np.abs(load).max() / 32752
     whole = step * np.round(load / step)
-    errors = [abs(pseudo_damage(own[:4500]) / pseudo_damage(load[:4500]) - 1.0) for own in (floating, whole)]
+    errors = [abs(pseudo_damage(damaged[:4500]) / pseudo_damage(load[:4500]) - 1.0) for damaged in (floating, whole)]
     why = "slope 5, of the smooth road before a pothole that sets the scale of the whole numbers"
     return [
         Observed(
@@ -263,13 +271,13 @@ def memory(path: Path, extension: str) -> list[Row]:
     blocks: Iterator[np.ndarray] = (base + i for i in range(count // len(base)))
     write(path, [Group(tuple(f"ch{i}" for i in range(60)), ("N",) * 60, ("",) * 60, 1e-3, count, blocks)])
     out = subprocess.run([sys.executable, "-c", WATCHED, str(path)], capture_output=True, text=True, check=True).stdout
-    found, peak = (int(word) for word in out.split())
+    samples, peak = (int(word) for word in out.split())
     size = path.stat().st_size / 1e6
     path.unlink()
     return [
-        Observed(f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", found, "").within(
-            count, 0, "a count: none is lost between blocks", "none"
-        ),
+        Observed(
+            f"{key}.samples", SYSTEM, f"{form}: samples of five minutes that are read by block", samples, ""
+        ).within(count, 0, "a count: none is lost between blocks", "none"),
         Observed(
             key,
             SYSTEM,
@@ -289,14 +297,14 @@ def tables(data: dict[str, Any]) -> list[Table]:
     )
     rows = tuple(
         (
-            one["format"],
-            f"{one['values']:.1e}",
-            f"{one['times']:.1e}",
-            f"{one['library']}: {one['own']:.1e}",
-            f"{one['size'] / 1e3:.0f}",
-            f"{one['rate'] / 1e6:.1f}",
+            each["format"],
+            f"{each['values']:.1e}",
+            f"{each['times']:.1e}",
+            f"{each['library']}: {each['own']:.1e}",
+            f"{each['size'] / 1e3:.0f}",
+            f"{each['rate'] / 1e6:.1f}",
         )
-        for one in data["formats"]
+        for each in data["formats"]
     )
     headings = ("format", "values", "times, s", "own library", "kB", "million values per s, there and back, once")
     return [Table(TITLE, note, headings, rows)]

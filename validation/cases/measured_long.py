@@ -55,8 +55,8 @@ def _guides(quick: bool) -> list[Row]:
     numbers, wrenches = build("reference", car, drive, 1e-3, 1e-3).numbers, drive.hubs[0].reshape(-1, 6)
     for seed in range(1 if quick else 5):
         q, v = anywhere(car, seed)
-        found, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
-        worst = max(worst, float(np.abs(found - other).max() / np.abs(other).max()))
+        guided, other = _transmitted(sections, numbers, q, v), mujoco_guides(car, q, v, wrenches)
+        worst = max(worst, float(np.abs(guided - other).max() / np.abs(other).max()))
     rows = [
         Observed(
             "measured_long.guides_mujoco",
@@ -72,8 +72,8 @@ def _guides(quick: bool) -> list[Row]:
     q, v = anywhere(car, 0)
     for i, (body, freedom) in enumerate(car.tree.coordinates()):
         q[i] = 0.0 if body == "engine" and freedom.startswith("r") else q[i]
-    found, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
-    off = float(np.abs(found - other).max() / np.abs(other).max())
+    guided, other = _transmitted(sections, numbers, q, 0 * v), exudyn_guides(car, q, wrenches)
+    off = float(np.abs(guided - other).max() / np.abs(other).max())
     return [
         *rows,
         Observed(
@@ -99,7 +99,7 @@ def _transmitted(sections: Sections, numbers: np.ndarray, q: np.ndarray, v: np.n
 def _counting() -> list[Row]:
     """The example of the standard, and a sine of which all is known."""
     spans, _, counts = cycles(ASTM)
-    found = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
+    by_span = {float(span): float(counts[spans == span].sum()) for span in np.unique(spans)}
     sine = np.sin(2 * np.pi * np.arange(100 * 64 + 1) / 64)  # 100 periods from 0: half cycles of 1, whole ones of 2
     counted = count(sine, (5.0,))
     levels = level_crossings(sine, np.array([-1.1, -0.5, 0.5, 1.1])).tolist()
@@ -110,7 +110,7 @@ def _counting() -> list[Row]:
             "measured_long.astm",
             SYSTEM,
             "rainflow counts of the example of ASTM E1049-85",
-            str(found),
+            str(by_span),
             str(COUNTED),
             "the standard's own table",
             "published",
@@ -138,11 +138,11 @@ def _blocks(folder: Path, engine: str, method: str, seconds: float) -> Row:
     """Samples that differ between a run in one piece and one in uneven blocks."""
     place = folder / f"blocks {seconds}"
     place.mkdir(exist_ok=True)
-    own = run_of(place, seconds, REPEATED, engine, Hold(method))  # type: ignore[arg-type]
+    job = run_of(place, seconds, REPEATED, engine, Hold(method))  # type: ignore[arg-type]
     bits = []
     for block in (60.0, 0.073):
         name = f"{engine} {method} {block}"
-        run(own, place / name, block=block)
+        run(job, place / name, block=block)
         bits.append(np.frombuffer(answers_of(place, name), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
@@ -160,11 +160,11 @@ def _killed(folder: Path) -> Row:
     for times in (0, 2):
         place = folder / f"killed {times}"
         place.mkdir()
-        own = run_of(place, seconds, REPEATED)
+        job = run_of(place, seconds, REPEATED)
         if times:
             killed(place, seconds, REPEATED, 0.25, times)
         else:
-            run(own, place / "run")
+            run(job, place / "run")
         bits.append(np.frombuffer(answers_of(place), np.int64))
     changed = float(np.sum(bits[0] != bits[1]))
     return Observed(
@@ -209,19 +209,19 @@ def _handed_on(folder: Path) -> list[Row]:
     """Section forces in every format, read back; and check channels beside the run."""
     place = folder / "handed on"
     place.mkdir()
-    own = run_of(place, 2.0, REPEATED)
-    found = run(own, place / "run")
-    wanted = found.answers[:6]
-    values = np.column_stack([found.samples(answer) for answer in wanted])
+    job = run_of(place, 2.0, REPEATED)
+    outcome = run(job, place / "run")
+    wanted = outcome.answers[:6]
+    values = np.column_stack([outcome.samples(answer) for answer in wanted])
     worst, said = 0.0, set()
-    for path in hand_on(found, place, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
+    for path in hand_on(outcome, place, ("csv", "mf4", "rsp", "tdms"), wanted, comment="Monday"):
         source = open_source(path)
         names = [channel.name for channel in source.channels if channel.name in {answer.name for answer in wanted}]
         read = np.vstack([block.values for block in source.blocks(names)])
         worst = max(worst, float(np.abs(read - values).max() / np.abs(values).max()))
         said |= {(channel.name, channel.unit, channel.comment) for channel in source.channels if channel.name in names}
     kept = said == {(answer.name, answer.unit, answer.comment) for answer in wanted}
-    compared = [compare(own.recording, found, *pair) for pair in checks(own)]
+    compared = [compare(job.recording, outcome, *pair) for pair in checks(job)]
     force = next(each for each in compared if each.signal.name == "front left_force")
     return [
         Observed(

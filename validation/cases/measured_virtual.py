@@ -69,8 +69,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return _quick(folder), {}
     rows, data = list[Row](), dict[str, Any]()
     for proof in PROOFS:
-        found, ratios = _proved(proof, folder / proof.name)
-        rows += found
+        proved, ratios = _proved(proof, folder / proof.name)
+        rows += proved
         data[proof.name] = ratios
     return [*rows, *_trusted(), *_moving(folder / "moving")], data
 
@@ -110,12 +110,12 @@ def recorded(virtual: VirtualMeasurement, samples: np.ndarray, vehicle: str, for
     inertial = np.array([signal.at == virtual.vehicle.chassis for signal in virtual.signals])
     text = ['title = "proof"', 'system = "measured"', "[vehicle]", f'file = "{vehicle}"']
     for name, chosen, offset in (("hubs", ~inertial, 0.0), ("unit", inertial, -LATE)):
-        signals = tuple(signal for signal, own in zip(virtual.signals, chosen, strict=True) if own)
+        signals = tuple(signal for signal, taken in zip(virtual.signals, chosen, strict=True) if taken)
         write(folder / f"{name}.{form}", [group(signals, samples[:, chosen], virtual.period)])
         text.append(map_lines(signals, f"{name}.{form}", offset))
     (folder / "scene.toml").write_text("\n".join(text))
-    if (own := folder.parent / vehicle).is_file():
-        (folder / vehicle).write_bytes(own.read_bytes())
+    if (taken := folder.parent / vehicle).is_file():
+        (folder / vehicle).write_bytes(taken.read_bytes())
     return read_files(load(folder / "scene.toml"), folder)
 
 
@@ -138,24 +138,24 @@ def _proved(proof: Proof, folder: Path) -> tuple[list[Row], dict[str, dict[str, 
             recording = recorded(true, samples, proof.vehicle, form, place)
             off[form] = max(off[form], _changed(recording, true, samples))
             values = recording.columns.block(recording.columns.names, 0, recording.count)
-            damage = next((own for other, own in known if _same(values, other)), None)
+            damage = next((damages for other, damages in known if _same(values, other)), None)
             if damage is None:
                 damage = errors(march(held(recording, true.vehicle, proof.hold), place / "run"), true).damage
                 known.append((values, damage))
             ratios[form].append(damage)
     means = {
-        form: {name: float(np.mean([own[name] for own in found])) for name in found[0]}
-        for form, found in ratios.items()
+        form: {name: float(np.mean([damages[name] for damages in ratios_of])) for name in ratios_of[0]}
+        for form, ratios_of in ratios.items()
     }
     rows = [row for form in proof.formats for row in _rows(proof, form, off[form], means[form])]
     first = recorded(true, true.samples(planted, SEED), proof.vehicle, "csv", folder / "beside")
     return [*rows, *_beside(proof, first, true, folder)], means
 
 
-def _same(one: np.ndarray, two: np.ndarray) -> bool:
+def _same(first: np.ndarray, two: np.ndarray) -> bool:
     """Whether two recordings differ by nothing but the rounding of a unit, so that one run stands for both."""
-    largest = np.maximum(np.nanmax(np.abs(one), axis=0), 1e-300)
-    return bool(np.allclose(one / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
+    largest = np.maximum(np.nanmax(np.abs(first), axis=0), 1e-300)
+    return bool(np.allclose(first / largest, two / largest, rtol=0.0, atol=1e-12, equal_nan=True))
 
 
 def _changed(recording: Recording, true: VirtualMeasurement, samples: np.ndarray) -> float:
@@ -203,8 +203,8 @@ def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Pa
     free = held(first, true.vehicle, Hold("none"))
     jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}
-    one, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
-    apart = float((np.abs(one - two).max(axis=0) / np.maximum(np.abs(one).max(axis=0), 1e-6)).max())
+    beside, two = (run.columns.block(run.columns.names, 0, run.done) for run in runs.values())
+    apart = float((np.abs(beside - two).max(axis=0) / np.maximum(np.abs(beside).max(axis=0), 1e-6)).max())
     held_run = runs[ENGINES[-1]]
     blind = judge(jobs[ENGINES[-1]], held_run)
     rows = [
@@ -258,18 +258,18 @@ def _trusted() -> list[Row]:
         ("tilt", "inertial", 1.6, Level(8.0, 1.0, tilt=(0.004, 0.0))),
     )
     for name, frame, duration, level in cases:
-        own = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
-        true = virtual_measurement(vehicle, own, "mujoco")
+        virtual = read(VirtualTable, {"duration": duration, "step": 2e-3, "sampling_rate": RATE, "frame": frame}, "")
+        true = virtual_measurement(vehicle, virtual, "mujoco")
         predicted = drift(vehicle, level, 1 / RATE, duration, frame).passes()
         assert predicted is not None
-        found = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
+        drift_off = float(np.median([_drift_off(vehicle, true, level, path) for path in range(COPIES)]))
         rows.append(
             Observed(
                 f"measured_virtual.trust_{name}",
                 SYSTEM,
                 "ratio of the median time at which roll or pitch is off by 0.05 rad to the predicted "
                 f"time, {COPIES} free runs on a rough road ({name}, {frame!r})",
-                found / predicted,
+                drift_off / predicted,
                 "1",
             ).within(1.0, 0.2, "demanded; the median of 16 has a deviation of 3 to 10 %", "closed form")
         )
@@ -327,7 +327,7 @@ def _quick(folder: Path) -> list[Row]:
     samples = true.samples(read(Faults, {"noise": NOISE}, ""), SEED)
     recording = recorded(true, samples, proof.vehicle, "csv", folder / "quick")
     run = march(held(recording, true.vehicle, proof.hold), folder / "quick" / "run")
-    found = errors(run, true)
+    wrong = errors(run, true)
     level = Level(8.0, 1.0)
     law = rigid(true.vehicle).angle_variance(np.tile([8.0] * 3 + [1.0] * 3, 4), true.period, np.array([10.0]))
     deviations = drift(true.vehicle, level, true.period, 10.0, "hub").deviations[-1]
@@ -343,7 +343,7 @@ def _quick(folder: Path) -> list[Row]:
             "measured_virtual.damage",
             SYSTEM,
             "ratio of the damage (slope 5) of the front left spring to the true damage, 0.6 s of a rough road",
-            found.damage["front left"],
+            wrong.damage["front left"],
             "1",
         ).within(1.0, 0.1, "one sample of noise", "none"),
         Observed(
@@ -358,11 +358,11 @@ def _quick(folder: Path) -> list[Row]:
 
 def tables(data: dict[str, Any]) -> list[Table]:
     """Mean damage of every section force, through every format."""
-    found = []
+    tables = []
     for name, means in data.items():
         elements = next(iter(means.values()))
-        rows = tuple((element, *(f"{own[element]:.4f}" for own in means.values())) for element in elements)
-        found.append(
+        rows = tuple((element, *(f"{of_form[element]:.4f}" for of_form in means.values())) for element in elements)
+        tables.append(
             Table(
                 f"Ratio of the damage to the true damage, {name}, mean of {SAMPLES} samples of noise",
                 "Section forces in the chassis' axes, slope 5, held by the filter.",
@@ -370,4 +370,4 @@ def tables(data: dict[str, Any]) -> list[Table]:
                 rows,
             )
         )
-    return found
+    return tables

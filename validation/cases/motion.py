@@ -55,8 +55,8 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Clean motions in space, noise, each engine's own readings, and drift; quick: few paths, runs of 1 s."""
     rows = [row for name in ARRAYS for row in _exact(name)]
     rows += [_plain(), _order(), _tilt()]
-    gains, found = _gains(4000 if quick else 40_000)
-    rows += found
+    gains, gain_rows = _gains(4000 if quick else 40_000)
+    rows += gain_rows
     for engine in IMPLEMENTATIONS:
         rows += _engine(engine, 1.0 if quick else 5.0)
     walked, curves = _walk(20 if quick else 300)
@@ -67,9 +67,9 @@ def _exact(name: str) -> list[Row]:
     """What needs no integration, on a motion whose derivatives are closed forms."""
     array = sensor_array(ARRAYS[name])
     clean = readings_on_path(array.positions)
-    found, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
-    alpha = float(np.abs(angular_acceleration(found, PATH.rates) - PATH.alpha).max())
-    squares = (rates_up_to_sign(found) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
+    spins, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
+    alpha = float(np.abs(angular_acceleration(spins, PATH.rates) - PATH.alpha).max())
+    squares = (rates_up_to_sign(spins) @ array.frame) ** 2 - (PATH.rates @ array.frame) ** 2
     what = f"sensors: {name}{', formula for a plane' if array.planar else ''}"
     why = "rounding of readings of 20 m/s^2; nothing is integrated"
     shown = (
@@ -126,13 +126,13 @@ def _order() -> Row:
 def _tilt() -> Row:
     array, tilt, count = sensor_array(ARRAYS["4"]), 1e-3, 10_001
     still = np.broadcast_to([0.0, 0.0, -9.81], (count, 4, 3))
-    found = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
+    drift = -motion(array, still, 1e-3, Start.pitched(tilt)).position[:, 0]
     law = tilt_displacement(tilt, 1e-3 * np.arange(count))
     what = (
         f"relative difference of the false displacement after 10 s, {law[-1]:.4f} m, from g sin(tilt) t^2 / 2, "
         "tilt error of 1 mrad"
     )
-    worst = float(np.abs(found - law).max() / law[-1])
+    worst = float(np.abs(drift - law).max() / law[-1])
     return Observed("motion.tilt", SYSTEM, what, worst, "").at_most(
         1e-10, "a constant is integrated exactly", "closed form"
     )
@@ -148,7 +148,7 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
             noise = normal(SEED, i, count, 15, source=ACCELEROMETERS).reshape(count, 5, 3)
             alpha = angular_acceleration(spin(array, noise), np.zeros((count, 3)))
             axis = int(np.argmax(array.gains()))
-            law, found = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
+            law, variance = float(array.gains()[axis] ** 2), float(np.mean(alpha[:, axis] ** 2))
             key = f"motion.gain.{formula}.{height:g}"
             rows.append(
                 mean_square(
@@ -157,7 +157,7 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
                         SYSTEM,
                         f"variance of the {('roll', 'pitch', 'yaw')[axis]} acceleration per "
                         f"unit variance of the readings, fifth sensor {height:g} m up, {formula} formula",
-                        found,
+                        variance,
                         "1/m^2",
                     ),
                     law,
@@ -165,7 +165,7 @@ def _gains(count: int) -> tuple[list[list[float]], list[Row]]:
                     f"{count:,} samples; gain {law**0.5:.3g} 1/m",
                 )
             )
-            line += [law**0.5, found**0.5]
+            line += [law**0.5, variance**0.5]
         if height in HEIGHTS:
             rows.append(
                 Observed(
@@ -203,7 +203,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
     readings, array = readings_of(run, p), sensor_array(RIGID)
     felt = readings[:, :5]
     turning = run["gyro"][:, None] * [0.0, 1.0, 0.0]
-    found = angular_acceleration(spin(array, felt), turning)[:, 1]
+    acceleration = angular_acceleration(spin(array, felt), turning)[:, 1]
     equations = build("reference", assemble(scene), settings_of(scene, "reference"))  # eq. (38) at every state
     true = np.array([equations.acceleration(t, *np.split(y, 2))[3] for t, y in zip(run.times, run.states, strict=True)])
     loose = quality(sensor_array(p.positions()), readings)
@@ -215,7 +215,7 @@ def _engine(engine: str, duration: float) -> list[Row]:
             SYSTEM,
             f"largest difference of the pitch acceleration from {engine}'s readings from the paper's "
             "equations, over the largest value",
-            float(np.abs(found - true).max() / np.abs(true).max()),
+            float(np.abs(acceleration - true).max() / np.abs(true).max()),
             "",
         ).at_most(
             BOUND,
@@ -246,10 +246,10 @@ def _follows(
     way: str, engine: str, array: SensorArray, felt: np.ndarray, states: np.ndarray, rates: np.ndarray | None
 ) -> list[Row]:
     """Pitch and heave recovered from a run's clean readings, with or without its gyro, against its states (n, 8)."""
-    found = motion(array, felt, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
+    followed = motion(array, felt, 1e-3, Start.pitched(*states[0, [3, 7, 2, 6]].tolist()), rates=rates)
     errors = (
-        ("pitch", found.angles()[:, 1] - states[:, 3], "rad", 1e-6),
-        ("heave", found.position[:, 2] - states[:, 2], "m", 1e-5),
+        ("pitch", followed.angles()[:, 1] - states[:, 3], "rad", 1e-6),
+        ("heave", followed.position[:, 2] - states[:, 2], "m", 1e-5),
     )
     words = "accelerometers alone" if rates is None else "accelerometers and a gyro"
     return [
@@ -305,9 +305,11 @@ def _held(curves: Saved, quick: bool) -> list[Row]:
     """The symmetric part as a measurement: the error stays where it is."""
     count, paths = (1001, 1) if quick else (6001, 8)
     rates, array, clean = _moving(count)
-    found = [filter_rates(spin(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE) for path in range(paths)]
-    squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in found], axis=0)
-    stated = np.sqrt(np.mean(found[0][1] ** 2, axis=1))
+    filtered = [
+        filter_rates(spin(array, clean + _noise(path, count)), PERIOD, rates[0], NOISE) for path in range(paths)
+    ]
+    squares = np.mean([np.mean((held - rates) ** 2, axis=1) for held, _ in filtered], axis=0)
+    stated = np.sqrt(np.mean(filtered[0][1] ** 2, axis=1))
     curves["held"], curves["stated"] = np.sqrt(squares)[::25].tolist(), stated[::25].tolist()
     walked = NOISE * rms(array.gains()) * np.sqrt(PERIOD * (count - 1) * PERIOD)
     late, early = (float(np.sqrt(np.mean(part))) for part in (squares[-count // 3 :], squares[count // 6 : count // 3]))

@@ -46,18 +46,18 @@ def errors(
     steps: tuple[float, ...],
 ) -> list[float]:
     """Largest state error at each step over a duration (s), on the common grid."""
-    found = []
+    errors_of_steps = []
     for step in steps:
         run = simulate(
             road_scene(step=step, duration=duration), engine, Settings(integrator, step, duration, **options)
         )
-        found.append(float(np.abs(run.states[:: round(GRID / step)] - truth).max()))
-    return found
+        errors_of_steps.append(float(np.abs(run.states[:: round(GRID / step)] - truth).max()))
+    return errors_of_steps
 
 
-def fitted(steps: tuple[float, ...], found: list[float]) -> float:
+def fitted(steps: tuple[float, ...], errors_of_steps: list[float]) -> float:
     """Slope of log error over log step by least squares."""
-    return float(np.polyfit(np.log(steps), np.log(found), 1)[0])
+    return float(np.polyfit(np.log(steps), np.log(errors_of_steps), 1)[0])
 
 
 @on_paper_road()
@@ -69,21 +69,28 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     ).states
     rows, table = [], []
     for engine, integrator, options, order, band in FAMILIES:
-        found = errors(engine, integrator, options, truth, duration, steps)
+        errors_of_steps = errors(engine, integrator, options, truth, duration, steps)
         name = " ".join([integrator, *(f"{value:g}" for value in options.values())])
         rows.append(
             Observed(
-                f"order.{engine}.{name}", SYSTEM, f"observed order of {name} in {engine}", fitted(steps, found), ""
+                f"order.{engine}.{name}",
+                SYSTEM,
+                f"observed order of {name} in {engine}",
+                fitted(steps, errors_of_steps),
+                "",
             ).within(order, band, WHY, "closed form")
         )
-        table.append([engine, name, *found])
+        table.append([engine, name, *errors_of_steps])
     return rows, {"table": table, "steps": steps, "duration": duration}
 
 
 def tables(data: Saved) -> list[Table]:
     """Largest state error by step."""
     heads = ("engine", "integrator", *(f"{1e3 * step:g} ms" for step in data["steps"]))
-    rows = tuple((engine, name, *(f"{value:.2e}" for value in found)) for engine, name, *found in data["table"])
+    rows = tuple(
+        (engine, name, *(f"{value:.2e}" for value in errors_of_steps))
+        for engine, name, *errors_of_steps in data["table"]
+    )
     note = (
         f"Largest error of any state (m, rad, m/s, rad/s) over the first {data['duration']:g} s. Equal rows are "
         "the same method."

@@ -48,8 +48,11 @@ EVERY, LEAST = 16, 40
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows by system and, in full, of the whole; quick: every sixteenth fault of each system."""
     plane = pitch_plane.measure(FEW, CLEAN[:1], (pitch_plane.TWIN,)) if quick else pitch_plane.measure()
-    data: Saved = {"pitch-plane": plane, **{own.id: own.measure(EVERY if quick else 1) for own in CAMPAIGNS}}
-    rows = [*pitch_plane.rows(plane), *(row for own in CAMPAIGNS for row in own.rows(data[own.id]))]
+    data: Saved = {
+        "pitch-plane": plane,
+        **{campaign.id: campaign.measure(EVERY if quick else 1) for campaign in CAMPAIGNS},
+    }
+    rows = [*pitch_plane.rows(plane), *(row for campaign in CAMPAIGNS for row in campaign.rows(data[campaign.id]))]
     return [*rows, *([] if quick else [_enough(data)])], data
 
 
@@ -66,7 +69,10 @@ def _enough(data: Saved) -> Row:
 
 def _lines(data: Saved) -> list[tuple[str, ...]]:
     """Of every fault: system, what it is in, fault, checks that see it, checks that had missed it."""
-    return [*pitch_plane.lines(data["pitch-plane"]), *(line for own in CAMPAIGNS for line in own.lines(data[own.id]))]
+    return [
+        *pitch_plane.lines(data["pitch-plane"]),
+        *(line for campaign in CAMPAIGNS for line in campaign.lines(data[campaign.id])),
+    ]
 
 
 def tables(data: Saved) -> list[Table]:
@@ -79,7 +85,11 @@ def tables(data: Saved) -> list[Table]:
     )
     headings = ("system", "planted in", "fault", "caught by", "would have been missed by")
     whole = Table("Planted faults of all systems", note, headings, tuple(lines))
-    return [whole, *pitch_plane.tables(data["pitch-plane"]), *(own.table(data[own.id]) for own in CAMPAIGNS)]
+    return [
+        whole,
+        *pitch_plane.tables(data["pitch-plane"]),
+        *(campaign.table(data[campaign.id]) for campaign in CAMPAIGNS),
+    ]
 
 
 def draw(data: Saved) -> Drawn:

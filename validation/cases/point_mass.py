@@ -64,12 +64,12 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 def _power(matrix: Matrix, n: int) -> Matrix:
     """A matrix to a whole power, by squaring."""
     size = range(len(matrix))
-    found = [[Decimal(int(i == j)) for j in size] for i in size]
+    product = [[Decimal(int(i == j)) for j in size] for i in size]
     while n:
         if n % 2:
-            found = _times(found, matrix)
+            product = _times(product, matrix)
         matrix, n = _times(matrix, matrix), n // 2
-    return found
+    return product
 
 
 def _times(a: Matrix, b: Matrix) -> Matrix:
@@ -82,11 +82,11 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
 def _exponential(matrix: Matrix) -> Matrix:
     """Exponential by a Taylor series of the matrix divided by 2^20, squared 20 times."""
     small = [[value / 2**20 for value in row] for row in matrix]
-    term = found = _power(small, 0)
+    term = total = _power(small, 0)
     for k in range(1, 25):
         term = [[value / k for value in row] for row in _times(term, small)]
-        found = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(found, term, strict=True)]
-    return _power(found, 2**20)
+        total = [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(total, term, strict=True)]
+    return _power(total, 2**20)
 
 
 def _continuous_error(damped: float) -> float:
@@ -122,26 +122,26 @@ def _discrete_error(damped: float, steps: int) -> float:
         return _worst(discrete(steps, DEVIATION, step, MASS, eta), truth)
 
 
-def _worst(found: np.ndarray, truth: Sequence[Decimal]) -> float:
+def _worst(computed: np.ndarray, truth: Sequence[Decimal]) -> float:
     return max(
         float(abs(Decimal(float(value)) / true - 1))
-        for value, true in zip(found[[0, 0, 1], [0, 1, 1]], truth, strict=False)
+        for value, true in zip(computed[[0, 0, 1], [0, 1, 1]], truth, strict=False)
     )
 
 
 def _difference(damped: float, steps: int) -> float:
     """1 - discrete by continuous variance of position."""
     step = TIME / steps
-    own = (DEVIATION, step, MASS, damped / TIME)
-    return 1 - float(discrete(steps, *own)[0, 0] / continuous(TIME, *own)[0, 0])
+    arguments = (DEVIATION, step, MASS, damped / TIME)
+    return 1 - float(discrete(steps, *arguments)[0, 0] / continuous(TIME, *arguments)[0, 0])
 
 
 def _monte_carlo(damped: float, count: int) -> list[Row]:
     """Position alone, and position and velocity together by their squared distance in the law's own metric."""
     steps = 1000
-    own = (DEVIATION, STEP, MASS, damped / (steps * STEP))
-    law, found = discrete(steps, *own), paths(count, steps, *own, seed=SEED)
-    distance = float(np.mean(np.sum(found * np.linalg.solve(law, found.T).T, axis=1))) / 2
+    arguments = (DEVIATION, STEP, MASS, damped / (steps * STEP))
+    law, drawn = discrete(steps, *arguments), paths(count, steps, *arguments, seed=SEED)
+    distance = float(np.mean(np.sum(drawn * np.linalg.solve(law, drawn.T).T, axis=1))) / 2
     why = f"{count:,} paths of {steps} explicit Euler steps, seed {SEED}"
     return [
         mean_square(
@@ -149,7 +149,7 @@ def _monte_carlo(damped: float, count: int) -> list[Row]:
                 f"point_mass.position.{damped:g}",
                 SYSTEM,
                 f"variance of the position by Monte Carlo, product of damping and time {damped:g}",
-                float(np.mean(found[:, 0] ** 2)),
+                float(np.mean(drawn[:, 0] ** 2)),
                 "m^2",
             ),
             float(law[0, 0]),

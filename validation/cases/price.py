@@ -76,23 +76,23 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Rows of all problems, of the force calls, and of two claims about speed; quick: five of the eleven problems, a
     named share of their settings, and beside another case, where in full no more processes run than there are cores.
     """
-    found, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _shared()
-    rows = [row for own, _ in found for row in own]
-    return rows + _road_rows(found[0][1]) + beside, {"problems": [saved for _, saved in found], **data}
+    priced, (beside, data) = ([_priced(True, make) for make in PROBLEMS], _beside(True)) if quick else _shared()
+    rows = [row for problem_rows, _ in priced for row in problem_rows]
+    return rows + _road_rows(priced[0][1]) + beside, {"problems": [saved for _, saved in priced], **data}
 
 
 def _beside(quick: bool) -> CaseAnswer:
     """What is not a problem of the runner: ride, the parts of a step, force calls, claims about speed."""
     road = assemble(road_excited.scene())
-    rows, found = ride.measure(quick, ROUNDS[quick], LEAST[True])
+    rows, prices = ride.measure(quick, ROUNDS[quick], LEAST[True])
     rounds, least, duration = 2 * ROUNDS[quick], 2 * LEAST[quick], road_excited.DURATION
     data: Saved = {
-        "ride": found,
+        "ride": prices,
         "split": [] if quick else split.measure(ROUNDS[quick], LEAST[quick]),
         "callback": {name: speed.callback_cost(road, duration, name, rounds, least) for name in ("RK4", "Euler")},
         "real time": speed.real_time(road, duration, rounds, least),
     }
-    settings = dict.fromkeys(_at_1_ms(one) for one in road_excited.settings(quick) if one.method != "DVERK6")
+    settings = dict.fromkeys(_at_1_ms(each) for each in road_excited.settings(quick) if each.method != "DVERK6")
     return rows + split.rows(data["split"]) + _counts([*settings], road) + _speed_rows(data), data
 
 
@@ -109,20 +109,20 @@ def _shared() -> tuple[list[CaseAnswer], CaseAnswer]:
     with processes(min(2, os.cpu_count() or 1)) as pool:
         first, *others = PROBLEMS + FULL_ONLY
         road, beside = pool.submit(_priced, False, first), pool.submit(_beside, False)
-        found = [*pool.map(partial(_priced, False), others[::-1])][::-1]
-        return [road.result(), *found], beside.result()
+        priced = [*pool.map(partial(_priced, False), others[::-1])][::-1]
+        return [road.result(), *priced], beside.result()
 
 
 def _road_rows(saved: Saved) -> list[Row]:
     """What must coincide on the road, and what Exudyn names without having it."""
     road = runner.of_saved(saved)
-    found = [" = ".join(sorted(group)) for group in road.same()]
+    groups = [" = ".join(sorted(group)) for group in road.same()]
     rows = [
         behaves(
             f"price.road.coincide.{name}",
             SYSTEM,
             "work-precision curves that agree to 1 % at every common setting",
-            group if group in found else "; ".join(found),
+            group if group in groups else "; ".join(groups),
             group,
             why,
             "native",
@@ -143,9 +143,9 @@ def _road_rows(saved: Saved) -> list[Row]:
     ]
 
 
-def _at_1_ms(one: Setting) -> Setting:
+def _at_1_ms(setting: Setting) -> Setting:
     """One setting per fixed-step method; adaptive methods keep theirs."""
-    return one if one.adaptive else road_excited.setting(one.engine, one.method, 1e-3)
+    return setting if setting.adaptive else road_excited.setting(setting.engine, setting.method, 1e-3)
 
 
 def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
@@ -153,9 +153,9 @@ def _counts(settings: list[Setting], assembly: Assembly) -> list[Row]:
     rows = []
     for engine, how in (("exudyn", "calls of one load"), ("mujoco", "MuJoCo's own timers")):
         pairs = [
-            counted(engine, assembly, road_excited.settings_of(one, COUNTED))
-            for one in settings
-            if one.engine == engine
+            counted(engine, assembly, road_excited.settings_of(each, COUNTED))
+            for each in settings
+            if each.engine == engine
         ]
         what = (
             f"largest difference between force calls counted from outside ({how}) and those reported, {len(pairs)} runs"
@@ -188,33 +188,33 @@ def _speed_rows(data: Saved) -> list[Row]:
             "m, rad, m/s, rad/s",
         ).at_most(1e-12, "the same forces at the same stages, written twice", "native")
     ]
-    for integrator, found in data["callback"].items():
+    for integrator, figures in data["callback"].items():
         for key, words in CALLBACKS.items():
-            ratio, low, high = found[key]
+            ratio, low, high = figures[key]
             name = f"price.callback.{integrator}.{key.replace(' ', '-')}"
             what = f"MuJoCo {integrator}, {words}, paired seconds, 95 % interval {low:.3f} to {high:.3f}"
             rows.append(Observed(name, SYSTEM, what, ratio, "times").aim(1.2, ON_SECONDS))
     return rows + [_real_time(key, data["real time"][key]) for key in ("with table", "without table")]
 
 
-def _real_time(key: str, found: tuple[float, float, float] | None) -> Row:
+def _real_time(key: str, factors: tuple[float, float, float] | None) -> Row:
     name = f"price.real-time.{key.replace(' ', '-')}"
     what = f"reference RK4 at 1 ms, {key.replace('table', 'making its road table')}"
-    if found is None:
+    if factors is None:
         return not_run(name, SYSTEM, what, "other work of the machine hid the difference")
-    factor, low, high = found
+    factor, low, high = factors
     told = f"{what}, 95 % interval {low:,.0f} to {high:,.0f}"
     return Observed(name, SYSTEM, told, factor, "times real time").aim(1000.0, ON_SECONDS, "at least")
 
 
 def tables(data: Saved) -> list[Table]:
     """Cheapest settings, losses, curves, failures and the parts of a step of every problem; the routes of ride."""
-    found = [
+    tables = [
         table
         for saved in data["problems"]
         for table in (*cost_tables(runner.of_saved(saved)), *split.table(data["split"], saved["key"]))
     ]
-    return [*found, ride.table(data["ride"])]
+    return [*tables, ride.table(data["ride"])]
 
 
 def draw(data: Saved) -> Drawn:

@@ -36,8 +36,11 @@ MET, FACTOR = 0.95, 3.0
 def measure(quick: bool, folder: Path) -> CaseAnswer:
     """Verdicts on all recommendations for all scenes; quick: those of one engine for one scene."""
     both = [judged("pitch-plane", QUICK, folder, (ENGINE,))] if quick else _shared(folder)
-    found, refused = [own for own, _ in both], [why for _, own in both for why in own]
-    return _rows(found, refused), {"verdicts": [[asdict(one) for one in own] for own in found], "refused": refused}
+    verdicts, refused = [of_scene for of_scene, _ in both], [why for _, of_scene in both for why in of_scene]
+    return _rows(verdicts, refused), {
+        "verdicts": [[asdict(verdict) for verdict in of_scene] for of_scene in verdicts],
+        "refused": refused,
+    }
 
 
 def _shared(folder: Path) -> list[Judged]:
@@ -45,8 +48,8 @@ def _shared(folder: Path) -> list[Judged]:
     context = get_context("spawn")  # an engine's threads do not survive a fork
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), mp_context=context) as pool:
         return [
-            one.result()
-            for one in [
+            job.result()
+            for job in [
                 pool.submit(judged, system, n, folder) for system in reversed(SCENES) for n in range(SCENES[system])
             ]
         ]
@@ -57,7 +60,7 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
     refused: list[str] = []
     for n in range(number, number + (SPARE + 1) * STRIDE, STRIDE):
         try:
-            own = (
+            told = (
                 judge(drawn(n, folder), engines)
                 if system == "pitch-plane"
                 else unseen_systems.judge(unseen_systems.drawn(system, n))
@@ -65,22 +68,22 @@ def judged(system: str, number: int, folder: Path, engines: tuple[str, ...] = EN
         except (InputError, RunFailed) as error:
             refused.append(f"{system} {n}: {error}")
         else:
-            return own, refused
+            return told, refused
     return [], refused
 
 
-def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
+def _rows(verdicts: list[list[Verdict]], refused: list[str]) -> list[Row]:
     """The three promises; a scene counts as held if every setting recommended for it does."""
-    every = [one for own in found for one in own]
-    held = sum(bool(own) and all(one.meets for one in own) for own in found)
-    factors = [one.factor for one in every]
-    scenes, why = f"{len(found)} scenes drawn at random", "judged by another solver than the search's, DOP853"
+    every = [verdict for of_scene in verdicts for verdict in of_scene]
+    held = sum(bool(of_scene) and all(verdict.meets for verdict in of_scene) for of_scene in verdicts)
+    factors = [verdict.factor for verdict in every]
+    scenes, why = f"{len(verdicts)} scenes drawn at random", "judged by another solver than the search's, DOP853"
     return [
         Observed(
             "recommendation.met",
             SYSTEM,
             f"share of {scenes} in which every recommended setting keeps its tolerance ({len(every)} settings)",
-            held / len(found),
+            held / len(verdicts),
             "",
         ).within(1.0, 1.0 - MET, why, "closed form"),
         Observed(
@@ -96,7 +99,9 @@ def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
             f"scenes that were refused with a reason and drawn anew, beside {scenes}",
             len(refused),
             "scenes",
-        ).at_most((1.0 - MET) * len(found), "; ".join(refused) or "none was: every one got a recommendation", "none"),
+        ).at_most(
+            (1.0 - MET) * len(verdicts), "; ".join(refused) or "none was: every one got a recommendation", "none"
+        ),
         Observed(
             "recommendation.factor",
             SYSTEM,
@@ -126,24 +131,24 @@ def _rows(found: list[list[Verdict]], refused: list[str]) -> list[Row]:
 
 
 def _slower(every: list[Verdict], kind: str) -> int:
-    return sum(one.slower for one in every if one.kind == kind)
+    return sum(verdict.slower for verdict in every if verdict.kind == kind)
 
 
 def tables(data: Saved) -> list[Table]:
     """Every scene with what was recommended over all engines."""
     rows = []
-    for own in data["verdicts"]:
-        if not own:
+    for of_scene in data["verdicts"]:
+        if not of_scene:
             continue
-        one = own[0]
+        verdict = of_scene[0]
         rows.append(
             (
-                one["title"],
-                f"{one['tolerance']:.2g}",
-                f"{one['curve']}, {one['label']}",
-                f"{one['predicted']:.3g}",
-                f"{one['true']:.3g}",
-                str(sum(v["true"] <= v["tolerance"] for v in own)) + f" of {len(own)}",
+                verdict["title"],
+                f"{verdict['tolerance']:.2g}",
+                f"{verdict['curve']}, {verdict['label']}",
+                f"{verdict['predicted']:.3g}",
+                f"{verdict['true']:.3g}",
+                str(sum(v["true"] <= v["tolerance"] for v in of_scene)) + f" of {len(of_scene)}",
             )
         )
     note = (
@@ -159,12 +164,12 @@ def draw(data: Saved) -> Drawn:
     from models.drawing.figures import BAD, COLOURS, DARK, LABELS, heading, plt
 
     figure, ax = plt.subplots(figsize=(6.0, 4.6))
-    every = [one for own in data["verdicts"] for one in own]
-    for engine in dict.fromkeys(one["curve"].split()[0] for one in every):
-        own = [one for one in every if one["curve"].startswith(engine)]
+    every = [verdict for of_engine in data["verdicts"] for verdict in of_engine]
+    for engine in dict.fromkeys(verdict["curve"].split()[0] for verdict in every):
+        of_engine = [verdict for verdict in every if verdict["curve"].startswith(engine)]
         ax.plot(
-            [one["true"] / one["tolerance"] for one in own],
-            [one["predicted"] / one["tolerance"] for one in own],
+            [verdict["true"] / verdict["tolerance"] for verdict in of_engine],
+            [verdict["predicted"] / verdict["tolerance"] for verdict in of_engine],
             "o",
             color=COLOURS[engine],
             markersize=4,

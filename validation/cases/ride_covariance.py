@@ -155,11 +155,11 @@ def _limit_rows() -> list[Row]:
     """Delays of zero and without end, and the road's own covariances."""
     vehicle = linearise(_vehicle("three_axle_truck", SEED))
     road = paper_road(vehicle.wheels)
-    one = excited(vehicle, road, 20.0)
-    at_once = stationary(replace(one, delays=(0.0,) * 3)).deviation
-    joined = stationary(replace(one, B=(sum(one.B),), D=(sum(one.D),), delays=(0.0,))).deviation  # type: ignore[arg-type]
-    late = stationary(replace(one, delays=(0.0, 1e6, 2e6))).deviation
-    apart = stationary(replace(one, independent=True)).deviation
+    lagged = excited(vehicle, road, 20.0)
+    at_once = stationary(replace(lagged, delays=(0.0,) * 3)).deviation
+    joined = stationary(replace(lagged, B=(sum(lagged.B),), D=(sum(lagged.D),), delays=(0.0,))).deviation  # type: ignore[arg-type]
+    late = stationary(replace(lagged, delays=(0.0, 1e6, 2e6))).deviation
+    apart = stationary(replace(lagged, independent=True)).deviation
     return [
         Observed(
             "ride_covariance.delay.zero",

@@ -68,18 +68,18 @@ def curved(vehicle: SpatialVehicle) -> SpatialVehicle:
     return replace(vehicle, springs=(*bent, *vehicle.springs[4:]))
 
 
-def difference(found: LinearVehicle, expected: LinearVehicle) -> float:
+def difference(computed: LinearVehicle, expected: LinearVehicle) -> float:
     """Largest error of M, D, K, the road's columns and the outputs, each relative to its own largest entry."""
     matrices = ("mass", "damping", "stiffness", "road_stiffness", "road_damping")
-    sides: list[tuple[Any, Any, tuple[str, ...]]] = [(found, expected, matrices)]
-    sides += [(a, b, Rows._fields) for a, b in zip(found.outputs, expected.outputs, strict=True)]
+    sides: list[tuple[Any, Any, tuple[str, ...]]] = [(computed, expected, matrices)]
+    sides += [(a, b, Rows._fields) for a, b in zip(computed.outputs, expected.outputs, strict=True)]
     return max(relative(getattr(a, name), getattr(b, name)) for a, b, names in sides for name in names)
 
 
-def relative(found: np.ndarray, expected: np.ndarray) -> float:
+def relative(computed: np.ndarray, expected: np.ndarray) -> float:
     """Largest difference over the largest expected entry, or the difference where all of these are 0."""
     size = float(np.abs(expected).max(initial=0.0))
-    return float(np.abs(found - expected).max(initial=0.0)) / (size or 1.0)
+    return float(np.abs(computed - expected).max(initial=0.0)) / (size or 1.0)
 
 
 def random_state(vehicle: SpatialVehicle, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,7 +207,7 @@ def _shift() -> list[Row]:
     for name in SHARES[1]:
         analytic = shift(*(linearise(of_name(name, gravity), SPEED) for gravity in (0.0, GRAVITY)))
         for engine in ENGINES:
-            found = shift(
+            shifted = shift(
                 *(build(engine, of_name(name, gravity), speed=SPEED).linearise() for gravity in (0.0, GRAVITY))
             )
             rows.append(
@@ -215,7 +215,7 @@ def _shift() -> list[Row]:
                     f"ride_engines.shift.{name}.{engine}",
                     SYSTEM,
                     f"largest shift of an eigenvalue of {name} from unloaded to loaded, {engine}",
-                    float(np.abs(found).max()),
+                    float(np.abs(shifted).max()),
                     "1/s",
                 ).beside(float(np.abs(analytic).max()), "expected: the same from the analytic matrices", "native")
             )

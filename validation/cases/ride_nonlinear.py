@@ -34,15 +34,15 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     rows = [*_gains(), *_fixed_point()]
     table = []
     for level in LEVELS[: 1 if quick else None]:
-        found, line = _level(level, quick)
-        rows += found
+        level_rows, line = _level(level, quick)
+        rows += level_rows
         table.append(line)
     rows += bent_in_engines(quick)
     if quick:
         return rows, {"levels": table, "spectra": {}}
     rows += [_linear_copies(), *_alone()]
-    found, shown = linear_in_engines()
-    return rows + found, {"levels": table, "spectra": shown}
+    level_rows, shown = linear_in_engines()
+    return rows + level_rows, {"levels": table, "spectra": shown}
 
 
 def _gains() -> list[Row]:
@@ -55,9 +55,9 @@ def _gains() -> list[Row]:
             cut = [(x - mean) / deviation for x in curve.arguments[1:-1]]
             force = expected(lambda x: curve(mean + deviation * x), cut)  # noqa: B023
             gain = expected(lambda x: curve(mean + deviation * x) * x, cut) / deviation  # noqa: B023
-            found = of_curve(curve, mean, deviation)
+            gains = of_curve(curve, mean, deviation)
             scale = max(abs(force), abs(gain) * deviation, 1e-3)
-            worst = max(worst, abs(found[0] - force) / scale, abs(found[1] - gain) * deviation / scale)
+            worst = max(worst, abs(gains[0] - force) / scale, abs(gains[1] - gain) * deviation / scale)
     for ratio in (0.1, 1.0, 10.0, 100.0):
         gain = expected(lambda x: np.tanh(ratio * x) * x, (-1.0 / ratio, 0.0, 1.0 / ratio)) / ratio  # noqa: B023
         dry = max(dry, abs(of_friction(1.0, 1.0, ratio) / gain - 1.0))
@@ -93,26 +93,26 @@ def _gains() -> list[Row]:
 def expected(law: Any, cuts: Any) -> float:
     """Mean of law(x) over the standard normal x, cut where the law has corners."""
     edges = np.unique(np.clip([-12.0, *cuts, 12.0], -12.0, 12.0))
-    found = [
+    integrals = [
         quad(lambda x: law(x) * np.exp(-x * x / 2), a, b, epsabs=0.0, epsrel=1e-12, limit=200)[0]
         for a, b in pairwise(edges)
     ]
-    return float(sum(found)) / np.sqrt(2 * np.pi)
+    return float(sum(integrals)) / np.sqrt(2 * np.pi)
 
 
 def _fixed_point() -> list[Row]:
     """Reached, and the same from elsewhere; gravity moves nothing in a vehicle that only goes up and down."""
     vehicle, road = ride(NONLINEAR, 4.0)
-    one, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
+    first, other = (statistically_linear(vehicle, road, SPEED, scale) for scale in (1.0, 10.0))
     unloaded = statistically_linear(replace(vehicle, gravity=0.0), road, SPEED)
-    apart = [off(each.covariance.deviation, one.covariance.deviation) for each in (other, unloaded)]
+    apart = [off(each.covariance.deviation, first.covariance.deviation) for each in (other, unloaded)]
     return [
         Observed(
             "ride_nonlinear.fixed_point",
             SYSTEM,
-            f"relative distance of the gains from the fixed point after {len(one.changes)} "
-            f"iterations, each change at most {one.contraction:.2g} of the last",
-            one.distance,
+            f"relative distance of the gains from the fixed point after {len(first.changes)} "
+            f"iterations, each change at most {first.contraction:.2g} of the last",
+            first.distance,
             "",
         ).at_most(1e-11, "last change * c / (1 - c), Banach's bound", "none"),
         Observed(
@@ -135,14 +135,14 @@ def _fixed_point() -> list[Row]:
 def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
     """Deviations and mean travel beside Monte Carlo, each by what its sentence promises."""
     vehicle, road = ride(NONLINEAR, level)
-    found = statistically_linear(vehicle, road, SPEED)
+    linear = statistically_linear(vehicle, road, SPEED)
     copies = copies_in_time(vehicle, road, SPEED, LASTING[not quick], copies=COPIES[not quick], seed=SEED)
     rows, cells = [], [f"{level:g}"]
     for i, name in enumerate(copies.names):
-        error = float(found.covariance.deviation[i] / copies.deviation[i] - 1.0)
+        error = float(linear.covariance.deviation[i] / copies.deviation[i] - 1.0)
         spread = float(copies.error[i] / copies.variance[i] / 2.0)
         cells.append(
-            f"{100 * error:+.1f} ± {100 * spread:.1f} % ({100 * found.left_out[i]:.1f} %, {copies.kurtosis[i]:.1f})"
+            f"{100 * error:+.1f} ± {100 * spread:.1f} % ({100 * linear.left_out[i]:.1f} %, {copies.kurtosis[i]:.1f})"
         )
         rows.append(
             Observed(
@@ -153,25 +153,25 @@ def _level(level: float, quick: bool) -> tuple[list[Row], list[str]]:
                 abs(error),
                 "",
             ).at_most(
-                promised(found.left_out[i]) + 4.0 * spread,
-                f"left out {100 * found.left_out[i]:.2g} % of the variance: what its sentence promises, "
+                promised(linear.left_out[i]) + 4.0 * spread,
+                f"left out {100 * linear.left_out[i]:.2g} % of the variance: what its sentence promises, "
                 "and 4 standard errors",
                 "none",
             )
         )
     travel = copies.names.index("travel front left")
     size = float(copies.deviation[travel])
-    shift = float(found.mean[travel] - copies.mean[travel]) / size
+    shift = float(linear.mean[travel] - copies.mean[travel]) / size
     rows.append(
         Observed(
             f"ride_nonlinear.mean.{level:g}",
             SYSTEM,
-            f"difference of the mean travel, {1e3 * found.mean[travel]:.2f} mm, from that of the "
+            f"difference of the mean travel, {1e3 * linear.mean[travel]:.2f} mm, from that of the "
             "copies, over its deviation",
             abs(shift),
             "",
         ).at_most(
-            promised(found.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
+            promised(linear.left_out[travel]) + 4.0 * float(copies.mean_error[travel]) / size,
             "as above: the damper pulls the body down",
             "none",
         )
@@ -206,10 +206,10 @@ def _alone() -> list[Row]:
     for name, (level, laws) in others.items():
         alone = replace(vehicle, springs=(replace(spring, **laws),))
         road = ride(NONLINEAR, level)[1]
-        found = statistically_linear(alone, road, SPEED)
+        linear = statistically_linear(alone, road, SPEED)
         copies = copies_in_time(alone, road, SPEED, LASTING[1], copies=COPIES[1] // 2, seed=SEED)
-        error = np.abs(found.covariance.deviation / copies.deviation - 1.0)
-        kept = [promised(share) for share in found.left_out] + 4.0 * copies.error / copies.variance / 2.0
+        error = np.abs(linear.covariance.deviation / copies.deviation - 1.0)
+        kept = [promised(share) for share in linear.left_out] + 4.0 * copies.error / copies.variance / 2.0
         worst = int((error / kept).argmax())
         rows.append(
             Observed(
@@ -221,7 +221,7 @@ def _alone() -> list[Row]:
                 "",
             ).at_most(
                 float(kept[worst]),
-                f"left out {100 * found.left_out[worst]:.2g} %: the promise, and 4 standard errors",
+                f"left out {100 * linear.left_out[worst]:.2g} %: the promise, and 4 standard errors",
                 "none",
             )
         )

@@ -55,7 +55,7 @@ def _paper_rows() -> list[Row]:
     closed = float(road.covariance(np.array(0.0), HALF_TRACK, HALF_TRACK))
     k = np.array([0.0, 1.0, 16.0])
     formula = (1.5**2 - 0.3**2) / (0.3**2 + 1.5**2 + 2.0 * k**2)
-    found = road.coherency(k, HALF_TRACK, -HALF_TRACK)
+    coherency = road.coherency(k, HALF_TRACK, -HALF_TRACK)
     return [
         Observed(
             "ride_road.level",
@@ -75,7 +75,7 @@ def _paper_rows() -> list[Row]:
             "ride_road.coherency",
             SYSTEM,
             "difference of the coherency at 0, 1 and 16 rad/m from (O2^2 - O1^2)/(O1^2 + O2^2 + 2 Omega^2)",
-            float(np.abs(found - formula).max()),
+            float(np.abs(coherency - formula).max()),
             "",
         ).at_most(1e-15, "equal shares at short waves", "closed form"),
     ]
@@ -189,7 +189,7 @@ def _route_rows(road: TwoTrackRoad) -> list[Row]:
     """Frequency route against covariance on the built-in vehicle, and the isotropic road through the same route."""
     vehicle = linearise(load_vehicle("r19_ride"))
     exact = _accelerations(stationary(excited(vehicle, excitation(road, vehicle.wheels), SPEED)).deviation, vehicle)
-    by_frequency, isotropic = (_by_frequency(vehicle, one) for one in (road, isotropic_like(road, HALF_TRACK)))
+    by_frequency, isotropic = (_by_frequency(vehicle, each) for each in (road, isotropic_like(road, HALF_TRACK)))
     rows = [
         Observed(
             "ride_road.route",
@@ -226,8 +226,8 @@ def _names(vehicle: LinearVehicle) -> list[str]:
 
 
 def _by_frequency(vehicle: LinearVehicle, road: TwoTrackRoad | IsotropicRoad) -> np.ndarray:
-    found = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *BAND)
-    return np.sqrt(_accelerations(found, vehicle))
+    spectral = variances(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, *BAND)
+    return np.sqrt(_accelerations(spectral, vehicle))
 
 
 def _weighting_rows() -> list[Row]:
@@ -275,11 +275,11 @@ def _weighted_rows() -> list[Row]:
     road = road_of_level(HALF_TRACK)
     filters = {"left occupant": "Wk", "body centre": "Wd"}
     system = weighted(excited(vehicle, excitation(road, vehicle.wheels), SPEED), filters)
-    found = stationary(system).deviation[-len(filters) :]
+    deviations = stationary(system).deviation[-len(filters) :]
     k, weight = both_sides(vehicle, *BAND)
     density = output_densities(vehicle, lambda k: spectral_matrix(road, vehicle.wheels, k), SPEED, k)
     rows = []
-    for value, (output, name) in zip(found, filters.items(), strict=True):
+    for value, (output, name) in zip(deviations, filters.items(), strict=True):
         gain = np.abs(WEIGHTINGS[name].response(SPEED * k / (2.0 * np.pi))) ** 2
         expected = math.sqrt(weight @ (gain * density[:, vehicle.names.index(output)]))
         rows.append(
@@ -315,8 +315,8 @@ def _inputs_table() -> Table:
 def _weighting_table() -> Table:
     rows = []
     for f, wk, wd in STANDARD:
-        own = [1e3 * abs(complex(WEIGHTINGS[name].response(np.array(f)))) for name in ("Wk", "Wd")]
-        rows.append((f"{f:g}", f"{own[0]:.1f}", f"{wk:g}", f"{own[1]:.1f}", f"{wd:g}"))
+        factors = [1e3 * abs(complex(WEIGHTINGS[name].response(np.array(f)))) for name in ("Wk", "Wd")]
+        rows.append((f"{f:g}", f"{factors[0]:.1f}", f"{wk:g}", f"{factors[1]:.1f}", f"{wd:g}"))
     note = "Factors times 1000; the table as others have printed it. Its Wd at 10 Hz does not fit its own parameters."
     heads = ("Hz", "Wk", "Wk, table", "Wd", "Wd, table")
     return Table("Weightings of ISO 2631-1", note, heads, tuple(rows))

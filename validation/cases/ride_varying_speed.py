@@ -56,8 +56,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
         return rows, {}
     rows += [*_limits("r19_ride", STOPS), *_limits("three_axle_truck", SHORT_STOPS)]
     data = {name: _drive(profile) for name, profile in DRIVES.items()}
-    for name, found in data.items():
-        rows += _copies(name, found)
+    for name, drive in data.items():
+        rows += _copies(name, drive)
     return rows + _constant(), data
 
 
@@ -118,22 +118,22 @@ def _limits(name: str, stops: SpeedProfile) -> list[Row]:
 def _adjoint() -> Row:
     """The end of a drive with a stop in it by the other route."""
     vehicle, road = ride("half_car")
-    found = varying_speed(vehicle, road, STOP_AND_GO)
+    varied = varying_speed(vehicle, road, STOP_AND_GO)
     exact = by_adjoint(vehicle, road, STOP_AND_GO, "body rear")
     return Observed(
         "ride_varying_speed.adjoint",
         SYSTEM,
         "half_car, a stop within its wheelbase and off again: relative difference of the body's rear "
         "acceleration from the adjoint",
-        off(found.of("body rear")[-1], exact),
+        off(varied.of("body rear")[-1], exact),
         "",
     ).at_most(1e-8, "the adjoint's solver is good to 1e-10", "closed form")
 
 
 def _damped() -> Row:
     """Tyre damping brings white noise into the tyre force, while the road moves."""
-    found = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
-    force, moving = found.of("tyre force front left"), found.speed > 0.0
+    varied = varying_speed(*ride("half_car", 100.0), SHORT_STOPS)
+    force, moving = varied.of("tyre force front left"), varied.speed > 0.0
     said = "infinite" if np.isinf(force[moving]).all() else "finite"
     said += ", finite" if np.isfinite(force[~moving]).all() else ", infinite"
     return behaves(
@@ -151,40 +151,40 @@ def _drive(profile: SpeedProfile) -> dict[str, Any]:
     vehicle, road = ride("r19_ride")
     instants = profile.times[-1] * np.array([0.25, 0.6, 0.95])
     copies, slow = _timed(along, vehicle, road, profile, instants, copies=COPIES, seed=SEED)
-    found, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
+    varied, fast = _timed(varying_speed, vehicle, road, profile, instants=copies.time)
     often = np.linspace(profile.times[0], profile.times[-1], 101)
-    columns = [found.names.index(point) for point in POINTS]
-    near = np.abs(found.time[:, None] - often).argmin(axis=0)
+    columns = [varied.names.index(point) for point in POINTS]
+    near = np.abs(varied.time[:, None] - often).argmin(axis=0)
     return {
-        "time": found.time[near].tolist(),
-        "speed": found.speed[near].tolist(),
-        "deviation": found.deviation[near][:, columns].tolist(),
-        "quasi": quasi_stationary(vehicle, road, found.speed[near])[:, columns].tolist(),
+        "time": varied.time[near].tolist(),
+        "speed": varied.speed[near].tolist(),
+        "deviation": varied.deviation[near][:, columns].tolist(),
+        "quasi": quasi_stationary(vehicle, road, varied.speed[near])[:, columns].tolist(),
         "instants": copies.time.tolist(),
         "copies": np.sqrt(copies.variance[:, columns]).tolist(),
         "error": (copies.error / 2.0 / np.sqrt(copies.variance))[:, columns].tolist(),
-        "z": copies.z(found.at(copies.time))[:, columns].tolist(),
-        "all": float(np.abs(copies.z(found.at(copies.time))).max()),
+        "z": copies.z(varied.at(copies.time))[:, columns].tolist(),
+        "all": float(np.abs(copies.z(varied.at(copies.time))).max()),
         "seconds": [fast, slow],
     }
 
 
-def _copies(name: str, found: dict[str, Any]) -> list[Row]:
+def _copies(name: str, drive: dict[str, Any]) -> list[Row]:
     """Copies at three instants in three points, all outputs beside, and the error of the quasi-stationary answer."""
-    error = off(np.array(found["quasi"]), np.array(found["deviation"]))
+    error = off(np.array(drive["quasi"]), np.array(drive["deviation"]))
     return [
         Observed(
             f"ride_varying_speed.copies.{name}",
             SYSTEM,
             f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants in 3 points of the body",
-            float(np.abs(found["z"]).max()),
+            float(np.abs(drive["z"]).max()),
             "",
         ).at_most(4.0, "of 9 normal values one beyond 4 in 1800 times", "none"),
         Observed(
             f"ride_varying_speed.outputs.{name}",
             SYSTEM,
             f"r19_ride {name}: largest |z| of {COPIES} Monte Carlo copies at 3 instants for all 16 outputs",
-            found["all"],
+            drive["all"],
             "",
         ).beside("below 4", "wheel loads and travels follow the same law", "none"),
         Observed(
@@ -257,10 +257,10 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
     Backward in time l' = -A' l from l = C: noise that axle i meets at t moves the output by l(t) . B_i. The drive
     begins in motion and is taken as even long before.
     """
-    one, two = (at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
-    steady, per_speed = (2.0 * one.A - two.A).T, (two.A - one.A).T
-    row = one.names.index(output)
-    seen = one.C[row] + (profile.speeds[-1] - 1.0) * (two.C - one.C)[row]
+    at_1, two = (at_speed(vehicle, road, speed) for speed in (1.0, 2.0))
+    steady, per_speed = (2.0 * at_1.A - two.A).T, (two.A - at_1.A).T
+    row = at_1.names.index(output)
+    seen = at_1.C[row] + (profile.speeds[-1] - 1.0) * (two.C - at_1.C)[row]
     slowest = -np.linalg.eigvals(at_speed(vehicle, road, float(profile.speeds[0])).A).real.max()
     pieces, cuts = {}, [profile.times[0] - 10.0 / slowest, *profile.times]
     for start, stop in reversed(list(pairwise(cuts))):
@@ -270,18 +270,18 @@ def by_adjoint(vehicle: LinearVehicle, road: Excitation, profile: SpeedProfile, 
             seen,
             method="DOP853",
             rtol=1e-10,
-            atol=1e-11 * np.abs(one.C[row]).max(),
+            atol=1e-11 * np.abs(at_1.C[row]).max(),
             dense_output=True,
         )
         pieces[start, stop], seen = back.sol, back.y[:, -1]
     places, weights = _path_points(profile, cuts, road.lengths)
-    response = np.zeros((len(places), one.B[0].shape[1]))
-    for B, length in zip(one.B, road.lengths, strict=True):
+    response = np.zeros((len(places), at_1.B[0].shape[1]))
+    for B, length in zip(at_1.B, road.lengths, strict=True):
         met = profile.time(places + length)
         for (start, stop), adjoint in pieces.items():
-            own = np.flatnonzero((met > start) & (met < stop))
-            if len(own):
-                response[own] += adjoint(met[own]).T @ B
+            then = np.flatnonzero((met > start) & (met < stop))
+            if len(then):
+                response[then] += adjoint(met[then]).T @ B
     return float(np.sqrt(weights @ (response**2).sum(axis=1)))
 
 
@@ -299,8 +299,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
     """z of the copies, instant by instant."""
     rows = [
         (name, f"{t:.2f} s", *(f"{value:.2f}" for value in z))
-        for name, found in data.items()
-        for t, z in zip(found["instants"], found["z"], strict=True)
+        for name, drive in data.items()
+        for t, z in zip(drive["instants"], drive["z"], strict=True)
     ]
     if not rows:
         return []
@@ -315,23 +315,23 @@ def draw(data: dict[str, Any]) -> list[tuple[str, Any]]:
     from models.drawing.figures import WIDE, heading, plt
 
     figure, axes = plt.subplots(1, 2, figsize=(WIDE, 3.9), sharey=True)
-    for axis, (name, found) in zip(axes, data.items(), strict=True):
+    for axis, (name, drive) in zip(axes, data.items(), strict=True):
         for column, point in enumerate(POINTS):
-            pick = [row[column] for row in found["deviation"]]
-            (line,) = axis.plot(found["time"], pick, label=point)
+            pick = [row[column] for row in drive["deviation"]]
+            (line,) = axis.plot(drive["time"], pick, label=point)
             colour = line.get_color()
-            axis.plot(found["time"], [row[column] for row in found["quasi"]], "--", color=colour, linewidth=1.0)
-            spread = [2.0 * row[column] for row in found["error"]]
+            axis.plot(drive["time"], [row[column] for row in drive["quasi"]], "--", color=colour, linewidth=1.0)
+            spread = [2.0 * row[column] for row in drive["error"]]
             axis.errorbar(
-                found["instants"],
-                [row[column] for row in found["copies"]],
+                drive["instants"],
+                [row[column] for row in drive["copies"]],
                 spread,
                 fmt="o",
                 color=colour,
                 markersize=3,
                 capsize=2,
             )
-        axis.set(title=f"{name}, {found['speed'][0]:.0f} to {found['speed'][-1]:.0f} m/s", xlabel="time [s]")
+        axis.set(title=f"{name}, {drive['speed'][0]:.0f} to {drive['speed'][-1]:.0f} m/s", xlabel="time [s]")
     axes[0].set_ylabel("standard deviation of\nvertical acceleration [m/s²]")
     axes[0].plot([], [], "k--", linewidth=1.0, label="quasi-stationary")
     axes[0].plot([], [], "ko", markersize=3, label=f"{COPIES} copies, 2 standard errors")

@@ -57,10 +57,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
         if quick:
             return rows + _graded(Path(name), ("reference",)), {"study": [], "prototype": []}
         rows += _graded(Path(name), IMPLEMENTATIONS)
-        found = _study(Path(name))
+        studied = _study(Path(name))
         long = _long(Path(name))
-    rows += [*_verdicts(found), *_blind(found), *_beside(long)]
-    return rows, {"study": found, "prototype": long}
+    rows += [*_verdicts(studied), *_blind(studied), *_beside(long)]
+    return rows, {"study": studied, "prototype": long}
 
 
 def _conventions() -> list[Row]:
@@ -103,9 +103,9 @@ def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         drive(folder, duration)
-        found = {engine: _sinking(engine, folder, duration) for engine in engines}
+        sunk = {engine: _sinking(engine, folder, duration) for engine in engines}
     rows = []
-    for engine, (drift, worst) in found.items():
+    for engine, (drift, worst) in sunk.items():
         rows += [
             Observed(
                 f"score.heave.drift.{engine}",
@@ -134,7 +134,7 @@ def _sinking(engine: str, folder: Path, duration: float) -> tuple[float, float]:
     """Heave error (m) and worst damage error."""
     scene = force_scene(folder, duration=duration)
     sinking = scene.model_copy(update={"start": dict.fromkeys(("z1_rate", "z2_rate", "z3_rate"), SINKING)})
-    still, moved = (simulate(one, engine) for one in (scene, sinking))
+    still, moved = (simulate(each, engine) for each in (scene, sinking))
     wrong = errors(moved, still)
     return wrong.heave_max, max(abs(ratio - 1) for ratio in wrong.damage.values())
 
@@ -173,10 +173,10 @@ def _study(folder: Path) -> list[Saved]:
     return rows
 
 
-def _verdicts(found: list[Saved]) -> list[Row]:
+def _verdicts(studied: list[Saved]) -> list[Row]:
     """Known-good and known-bad runs get their words; the blind one is judged where it can know."""
     rows = []
-    for row in found:
+    for row in studied:
         name, word, alone = row["method"], row["verdict"], row["without truth"]
         place = f"{row['engine']}, {row['road']}: {name}"
         if name in GOOD or name in BAD:
@@ -205,7 +205,7 @@ def _id(row: Saved) -> str:
     return ".".join((_slug(row["method"]), row["road"], row["engine"]))
 
 
-def _blind(found: list[Saved]) -> list[Row]:
+def _blind(studied: list[Saved]) -> list[Row]:
     """The vertical force of a run that has tumbled."""
     return [
         Observed(
@@ -222,7 +222,7 @@ def _blind(found: list[Saved]) -> list[Row]:
             "by it calls a tumbling run good; here it is shown, never judged by",
             "closed form",
         )
-        for row in found
+        for row in studied
         if row["method"] == "free"
     ]
 
@@ -264,7 +264,7 @@ def _beside(long: list[Saved]) -> list[Row]:
 
 def tables(data: Saved) -> list[Table]:
     """Every stabiliser on both roads, and the same over 60 s beside the prototype."""
-    found = []
+    tables = []
     shown = {"Stabilisers compared": data["study"], "Stabilisers over 60 s at 1 kHz": data["prototype"]}
     for title, rows in shown.items():
         if rows:
@@ -273,8 +273,8 @@ def tables(data: Saved) -> list[Table]:
                 "f3 is shown because it is blind. The last two columns: the verdict by damage, and that of an "
                 "engineer who has no true run."
             )
-            found.append(Table(title, note, HEADINGS, tuple(_cells(row) for row in rows)))
-    return found
+            tables.append(Table(title, note, HEADINGS, tuple(_cells(row) for row in rows)))
+    return tables
 
 
 HEADINGS = (

@@ -127,10 +127,10 @@ def _exact(follow: Follow, duration: float) -> list[Row]:
             f"stabilisers.{name}.{engine}",
             SYSTEM,
             f"{engine}, {words}: largest difference of any state from the reference",
-            trajectory_gap(checks.engine(engine), own, Settings(integrator, STEP, duration)),
+            trajectory_gap(checks.engine(engine), law, Settings(integrator, STEP, duration)),
             "SI",
         ).at_most(1e-12, "the same stages see the same side of the band and the same moment", "native")
-        for name, (own, words) in laws.items()
+        for name, (law, words) in laws.items()
         for engine, integrator in EXPLICIT.items()
     ]
 

@@ -40,8 +40,10 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
     """All systems that have samples; the quick share has a few of the pitch plane, and judges no shares."""
     names = list(SYSTEMS)
     counts = QUICK if quick else dict.fromkeys(names, -(-COUNT // len(names)))
-    found = [one for own in _made(counts) for one in own]
-    return [*_rows(found, quick), *(row for name in counts for row in _of_system(name, found))], {"samples": found}
+    samples = [sample for of_system in _made(counts) for sample in of_system]
+    return [*_rows(samples, quick), *(row for name in counts for row in _of_system(name, samples))], {
+        "samples": samples
+    }
 
 
 def _made(counts: dict[str, int]) -> list[list[Saved]]:
@@ -87,13 +89,13 @@ def ratio(true: float, stated: float) -> float:
     return true / stated if stated > 0.0 else (0.0 if true == 0.0 else math.inf)
 
 
-def _rows(found: list[Saved], quick: bool) -> list[Row]:
+def _rows(samples: list[Saved], quick: bool) -> list[Row]:
     """What is asked of all systems together; shares of the few samples of a quick run are reported."""
-    known = [one for one in found if one["ratio"] is not None]
-    right = _share(one["ratio"] <= NEAR or one["rounding"] for one in known)
-    useless = _share(one["ratio"] < TENTH and not one["rounding"] for one in known)
-    silent = [one for one in known if one["ratio"] > FAR and not (one["warned"] or one["rounding"])]
-    costs = [_cost(name, found) for name in dict.fromkeys(one["system"] for one in found)]
+    known = [sample for sample in samples if sample["ratio"] is not None]
+    right = _share(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
+    useless = _share(sample["ratio"] < TENTH and not sample["rounding"] for sample in known)
+    silent = [sample for sample in known if sample["ratio"] > FAR and not (sample["warned"] or sample["rounding"])]
+    costs = [_cost(name, samples) for name in dict.fromkeys(sample["system"] for sample in samples)]
     near = f"share of {len(known)} samples whose true error is at most {NEAR:g} times the stated error"
     below = f"share of {len(known)} samples whose true error is below a tenth of the stated error"
     asked, tenth = f"asked: {100 * SHARE:g} of 100", "asked: at most a tenth; below rounding no error tells anything"
@@ -127,8 +129,8 @@ def _rows(found: list[Saved], quick: bool) -> list[Row]:
         Observed(
             "stated_errors.without",
             SYSTEM,
-            f"results, of {len(found)} samples, that say why there is no number",
-            float(len(found) - len(known)),
+            f"results, of {len(samples)} samples, that say why there is no number",
+            float(len(samples) - len(known)),
             "",
         ).beside("few", "what does not repeat has no error of steps", "none"),
     ]
@@ -140,24 +142,29 @@ def _share(hits: Iterator[bool]) -> float:
     return float(np.mean(counted)) if counted else 1.0
 
 
-def _cost(name: str, found: list[Saved]) -> float:
+def _cost(name: str, samples: list[Saved]) -> float:
     """Median cost of a system's estimates, those without a number left out where others have one."""
-    own = [one for one in found if one["system"] == name]
-    return float(np.median([one["cost"] for one in own if one["ratio"] is not None] or [one["cost"] for one in own]))
+    of_system = [sample for sample in samples if sample["system"] == name]
+    return float(
+        np.median(
+            [sample["cost"] for sample in of_system if sample["ratio"] is not None]
+            or [sample["cost"] for sample in of_system]
+        )
+    )
 
 
-def _of_system(name: str, found: list[Saved]) -> list[Row]:
+def _of_system(name: str, samples: list[Saved]) -> list[Row]:
     """The same of one system, reported."""
-    own = [one for one in found if one["system"] == name]
-    known = [one for one in own if one["ratio"] is not None]
-    told = f"{name}, {len(known)} of {len(own)} samples"
-    near = _share(one["ratio"] <= NEAR or one["rounding"] for one in known)
-    middle = float(np.median([one["ratio"] for one in known])) if known else math.nan
+    of_system = [sample for sample in samples if sample["system"] == name]
+    known = [sample for sample in of_system if sample["ratio"] is not None]
+    told = f"{name}, {len(known)} of {len(of_system)} samples"
+    near = _share(sample["ratio"] <= NEAR or sample["rounding"] for sample in known)
+    middle = float(np.median([sample["ratio"] for sample in known])) if known else math.nan
     why = "all systems are judged together"
     shown = (
         ("near", f"share within {NEAR:g} times the stated error", near, 1.0),
         ("ratio", "median ratio of true to stated error", middle, 1.0),
-        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, found), COST),
+        ("cost", "median ratio of the cost of the estimate to that of the run", _cost(name, samples), COST),
     )
     return [
         Observed(f"stated_errors.{name}.{id}", SYSTEM, f"{told}: {what}", value, "").beside(expected, why, "none")
@@ -167,20 +174,22 @@ def _of_system(name: str, found: list[Saved]) -> list[Row]:
 
 def tables(data: Saved) -> list[Table]:
     """Every sample, those whose true error is the largest by the stated one first."""
-    known = sorted((one for one in data["samples"] if one["ratio"] is not None), key=lambda one: -one["ratio"])
+    known = sorted(
+        (sample for sample in data["samples"] if sample["ratio"] is not None), key=lambda sample: -sample["ratio"]
+    )
     rows = tuple(
         (
-            one["system"],
-            one["name"],
-            one["engine"],
-            one["channel"],
-            f"{one['stated']:.2g} {one['unit']}".rstrip(),
-            f"{100.0 * one['share']:.2g}{' (warned)' if one['warned'] else ''}",
-            f"{one['true']:.2g}",
-            f"{one['ratio']:.2g}",
-            f"{one['cost']:.2f}",
+            sample["system"],
+            sample["name"],
+            sample["engine"],
+            sample["channel"],
+            f"{sample['stated']:.2g} {sample['unit']}".rstrip(),
+            f"{100.0 * sample['share']:.2g}{' (warned)' if sample['warned'] else ''}",
+            f"{sample['true']:.2g}",
+            f"{sample['ratio']:.2g}",
+            f"{sample['cost']:.2f}",
         )
-        for one in known
+        for sample in known
     )
     heads = ("System", "Scene", "Engine", "Channel", "Stated", "in %", "True", "True / stated", "Cost")
     note = "Shares are of the channel's standard deviation over the run; the cost is estimate / run."
@@ -192,10 +201,10 @@ def draw(data: Saved) -> Drawn:
     from models.drawing.figures import BAD, GREY, ORANGE, TURNS, heading, plt
 
     figure, axis = plt.subplots(figsize=(6.5, 5.0))
-    known = [one for one in data["samples"] if one["ratio"] is not None and one["share"] > 0.0]
-    for name, colour in zip(dict.fromkeys(one["system"] for one in known), (*TURNS, BAD), strict=False):
-        stated = np.array([one["share"] for one in known if one["system"] == name])
-        ratios = np.array([one["ratio"] for one in known if one["system"] == name])
+    known = [sample for sample in data["samples"] if sample["ratio"] is not None and sample["share"] > 0.0]
+    for name, colour in zip(dict.fromkeys(sample["system"] for sample in known), (*TURNS, BAD), strict=False):
+        stated = np.array([sample["share"] for sample in known if sample["system"] == name])
+        ratios = np.array([sample["ratio"] for sample in known if sample["system"] == name])
         axis.plot(stated, np.maximum(stated * ratios, 1e-17), "o", color=colour, ms=5, label=name)
     ends = np.array([1e-16, 1.0])
     for factor, style in ((1.0, "-"), (NEAR, "--"), (FAR, ":"), (TENTH, ":")):

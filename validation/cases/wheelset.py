@@ -46,8 +46,8 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
     return rows, {
         "critical": speeds,
         "cycles": {
-            name: {engine: {key: float(getattr(orbit, key)) for key in kept} for engine, orbit in own.items()}
-            for name, own in cycles.items()
+            name: {engine: {key: float(getattr(orbit, key)) for key in kept} for engine, orbit in of_engine.items()}
+            for name, of_engine in cycles.items()
         },
     }
 
@@ -96,9 +96,9 @@ def _wave_rows(wheelsets: dict[str, Wheelset]) -> list[Row]:
 
 def _critical_rows(speeds: Speeds) -> list[Row]:
     """Critical speeds among each other: of those that have one, and whether all agree which those are."""
-    there = [[speed for speed in own.values() if speed is not None] for own in speeds.values()]
-    agreed = all(len(own) in (0, len(IMPLEMENTATIONS)) for own in there)
-    having = [own for own in there if len(own) == len(IMPLEMENTATIONS)]
+    there = [[speed for speed in of_engine.values() if speed is not None] for of_engine in speeds.values()]
+    agreed = all(len(of_engine) in (0, len(IMPLEMENTATIONS)) for of_engine in there)
+    having = [of_engine for of_engine in there if len(of_engine) == len(IMPLEMENTATIONS)]
     why = (
         "each linearises its own equations of motion around the same contact forces, and looks for itself: at all "
         "speeds for the chosen wheelset, for drawn ones near the first's and below"
@@ -241,9 +241,9 @@ def _cycle_rows(cycles: dict[str, dict[str, Orbit]]) -> list[Row]:
     """Amplitude and frequency: step-halving errors, and how far the engines are apart by these."""
     rows, count = list[Row](), len(cycles["chosen"])
     for value, error in (("amplitude", "error"), ("frequency", "frequency_error")):
-        every = [[(getattr(o, value), getattr(o, error)) for o in own.values()] for own in cycles.values()]
-        errors = max(e / v for own in every for v, e in own)
-        apart = max(float(np.ptp([v for v, _ in own])) / max(e for _, e in own) for own in every)
+        every = [[(getattr(o, value), getattr(o, error)) for o in of_engine.values()] for of_engine in cycles.values()]
+        errors = max(e / v for of_engine in every for v, e in of_engine)
+        apart = max(float(np.ptp([v for v, _ in of_engine])) / max(e for _, e in of_engine) for of_engine in every)
         of = f"{value} of the limit cycle of {len(cycles)} wheelsets above the critical speed"
         rows += [
             Observed(
@@ -311,8 +311,8 @@ def _fault_rows() -> list[Row]:
     with faults.creeping(faults.spin_reversed)()():
         spin = off(engine.rates(state), equations.rates(state))
     softer = CHOSEN.changed(stiffness_x=0.99 * CHOSEN.stiffness_x)
-    one, other = (critical_speed(wheelset, partial(growth, Equations)) for wheelset in (CHOSEN, softer))
-    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / one - 1.0) > 1e-6}
+    stiff, other = (critical_speed(wheelset, partial(growth, Equations)) for wheelset in (CHOSEN, softer))
+    seen = {"sign of the spin": right < 1e-10 < spin, "1 % of a stiffness": abs(other / stiff - 1.0) > 1e-6}
     return [
         behaves(
             f"wheelset.fault.{name.split()[-1]}",
@@ -329,7 +329,8 @@ def _fault_rows() -> list[Row]:
 def tables(data: dict[str, Any]) -> list[Table]:
     """Critical speeds and limit cycles."""
     speeds = tuple(
-        (name, *("none" if v is None else f"{v:.9g}" for v in own.values())) for name, own in data["critical"].items()
+        (name, *("none" if v is None else f"{v:.9g}" for v in of_engine.values()))
+        for name, of_engine in data["critical"].items()
     )
     cycles = tuple(
         (
@@ -341,8 +342,8 @@ def tables(data: dict[str, Any]) -> list[Table]:
             f"{o['frequency']:.8f}",
             f"{o['frequency_error']:.0e}",
         )
-        for name, own in data["cycles"].items()
-        for engine, o in own.items()
+        for name, of_engine in data["cycles"].items()
+        for engine, o in of_engine.items()
     )
     note = "In m/s, with linear creep; parameters drawn at random but for the chosen ones."
     heads = ("wheelset", "implementation", "speed [m/s]", "amplitude [mm]", "error", "frequency [Hz]", "error")

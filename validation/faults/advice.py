@@ -81,8 +81,8 @@ class Swing:
             values.append(_step(i * setting.value, values[-1], setting.value, places, weights))
         CLOCK.now += CALL * len(places) * n
         times = setting.value * np.arange(n + 1)
-        found = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
-        return times, np.array(found), len(places) * n
+        swing = np.where(times < 0.1, np.exp(np.sin(times)), np.nan) if setting.method == "broken" else values
+        return times, np.array(swing), len(places) * n
 
     def answer(self, solution: tuple[np.ndarray, np.ndarray, int]) -> Answer:
         """y."""
@@ -113,10 +113,10 @@ def _error(setting: Setting) -> float:
 @cache
 def _least(tolerance: float) -> int:
     """Fewest calls with which any setting holds the tolerance: all are run."""
-    own = Swing()
+    swing = Swing()
     return min(
-        own.solve(setting, own.whole)[2]
-        for ladder in own.ladders()
+        swing.solve(setting, swing.whole)[2]
+        for ladder in swing.ladders()
         for setting in map(ladder.setting, range(len(STEPS)))
         if _error(setting) <= tolerance
     )
@@ -178,19 +178,19 @@ def _in(name: str, change: Callable[[Any], Any], module: str = "recommendation")
 def _tenth(real: Any) -> Any:
     """Errors of the winners by ten."""
 
-    def told(*own: Any) -> Any:
-        known, timed, winners = real(*own)
-        return known, timed, {key: replace(one, error=one.error / 10.0) for key, one in winners.items()}
+    def told(*arguments: Any) -> Any:
+        known, timed, winners = real(*arguments)
+        return known, timed, {key: replace(choice, error=choice.error / 10.0) for key, choice in winners.items()}
 
     return told
 
 
 def _by_error(timed: list[Choice], engine: str, kind: str) -> Choice | None:
-    return min(timed, key=lambda one: one.error, default=None)
+    return min(timed, key=lambda choice: choice.error, default=None)
 
 
 def _dearest(timed: list[Choice], engine: str, kind: str) -> Choice | None:
-    return max(timed, key=lambda one: one.calls, default=None)
+    return max(timed, key=lambda choice: choice.calls, default=None)
 
 
 def _mean(self: Truth, other: Answer) -> float:

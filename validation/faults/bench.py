@@ -116,8 +116,8 @@ class Bench:
     @cache  # noqa: B019
     def accelerations(self, situation: str) -> np.ndarray:
         """The reference's accelerations (100, 4) in a situation."""
-        reference, own = checks.engine("reference"), self.settings("reference")
-        return checks.accelerations(reference, getattr(self, situation), own, random_states())
+        reference, settings = checks.engine("reference"), self.settings("reference")
+        return checks.accelerations(reference, getattr(self, situation), settings, random_states())
 
     def _swell(self, frequency: float) -> np.ndarray:
         """From 0 to 1 and back with a smooth start; frequency in rad/s."""
@@ -147,9 +147,9 @@ class Check:
 
 
 def _audit(bench: Bench, engine: str, make: Make) -> float:
-    own, states = bench.settings(engine), random_states()
+    settings, states = bench.settings(engine), random_states()
     return max(
-        relative(checks.accelerations(make, getattr(bench, name), own, states), bench.accelerations(name))
+        relative(checks.accelerations(make, getattr(bench, name), settings, states), bench.accelerations(name))
         for name in ("road", "linear")
     )
 

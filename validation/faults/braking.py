@@ -29,10 +29,10 @@ from validation.faults.patches import Patch, attribute
 SPLIT, STEP = road([Stretch(0.0, 1, 0)]), 5.5e-3
 
 
-def _first_step(own: Road, steer: float = 0.0) -> Moving:
+def _first_step(course: Road, steer: float = 0.0) -> Moving:
     """One step of the truck with all wheels locked, or steered and rolling; on SPLIT the left side is dry, else ice."""
     tables = tyre_table.stacked([stops.met("ice")[0], stops.met("dry")[0]])
-    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, own), 10.0, steer=steer, go=advance)
+    truck = Moving(on_road(plane_vehicle.truck(PAPER), tables, course), 10.0, steer=steer, go=advance)
     if not steer:
         truck.turning[:] = 0.0
     truck.on(np.full(4, 0.0 if steer else 1e5), STEP)
@@ -133,7 +133,9 @@ CHECKS = {
 
 def _truck(**change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Numbers of every truck changed."""
-    return attribute("models.brake.plane_vehicle:truck", lambda real: lambda *own: _changed(real(*own), change))
+    return attribute(
+        "models.brake.plane_vehicle:truck", lambda real: lambda *arguments: _changed(real(*arguments), change)
+    )
 
 
 def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]) -> Plane:
@@ -142,7 +144,7 @@ def _changed(plane: Plane, change: dict[str, Callable[[np.ndarray], np.ndarray]]
 
 
 def _brakes(change: Callable[[Any], Any]) -> Patch:
-    return attribute("models.brake.brake:of_wheels", lambda real: lambda *own: change(real(*own)))
+    return attribute("models.brake.brake:of_wheels", lambda real: lambda *arguments: change(real(*arguments)))
 
 
 def _literal(real: Any) -> Any:
@@ -172,14 +174,14 @@ def _spin(factor: float) -> Patch:
     """Spin inertia of the quarter vehicle's wheel in the step, not in the closed form."""
 
     def change(real: Any) -> Any:
-        return property(lambda own: _changed(real.fget(own), {"spin": lambda spin: factor * spin}))
+        return property(lambda truck: _changed(real.fget(truck), {"spin": lambda spin: factor * spin}))
 
     return attribute("models.brake.quarter:Quarter.plane", change)
 
 
 def _one_bit_less(real: Any) -> Any:
     """Converts with a bit less than it is told."""
-    return lambda own, *rest: real(own.model_copy(update={"bits": own.bits - 1}), *rest)
+    return lambda table, *rest: real(table.model_copy(update={"bits": table.bits - 1}), *rest)
 
 
 FAULTS = (

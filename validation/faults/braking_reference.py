@@ -33,8 +33,8 @@ def _law(sides: Callable[[int], tuple[np.ndarray, np.ndarray]], count: int = 60)
 
 def _accelerations() -> float:
     """Of a vehicle that is built anew, with the fault."""
-    found = whole.accelerations(whole.bent.__wrapped__(), ENGINE, COUNT)
-    return whole.apart(found, whole.plain_accelerations("bent", COUNT))
+    accelerations = whole.accelerations(whole.bent.__wrapped__(), ENGINE, COUNT)
+    return whole.apart(accelerations, whole.plain_accelerations("bent", COUNT))
 
 
 def _stop() -> float:

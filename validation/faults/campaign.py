@@ -57,7 +57,7 @@ class Campaign:
         """Size over tolerance of every check, without a fault first and then with each, or with every such one."""
         clean = {"fault": "no fault", "place": "nowhere", "ratios": self._ratios()}
         planted = self.faults[::every]
-        return [clean, *({"fault": own.name, "place": own.place, "ratios": self._with(own)} for own in planted)]
+        return [clean, *({"fault": fault.name, "place": fault.place, "ratios": self._with(fault)} for fault in planted)]
 
     def _with(self, fault: Fault) -> dict[str, float]:
         with fault.inside()():
@@ -68,19 +68,19 @@ class Campaign:
 
     def rows(self, records: list[Record]) -> list[Row]:
         """Caught, false alarms, and what one check alone catches."""
-        clean, *found = records
-        single = [f"{record['fault']} ({seen(record)[0]})" for record in found if len(seen(record)) == 1]
+        clean, *faulty = records
+        single = [f"{record['fault']} ({seen(record)[0]})" for record in faulty if len(seen(record)) == 1]
         return [
             Observed(
                 f"{self.id}.caught",
                 SYSTEM,
                 f"faults planted in {self.what} that a check catches",
-                sum(bool(seen(record)) for record in found),
+                sum(bool(seen(record)) for record in faulty),
                 "faults",
             ).within(
-                len(found),
+                len(faulty),
                 0,
-                f"every one of them makes it wrong; {len(found)} of {len(self.faults)} were planted",
+                f"every one of them makes it wrong; {len(faulty)} of {len(self.faults)} were planted",
                 "native",
             ),
             Observed(

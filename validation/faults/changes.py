@@ -26,9 +26,9 @@ def vehicle(change: Callable[[Vehicle], Vehicle]) -> Change:
 def struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
     """Each strut changed, with all struts of the vehicle at hand by name."""
 
-    def changed(own: Vehicle) -> Vehicle:
-        named = {strut.name: strut for strut in own.struts}
-        return replace(own, struts=tuple(change(strut, named) for strut in own.struts))
+    def changed(original: Vehicle) -> Vehicle:
+        named = {strut.name: strut for strut in original.struts}
+        return replace(original, struts=tuple(change(strut, named) for strut in original.struts))
 
     return vehicle(changed)
 
@@ -36,9 +36,9 @@ def struts(change: Callable[[Strut, dict[str, Strut]], Strut]) -> Change:
 def bodies(change: Callable[[Body, dict[str, Body]], Body]) -> Change:
     """Each body changed, with all bodies of the vehicle at hand by name."""
 
-    def changed(own: Vehicle) -> Vehicle:
-        named = {body.name: body for body in own.bodies}
-        return replace(own, bodies=tuple(change(body, named) for body in own.bodies))
+    def changed(original: Vehicle) -> Vehicle:
+        named = {body.name: body for body in original.bodies}
+        return replace(original, bodies=tuple(change(body, named) for body in original.bodies))
 
     return vehicle(changed)
 
@@ -47,10 +47,12 @@ def moved(place: Callable[[float, float, float], float]) -> Change:
     """Suspension points and axles at place(x, a, b) instead of x (m)."""
 
     def changed(assembly: Assembly) -> Assembly:
-        p, own = assembly.parameters, assembly.vehicle
-        held = tuple(replace(strut, upper=_at(strut.upper, place(strut.upper.x, p.a, p.b))) for strut in own.struts)
-        axles = tuple(replace(axle, x=place(axle.x, p.a, p.b)) for axle in own.axles)
-        return replace(assembly, vehicle=replace(own, struts=held, axles=axles))
+        p, changed_vehicle = assembly.parameters, assembly.vehicle
+        held = tuple(
+            replace(strut, upper=_at(strut.upper, place(strut.upper.x, p.a, p.b))) for strut in changed_vehicle.struts
+        )
+        axles = tuple(replace(axle, x=place(axle.x, p.a, p.b)) for axle in changed_vehicle.axles)
+        return replace(assembly, vehicle=replace(changed_vehicle, struts=held, axles=axles))
 
     return changed
 
@@ -59,11 +61,11 @@ def _at(point: Point, x: float) -> Point:
     return replace(point, x=x) if point.body == "chassis" else point
 
 
-def swapped(one: str, other: str) -> Change:
+def swapped(first: str, other: str) -> Change:
     """Stiffness and damping of two struts exchanged."""
 
     def change(strut: Strut, named: dict[str, Strut]) -> Strut:
-        source = named.get({one: other, other: one}.get(strut.name, strut.name), strut)
+        source = named.get({first: other, other: first}.get(strut.name, strut.name), strut)
         return replace(strut, stiffness=source.stiffness, damping=source.damping)
 
     return struts(change)
@@ -193,7 +195,9 @@ def times(factors: dict[int, float]) -> Values:
 
 def springs(change: Callable[[PitchSpring], PitchSpring]) -> Change:
     """Every pitch spring replaced."""
-    return vehicle(lambda own: replace(own, pitch_springs=tuple(change(spring) for spring in own.pitch_springs)))
+    return vehicle(
+        lambda original: replace(original, pitch_springs=tuple(change(spring) for spring in original.pitch_springs))
+    )
 
 
 def front_twice(values: np.ndarray) -> np.ndarray:

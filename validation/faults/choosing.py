@@ -69,21 +69,21 @@ def _runs_by(*functions: Any) -> JudgedByRuns:
 
 def _variances() -> float:
     """Reported changes against sums over frequencies."""
-    choice, own, _ = _by_frequency()
-    return float(np.abs(own - choice.confirmed).max())
+    choice, by_frequency, _ = _by_frequency()
+    return float(np.abs(by_frequency - choice.confirmed).max())
 
 
 def _kept() -> float:
     """Change by frequency of what is reported as kept, by the tolerance that was asked for."""
-    choice, own, _ = _by_frequency()
-    return choice.kept * float(np.abs(own).max()) / _linear().tolerance
+    choice, by_frequency, _ = _by_frequency()
+    return choice.kept * float(np.abs(by_frequency).max()) / _linear().tolerance
 
 
 def _predicted() -> float:
     """Octaves between predictions and changes by frequency; infinite for another sign."""
-    choice, own, _ = _by_frequency()
+    choice, by_frequency, _ = _by_frequency()
     with np.errstate(invalid="ignore", divide="ignore"):
-        octaves = np.abs(np.log2(choice.predicted / own)).max()
+        octaves = np.abs(np.log2(choice.predicted / by_frequency)).max()
     return float(np.nan_to_num(octaves, nan=np.inf))
 
 
@@ -95,14 +95,14 @@ def _nearby() -> float:
 
 def _runs() -> float:
     """Reported changes of a half car against two runs more."""
-    found = _by_runs()
-    return float(np.abs(found.again - found.choice.confirmed).max())
+    by_runs = _by_runs()
+    return float(np.abs(by_runs.again - by_runs.choice.confirmed).max())
 
 
 def _runs_kept() -> float:
     """Change by two runs more of what is reported as kept, by the tolerance that was asked for."""
-    found = _by_runs()
-    return found.choice.kept * float(found.again.max()) / _run().tolerance
+    by_runs = _by_runs()
+    return by_runs.choice.kept * float(by_runs.again.max()) / _run().tolerance
 
 
 CHECKS = {
@@ -125,8 +125,8 @@ def _other_sign(real: Any) -> Any:
 
 
 def _any_tolerance(real: Any) -> Any:
-    def init(chooser: Any, one: Any, two: Any, quantities: Any, tolerance: float, *more: Any) -> None:
-        real(chooser, one, two, quantities, 0.9, *more)
+    def init(chooser: Any, first: Any, two: Any, quantities: Any, tolerance: float, *more: Any) -> None:
+        real(chooser, first, two, quantities, 0.9, *more)
 
     return init
 
@@ -136,9 +136,9 @@ def _reported(change: Callable[[Chooser, frozenset[str], int], np.ndarray]) -> C
 
     def confirm(chooser: Chooser, chosen: frozenset[str]) -> np.ndarray:
         times = chooser.reach(chosen)
-        found = change(chooser, chosen, times)
-        chooser._confirmed[chosen] = times, found, np.zeros_like(found)
-        return found
+        shares = change(chooser, chosen, times)
+        chooser._confirmed[chosen] = times, shares, np.zeros_like(shares)
+        return shares
 
     return lambda real: confirm
 

@@ -35,18 +35,18 @@ UNITS = {
 
 def _streams() -> float:
     """Largest correlation of streams of two paths and two sources, in standard errors."""
-    own = [
+    streams = [
         noise.normal(3, path, noise.BLOCK, 1, source=source)[:, 0]
         for path in (0, 1)
         for source in (noise.FORCES, noise.GYRO)
     ]
-    return max(abs(float(one @ two)) / noise.BLOCK**0.5 for one, two in combinations(own, 2))
+    return max(abs(float(first @ two)) / noise.BLOCK**0.5 for first, two in combinations(streams, 2))
 
 
 def _variance() -> float:
     """Variance of a stream against 1, in standard errors."""
-    own = noise.normal(3, 0, noise.BLOCK, 1)
-    return abs(float(np.mean(own**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
+    stream = noise.normal(3, 0, noise.BLOCK, 1)
+    return abs(float(np.mean(stream**2)) - 1.0) * (noise.BLOCK / 2.0) ** 0.5
 
 
 def _again() -> float:
@@ -65,8 +65,8 @@ def _damage() -> float:
 
 def _pairs() -> float:
     """Range pairs of the standard's load by its printed cycles."""
-    found = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
-    return off(found, np.array([3.5, 3.5, 0.5]))
+    counts = counting.range_pairs(np.array(list(PRINTED)), np.array(list(PRINTED.values())), np.array([3.5, 4.0, 8.5]))
+    return off(counts, np.array([3.5, 3.5, 0.5]))
 
 
 def _crossings() -> float:
@@ -87,22 +87,22 @@ def _clock() -> float:
     grid, worst = np.arange(1000) / 1000.0 + 0.2, 0.0
     for rate in (200.0, 4000.0):
         times = np.arange(round(1.5 * rate)) / rate
-        found = resampling.onto(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
-        worst = max(worst, float(np.abs(found - np.sin(4 * np.pi * grid)).max()))
+        values = resampling.onto(times, np.sin(4 * np.pi * times), 1.0 / rate, grid)
+        worst = max(worst, float(np.abs(values - np.sin(4 * np.pi * grid)).max()))
     return worst
 
 
 def _gap() -> float:
     """Points that are numbers within a gap of ten samples, of nine."""
     times = np.delete(np.arange(100) / 100.0, np.arange(40, 49))
-    found = resampling.onto(times, times, 0.01, np.arange(41, 48) / 100.0)
-    return float(np.isfinite(found).sum())
+    values = resampling.onto(times, times, 0.01, np.arange(41, 48) / 100.0)
+    return float(np.isfinite(values).sum())
 
 
 def _sections() -> float:
     """An upward force on a body that stands on its tail, and one with its nose 30 degrees up: along the body."""
-    found = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
-    have = np.concatenate([found[name] for name in score.CHANNELS])
+    forces = score.section_forces(np.array([100.0, 200.0]), np.array([50.0, 0.0]), np.array([np.pi / 2, np.pi / 6]))
+    have = np.concatenate([forces[name] for name in score.CHANNELS])
     return off(have, np.array([100.0, 100.0, 0.0, 200.0 * 3**0.5 / 2, 50.0, 0.0, 0.0, 0.0]))
 
 
@@ -115,16 +115,16 @@ def _turning() -> tuple[SensorArray, np.ndarray, np.ndarray, np.ndarray]:
     none = np.zeros(COUNT)
     S = matrix(from_cardan(none, pitch, none))
     felt = np.einsum("nji,nj->ni", S, np.column_stack([none, none, heave - 9.81]))
-    w, alpha = (np.column_stack([none, own, none]) for own in (rate, turn))
+    w, alpha = (np.column_stack([none, component, none]) for component in (rate, turn))
     return sensor_array(PLACES), in_space(np.array(list(PLACES.values())), felt, w, alpha), pitch, heave
 
 
 def _motion() -> float:
     """Rates and vertical acceleration of that body from the readings."""
     array, read, _, heave = _turning()
-    found = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
+    moved_body = body.motion(array, read, PERIOD, body.Start(rates=(0.0, 0.6, 0.0)))
     rate = 0.6 * np.cos(2 * PERIOD * np.arange(COUNT))
-    return max(off(found.rates[:, 1], rate), off(found.acceleration[:, 2], heave))
+    return max(off(moved_body.rates[:, 1], rate), off(moved_body.acceleration[:, 2], heave))
 
 
 def _rigid() -> float:
@@ -185,7 +185,7 @@ def _onto(late: float = 0.0, change: Callable[[np.ndarray], np.ndarray] = np.asa
 def _factor(name: str, factor: float) -> Patch:
     return attribute(
         "models.measured.units:conversion",
-        lambda real: lambda unit, *own: real(unit, *own) * (factor if unit == name else 1.0),
+        lambda real: lambda unit, *arguments: real(unit, *arguments) * (factor if unit == name else 1.0),
     )
 
 
@@ -198,7 +198,9 @@ def _read(change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """Readings (n, 4, 3) of all sensors changed before motion is made of them."""
     return attribute(
         "models.sensors.rigid_body_motion:spin",
-        lambda real: lambda array, own: real(array, change(own) if own.shape[1] == len(PLACES) else own),
+        lambda real: (
+            lambda array, readings: real(array, change(readings) if readings.shape[1] == len(PLACES) else readings)
+        ),
     )
 
 

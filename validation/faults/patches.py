@@ -105,8 +105,8 @@ def turning_reference(original: Any) -> Any:
 
     def suspension(spec: Any, vehicle: Any, strut: Any, joints: Any) -> None:
         original(spec, vehicle, strut, joints)
-        own = spec.actuator(strut.name)
-        own.target, own.refsite = own.refsite, own.target
+        actuator = spec.actuator(strut.name)
+        actuator.target, actuator.refsite = actuator.refsite, actuator.target
 
     return suspension
 
@@ -131,8 +131,8 @@ def negative(original: Any) -> Any:
     """A method's result with the other sign, where it has one."""
 
     def method(*arguments: Any) -> Any:
-        found = original(*arguments)
-        return None if found is None else -found
+        answer = original(*arguments)
+        return None if answer is None else -answer
 
     return method
 

@@ -26,7 +26,10 @@ def measure(
 ) -> Saved:
     """Records of engines without a fault and with each of some, on some vehicles, under every check."""
     benches = [Bench(name, DURATION) for name in vehicles]
-    return {name: [_record(fault, benches) for fault in own] for name, own in (("clean", clean), ("faults", faults))}
+    return {
+        name: [_record(fault, benches) for fault in planted_here]
+        for name, planted_here in (("clean", clean), ("faults", faults))
+    }
 
 
 def _record(fault: Fault, benches: list[Bench]) -> Saved:
@@ -43,8 +46,8 @@ def _record(fault: Fault, benches: list[Bench]) -> Saved:
 
 def _ratio(fault: Fault, engine: str, name: str, bench: Bench) -> float | None:
     check = CHECKS[name]
-    found = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
-    return found if math.isfinite(found) else None
+    ratio = size(check, bench, engine, planted(fault, engine)) / check.tolerance(engine)
+    return ratio if math.isfinite(ratio) else None
 
 
 PLACES = {"description": DESCRIPTION, "input": INPUT, "adapter": ADAPTER, "equations": EQUATIONS}
@@ -72,7 +75,7 @@ def caught(record: Saved, vehicle: str = TWIN) -> bool:
 
 def rows(data: Saved) -> list[Row]:
     """Caught, false alarms, hidden by symmetry where both vehicles ran, and what one check alone catches."""
-    clean, found = data["clean"], data["faults"]
+    clean, faulty = data["clean"], data["faults"]
     alarms = sum(
         ratio is None or ratio > 1
         for record in clean
@@ -80,17 +83,17 @@ def rows(data: Saved) -> list[Row]:
         for ratios in vehicle.values()
         for ratio in ratios.values()
     )
-    single = [record for record in found if sum(seen(record, name) for name in CHECKS) == 1]
+    single = [record for record in faulty if sum(seen(record, name) for name in CHECKS) == 1]
     told = [f"{record['fault']} ({next(name for name in CHECKS if seen(record, name))})" for record in single]
     return [
         Observed(
             "planted.caught",
             SYSTEM,
             "planted faults that a check catches, asymmetric vehicle",
-            sum(map(caught, found)),
+            sum(map(caught, faulty)),
             "faults",
         ).within(
-            len(found), 0, f"every one of them is a wrong model; {len(found)} of {len(FAULTS)} were planted", "native"
+            len(faulty), 0, f"every one of them is a wrong model; {len(faulty)} of {len(FAULTS)} were planted", "native"
         ),
         Observed(
             "planted.false_alarms",
@@ -99,7 +102,7 @@ def rows(data: Saved) -> list[Row]:
             alarms,
             "alarms",
         ).within(0, 0, "a check that cries without a fault is no check", "native"),
-        *([_hidden(found)] if _both(data) else []),
+        *([_hidden(faulty)] if _both(data) else []),
         Observed("planted.single", SYSTEM, "planted faults that a single check catches", len(single), "faults").beside(
             "few", "what would pass if that check were dropped: " + (", ".join(told) or "none"), "native"
         ),
@@ -111,8 +114,8 @@ def _both(data: Saved) -> bool:
     return all(SYMMETRIC in record["ratios"] for record in data["faults"])
 
 
-def _hidden(found: list[Saved]) -> Row:
-    missed = [record for record in found if not caught(record, SYMMETRIC)]
+def _hidden(faulty: list[Saved]) -> Row:
+    missed = [record for record in faulty if not caught(record, SYMMETRIC)]
     why = "exchanges of front and rear, and terms in k3 b - k4 a: equal halves cannot show them"
     return Observed(
         "planted.hidden", SYSTEM, "planted faults that the symmetric vehicle of the paper hides", len(missed), "faults"

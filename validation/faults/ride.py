@@ -54,9 +54,9 @@ def _closed_form() -> float:
     """Body acceleration of the quarter car on a road of one state, from the values of its file."""
     q, corner = 1e-4, 0.3
     road = Excitation(np.array([[-corner]]), np.array([[q**0.5]]), (np.ones((1, 1)),), (0.0,))
-    found = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
+    variance = stationary(_system("quarter_car", lambda vehicle: road)[2]).variance[0]
     car = QuarterCar(297.15222009894956, 31.8960913028392, 24453.137879749014, 1786.2441002440723, 158294.1398119115)
-    return off(found, car.body_acceleration(q * SPEED, corner * SPEED))
+    return off(variance, car.body_acceleration(q * SPEED, corner * SPEED))
 
 
 @cache
@@ -78,14 +78,14 @@ def _heights() -> float:
     road = two_track.excitation(two_track.road_of_level(two_track.half_track(vehicle.wheels)), vehicle.wheels)
     from models.ride import excited
 
-    found = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
-    return off(found, _covariance_of_heights())
+    variance = stationary(excited.excited(replace(vehicle, outputs=outputs), road, SPEED)).variance
+    return off(variance, _covariance_of_heights())
 
 
 def _published_road() -> float:
     """Variance of a track of the paper's road: pi S0 / 2 (1 / 0.3 + 1 / 1.5)."""
-    found = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
-    return off(found, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
+    covariance = float(two_track.road_of_level(0.7).covariance(np.array(0.0), 0.7, 0.7))
+    return off(covariance, np.pi * 1.6e-5 / 2.0 * (1.0 / 0.3 + 1.0 / 1.5))
 
 
 def _frequencies() -> float:
@@ -123,11 +123,11 @@ def _equations() -> float:
     sizes = []
     for name in ("r19_ride", "r19_free"):
         vehicle = vehicle_file.load_vehicle(name)
-        own, (q, v, road) = spatial_linear.linearise(vehicle, SPEED), _state(vehicle)
+        linear, (q, v, road) = spatial_linear.linearise(vehicle, SPEED), _state(vehicle)
         z, rate = np.split(road, 2)
-        force = own.road_stiffness @ z + own.road_damping @ rate - own.stiffness @ q - own.damping @ v
-        found, wanted = np.linalg.solve(own.mass, force), _by_hand(name)
-        sizes.append(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
+        force = linear.road_stiffness @ z + linear.road_damping @ rate - linear.stiffness @ q - linear.damping @ v
+        accelerations, wanted = np.linalg.solve(linear.mass, force), _by_hand(name)
+        sizes.append(float(np.abs(accelerations - wanted).max() / np.abs(wanted).max()))
     return max(sizes)
 
 
@@ -135,8 +135,8 @@ def _states_of_weighting() -> float:
     """Wk's states against the formulas of its sections, at eight frequencies."""
     A, B, C = WEIGHTINGS["Wk"].matrices()
     frequency = np.geomspace(0.3, 200.0, 8)
-    found = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
-    return off(found, WEIGHTINGS["Wk"].response(frequency))
+    response = np.array([C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) for f in frequency])
+    return off(response, WEIGHTINGS["Wk"].response(frequency))
 
 
 def _table_of_weighting() -> float:
@@ -160,7 +160,9 @@ CHECKS = {
 
 def _vehicle(change: Callable[[SpatialVehicle], SpatialVehicle]) -> Patch:
     """Every vehicle that is loaded changed."""
-    return attribute("models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *own: change(real(*own)))
+    return attribute(
+        "models.vehicles.vehicle_file:load_vehicle", lambda real: lambda *arguments: change(real(*arguments))
+    )
 
 
 def _excited(change: Callable[[DelayedSystem, float], DelayedSystem]) -> Patch:
@@ -211,8 +213,8 @@ def _wrong_wk(real: Any) -> Any:
 
 
 def _lossy(real: Any) -> Any:
-    def matrices(own: Any) -> Any:
-        A, B, C = real(own)
+    def matrices(weighting: Any) -> Any:
+        A, B, C = real(weighting)
         A = A.copy()
         A[5, 2:4] = 0.0  # what the third section hears of the second
         return A, B, C

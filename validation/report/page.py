@@ -96,8 +96,8 @@ def independence(results: Saved, drawn: dict[str, Saved]) -> Saved:
     """How many rows of each case rest on which kind of second side; drawn : what is shown of each, by name."""
     lines = []
     for name in dict.fromkeys(map(case_of, results["rows"])):
-        own = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
-        lines.append((name, drawn[name]["title"], [own.count(kind) for kind in KINDS]))
+        kinds = [row["independence"] for row in results["rows"] if case_of(row) == name and row["status"] != "not run"]
+        lines.append((name, drawn[name]["title"], [kinds.count(kind) for kind in KINDS]))
     return {"kinds": KINDS, "lines": lines, "total": [sum(line[2][i] for line in lines) for i in range(len(KINDS))]}
 
 
@@ -107,11 +107,11 @@ NUMBERS_AND_RUNS = re.compile(r"\([^()]*\)|[-+\d.e]+")
 
 def allowances(rows: list[Saved]) -> list[tuple[str, list[Saved]]]:
     """Assumptions that runs broke with leave, those of alike runs once, and the rows that rest on these runs."""
-    found: dict[tuple[str, str], list[Saved]] = {}
+    alike_rows: dict[tuple[str, str], list[Saved]] = {}
     for row in rows:
         if row["allowed"]:
-            found.setdefault((case_of(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
-    return [(alike[0]["allowed"], alike) for alike in found.values()]
+            alike_rows.setdefault((case_of(row), NUMBERS_AND_RUNS.sub("", row["allowed"])), []).append(row)
+    return [(alike[0]["allowed"], alike) for alike in alike_rows.values()]
 
 
 def conventions() -> list[tuple[str, str]]:
@@ -148,7 +148,7 @@ def _parameter_modules() -> Iterator[tuple[str, ModuleType]]:
     """Parameter sets that follow the form: SOURCE and a pydantic PARAMETERS."""
     import models.vehicles.parameters as package
 
-    for name in sorted(found.name for found in pkgutil.iter_modules(package.__path__)):
+    for name in sorted(named.name for named in pkgutil.iter_modules(package.__path__)):
         module = import_module(f"{package.__name__}.{name}")
         if hasattr(module, "SOURCE") and hasattr(type(getattr(module, "PARAMETERS", None)), "model_fields"):
             yield name, module

@@ -38,8 +38,8 @@ assert set(QUICK_SHARES) == set(get_args(System)) and sum(QUICK_SHARES.values())
 @cache
 def full() -> dict[str, Saved]:
     """What the last full report had of each case: "rows" by system, "seconds", "commit"."""
-    found: dict[str, Saved] = json.loads(KEPT.read_text(encoding="utf-8"))
-    return found
+    kept: dict[str, Saved] = json.loads(KEPT.read_text(encoding="utf-8"))
+    return kept
 
 
 def case_of(row: Saved) -> str:
@@ -53,37 +53,39 @@ def shares(results: Saved) -> list[Saved]:
 
     A case counts to the system of most of its rows. What is not known of some case of a system is None.
     """
-    found = _counted(results["rows"])
-    main = {case: systems.most_common(1)[0][0] for case, systems in found.items()}
+    counted = _counted(results["rows"])
+    main = {case: systems.most_common(1)[0][0] for case, systems in counted.items()}
     return [
-        _line(system, found, main, results["provenance"]["seconds"])
+        _line(system, counted, main, results["provenance"]["seconds"])
         for system in QUICK_SHARES
-        if any(system in systems for systems in found.values())
+        if any(system in systems for systems in counted.values())
     ]
 
 
-def _line(system: str, found: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]) -> Saved:
-    own = [case for case in found if main[case] == system]
-    shared = [case for case in found if system in found[case]]
+def _line(system: str, counted: dict[str, Counter[str]], main: dict[str, str], seconds: dict[str, float]) -> Saved:
+    main_cases = [case for case in counted if main[case] == system]
+    shared = [case for case in counted if system in counted[case]]
     return {
         "name": system,
-        "cases": len(own),
-        "rows": sum(found[case][system] for case in shared),
-        "seconds": sum(seconds.get(case, 0.0) for case in own),
+        "cases": len(main_cases),
+        "rows": sum(counted[case][system] for case in shared),
+        "seconds": sum(seconds.get(case, 0.0) for case in main_cases),
         "stated": QUICK_SHARES[system],
         "full_rows": sum(full()[case]["rows"].get(system, 0) for case in shared)
         if full().keys() >= set(shared)
         else None,
-        "full_seconds": sum(full()[case]["seconds"] for case in own) if full().keys() >= set(own) else None,
+        "full_seconds": sum(full()[case]["seconds"] for case in main_cases)
+        if full().keys() >= set(main_cases)
+        else None,
     }
 
 
 def _counted(rows: list[Saved]) -> dict[str, Counter[str]]:
     """Rows of each case by system."""
-    found: dict[str, Counter[str]] = {}
+    counted: dict[str, Counter[str]] = {}
     for row in rows:
-        found.setdefault(case_of(row), Counter())[row["system"]] += 1
-    return found
+        counted.setdefault(case_of(row), Counter())[row["system"]] += 1
+    return counted
 
 
 def keep(folder: Path) -> None:

@@ -28,7 +28,7 @@ def shown(folder: Path, name: str) -> Saved:
     folder : of the saved data, ``CASE.json`` each. The same data give the same bytes in any process.
     """
     module = _module(name)
-    found: Saved = {
+    content: Saved = {
         "title": getattr(module, "TITLE", name.replace("_", " ")),
         "about": _doc(module),
         "share": _doc(getattr(module, "measure", None)),
@@ -37,21 +37,23 @@ def shown(folder: Path, name: str) -> Saved:
         "notes": [],
     }
     if module is None:
-        found["notes"].append("This version of twinrig has no such case; its rows are shown as they were saved.")
+        content["notes"].append("This version of twinrig has no such case; its rows are shown as they were saved.")
     if not (hasattr(module, "tables") or hasattr(module, "draw")):
-        return found
+        return content
     path = folder / f"{name}.json"
     try:
         saved = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        found["notes"].append(f"data/{path.name} is missing or damaged: no tables and figures.")
-        return found
+        content["notes"].append(f"data/{path.name} is missing or damaged: no tables and figures.")
+        return content
     for kind, make in (("tables", _tables), ("figures", _figures)):
         try:
-            found[kind] = list(make(module, saved, name))
+            content[kind] = list(make(module, saved, name))
         except Exception as error:  # old data under new code must still give a page
-            found["notes"].append(f"The {kind} cannot be shown from data/{path.name}: {type(error).__name__}: {error}")
-    return found
+            content["notes"].append(
+                f"The {kind} cannot be shown from data/{path.name}: {type(error).__name__}: {error}"
+            )
+    return content
 
 
 def _module(name: str) -> ModuleType | None:
@@ -105,7 +107,7 @@ def _svg(figure: Any, caption: str, key: str) -> str:
 
 def _shorter(path: re.Match[str]) -> str:
     """Coordinates of a path with two decimals: a hundredth of a point."""
-    rounded = re.sub(r"-?\d+\.\d+", lambda found: f"{float(found[0]):.2f}".rstrip("0").rstrip("."), path[0])
+    rounded = re.sub(r"-?\d+\.\d+", lambda matched: f"{float(matched[0]):.2f}".rstrip("0").rstrip("."), path[0])
     return rounded.replace("\n", " ")
 
 

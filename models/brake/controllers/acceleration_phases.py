@@ -52,21 +52,21 @@ class AccelerationPhases(Common):
 
 
 class _Logic:
-    def __init__(self, own: AccelerationPhases) -> None:
-        self._own, self._phase, self._rose, self._count = own, FIRST, False, 0
+    def __init__(self, settings: AccelerationPhases) -> None:
+        self._own, self._phase, self._rose, self._count = settings, FIRST, False, 0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        own, phase = self._own, self._phase
-        falls = gains < own.falls
+        settings, phase = self._own, self._phase
+        falls = gains < settings.falls
         if phase == FIRST and falls:
             phase = WAIT
-        if phase == STEP_UP and (falls or slip > own.deep):
-            phase = LET_GO if slip > own.slip else WAIT
-        if phase in (FIRST, WAIT) and slip > own.slip and (phase == WAIT or slip > own.deep):
+        if phase == STEP_UP and (falls or slip > settings.deep):
+            phase = LET_GO if slip > settings.slip else WAIT
+        if phase in (FIRST, WAIT) and slip > settings.slip and (phase == WAIT or slip > settings.deep):
             phase = LET_GO
-        elif phase == WAIT and gains > own.rises:
+        elif phase == WAIT and gains > settings.rises:
             phase, self._count = STEP_UP, 0
-        if phase == LET_GO and not falls and (slip < own.deep or gains > own.rises):
+        if phase == LET_GO and not falls and (slip < settings.deep or gains > settings.rises):
             phase, self._rose = RECOVER, False
         elif phase in (RECOVER, OVERSHOOT):
             phase = self._recovering(slip, gains)
@@ -74,13 +74,13 @@ class _Logic:
         return self._valve(phase)
 
     def _recovering(self, slip: float, gains: float) -> int:
-        own = self._own
-        self._rose = self._rose or gains > own.rises
-        if gains > own.rises_fast and slip < own.slip:
+        settings = self._own
+        self._rose = self._rose or gains > settings.rises
+        if gains > settings.rises_fast and slip < settings.slip:
             return OVERSHOOT
-        if gains <= own.rises and slip > own.deep:
+        if gains <= settings.rises and slip > settings.deep:
             return LET_GO
-        if gains <= own.rises and (self._rose or slip < own.slip):
+        if gains <= settings.rises and (self._rose or slip < settings.slip):
             self._count = 0
             return STEP_UP
         return RECOVER

@@ -50,21 +50,21 @@ class FivePhase(Common):
 FIRST = 0
 
 
-def end_of(phase: int, own: FivePhase) -> tuple[float, float]:
+def end_of(phase: int, settings: FivePhase) -> tuple[float, float]:
     """Sign of the way in which the wheel's acceleration (m/s^2) ends a phase, and the level at which it does."""
     if phase in (1, 2):
-        return 1.0, own.e1 if phase == 1 else own.e2
-    return -1.0, {3: own.e3, 4: own.e4}.get(phase, -own.e5)
+        return 1.0, settings.e1 if phase == 1 else settings.e2
+    return -1.0, {3: settings.e3, 4: settings.e4}.get(phase, -settings.e5)
 
 
-def rate(phase: int, own: FivePhase) -> float:
+def rate(phase: int, settings: FivePhase) -> float:
     """Rate of the pressure (bar/s) in a phase."""
-    return (own.fast, -own.falling, 0.0, own.fast, 0.0, own.slow)[phase]
+    return (settings.fast, -settings.falling, 0.0, settings.fast, 0.0, settings.slow)[phase]
 
 
 class _Logic:
-    def __init__(self, own: FivePhase) -> None:
-        self._own, self._phase, self._pressure = own, FIRST, 0.0
+    def __init__(self, settings: FivePhase) -> None:
+        self._own, self._phase, self._pressure = settings, FIRST, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
         sign, level = end_of(self._phase, self._own)

@@ -29,8 +29,8 @@ class SlipBangBang(Common):
 
 
 class _BangBang:
-    def __init__(self, own: SlipBangBang) -> None:
-        self._own, self._valve = own, APPLY
+    def __init__(self, settings: SlipBangBang) -> None:
+        self._own, self._valve = settings, APPLY
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
         if slip > self._own.release:
@@ -56,13 +56,13 @@ class SlipPI(Common):
 
 
 class _Loop:
-    def __init__(self, own: SlipPI) -> None:
-        self._own, self._sum = own, 0.0
+    def __init__(self, settings: SlipPI) -> None:
+        self._own, self._sum = settings, 0.0
 
     def decide(self, slip: float, gains: float, speed: float, supply: float) -> float:
-        own = self._own
-        error = own.target - (slip - own.mix * gains / 9.81)
-        gain = own.gain * speed
-        total = self._sum + gain * error * own.period / own.reset
+        settings = self._own
+        error = settings.target - (slip - settings.mix * gains / 9.81)
+        gain = settings.gain * speed
+        total = self._sum + gain * error * settings.period / settings.reset
         self._sum = min(max(total, 0.0), supply)
         return min(max(self._sum + gain * error, 0.0), supply)

@@ -52,7 +52,7 @@ class Pressures:
 
     def _reached(self, time: float) -> np.ndarray:
         """The command that holds at a time (s) in the latest sample."""
-        known = [own for own, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
+        known = [arrived for arrived, late in zip(self.commands, self._arrivals(time), strict=True) if late <= 0.0]
         return known[-1] if known else np.full(self.air.pressure.size, RELEASE)
 
     def _press(self, valves: np.ndarray, time: float) -> None:

@@ -23,8 +23,8 @@ def _under(road: Road, way: np.ndarray, kind: int) -> Surface:
         sides, share = [int(road.right[first]), int(road.left[first])], (left - road.line) / (left - right)
     else:
         sides, share = 2 * [int((road.left if right >= road.line else road.right)[first])], 0.0
-    one, other = (side * road.kinds + kind for side in sides)
-    return Surface(one, other, float(share) if one != other else 0.0)
+    near, far = (side * road.kinds + kind for side in sides)
+    return Surface(near, far, float(share) if near != far else 0.0)
 
 
 def _stretch(road: Road, x: float) -> int:

@@ -55,41 +55,41 @@ class Steps:
     def __init__(self, vehicle: Suspension, course: Course, step: float) -> None:
         self.vehicle, self.course, self.step = vehicle, course, step
 
-    def on(self, own: Moving, torques: np.ndarray) -> tuple[int, float]:
+    def on(self, moving: Moving, torques: np.ndarray) -> tuple[int, float]:
         """One step from torques (2, W) at its start to those at its end (N m): how it ended and the time (s)."""
-        half, (q, v) = 0.5 * self.step, own.state
-        under, middle = self._under(own.state, self.step), np.array([torques[0], torques.mean(axis=0)])
+        half, (q, v) = 0.5 * self.step, moving.state
+        under, middle = self._under(moving.state, self.step), np.array([torques[0], torques.mean(axis=0)])
         contacts = self._contacts(q, v)
         starts = speeds(contacts)
-        if own.lag is not None:
-            own.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
-        held = self._hold(own, contacts, starts, under, middle, half)
+        if moving.lag is not None:
+            moving.lag.reach(np.array([starts, [contact.sliding for contact in contacts]]), half)
+        held = self._hold(moving, contacts, starts, under, middle, half)
         rates = self.vehicle.acceleration(q, v, held)
-        own.found[:] = rates[: own.found.size]
-        rest = self.rests(own)
+        moving.found[:] = rates[: moving.found.size]
+        rest = self.rests(moving)
         if rest is not None:
-            own.state[0] += rest * v + 0.5 * rest**2 * rates
-            own.state[1, : own.found.size], own.turning[:] = 0.0, 0.0
-            return (AT_REST, rest) if rest < self.step else (self._upright(own), self.step)
+            moving.state[0] += rest * v + 0.5 * rest**2 * rates
+            moving.state[1, : moving.found.size], moving.turning[:] = 0.0, 0.0
+            return (AT_REST, rest) if rest < self.step else (self._upright(moving), self.step)
         contacts = self._contacts(q + half * v + 0.5 * half**2 * rates, v + half * rates)
-        own.changes[:] = (speeds(contacts) - starts) / half
-        held = self._hold(own, contacts, starts, under, torques, self.step)
+        moving.changes[:] = (speeds(contacts) - starts) / half
+        held = self._hold(moving, contacts, starts, under, torques, self.step)
         after = march(lambda _, x, u: self.vehicle.acceleration(x, u, held), q.copy(), v.copy(), 1, self.step)[-1]
-        own.state[:], own.turning[:] = after.reshape(2, -1), own.report[:, SPINS]
-        return self._upright(own), self.step
+        moving.state[:], moving.turning[:] = after.reshape(2, -1), moving.report[:, SPINS]
+        return self._upright(moving), self.step
 
     def rolling(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n,) of a state (2, n) whose wheels roll without brakes, and their speeds of turning (W,)."""
         plane, contacts = self.course.on.plane, self._contacts(state[0], state[1])
         starts = speeds(contacts)
         none, report = np.zeros((2, starts.size)), np.zeros((starts.size, SPINS + 1))
-        own = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(3))
+        moving = Moving(state, starts / plane.radius, np.zeros(starts.size), report, np.zeros(3))
         under = self._under(state, 0.0)
-        held = self._hold(own, contacts, starts, under, none, self.step)
-        return self.vehicle.acceleration(state[0], state[1], held), own.turning
+        held = self._hold(moving, contacts, starts, under, none, self.step)
+        return self.vehicle.acceleration(state[0], state[1], held), moving.turning
 
-    def _upright(self, own: Moving) -> int:
-        return FINE if np.abs(own.state[0, LEANS]).max() <= UPRIGHT else OVER
+    def _upright(self, moving: Moving) -> int:
+        return FINE if np.abs(moving.state[0, LEANS]).max() <= UPRIGHT else OVER
 
     def _under(self, state: np.ndarray, time: float) -> list[Surface]:
         """Surfaces under the wheels, which go straight on for a time (s)."""
@@ -101,7 +101,7 @@ class Steps:
 
     def _hold(
         self,
-        own: Moving,
+        moving: Moving,
         contacts: list[Contact],
         starts: np.ndarray,
         under: list[Surface],
@@ -111,21 +111,21 @@ class Steps:
         """Forces over a time (s) by loads and motion at contacts; the reports are filled."""
         course = self.course
         for i, contact in enumerate(contacts):
-            motion = Motion(starts[i], own.changes[i], contact.passing, contact.sliding, course.regular)
-            if own.lag is not None:
-                motion = replace(motion, across=own.lag.across(i, max(motion.forwards, course.regular)))
+            motion = Motion(starts[i], moving.changes[i], contact.passing, contact.sliding, course.regular)
+            if moving.lag is not None:
+                motion = replace(motion, across=moving.lag.across(i, max(motion.forwards, course.regular)))
             radius, inertia = float(course.on.plane.radius[i]), float(course.on.plane.spin[i])
-            braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, own.turning[i])
-            own.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)
-        spun = course.on.plane.spin * (own.report[:, SPINS] - own.turning) / time
-        return Held(course.steer, own.report[:, :2].copy(), spun)
+            braked = Braked((torques[0, i], torques[1, i]), time, radius, inertia, moving.turning[i])
+            moving.report[i] = tyre(course.on.tables, under[i], motion, contact.load, braked)
+        spun = course.on.plane.spin * (moving.report[:, SPINS] - moving.turning) / time
+        return Held(course.steer, moving.report[:, :2].copy(), spun)
 
-    def rests(self, own: Moving) -> float | None:
+    def rests(self, moving: Moving) -> float | None:
         """Time (s) within the step at which the plane motion has least energy, where it was about to end in it."""
-        plane, v, a = self.course.on.plane, own.state[1, :3], own.found
+        plane, v, a = self.course.on.plane, moving.state[1, :3], moving.found
         weights = np.array([plane.masses.sum(), plane.masses.sum(), plane.inertias[0]])
         speed, falling, rate = (float(weights @ product) for product in (v * v, -v * a, a * a))
-        if speed == 0.0 and not own.turning.any():
+        if speed == 0.0 and not moving.turning.any():
             return 0.0
         if rate == 0.0 or falling <= 0.0:
             return None

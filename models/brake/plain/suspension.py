@@ -79,8 +79,10 @@ class Suspension:
         axle = heading @ (-np.sin(steer), np.cos(steer), 0.0)
         along = heading @ (np.cos(steer), np.sin(steer), 0.0)
         height = max(float(hub[PLACE, 2]), 0.0)
-        own, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._chassis)
-        turning = own + axle * (axle @ (carrying - own))  # the rim does not turn beside the chassis about its axle
+        hub_turning, carrying = motion.turning(int(self._hubs.rows[i])), motion.turning(self._chassis)
+        turning = hub_turning + axle * (
+            axle @ (carrying - hub_turning)
+        )  # the rim does not turn beside the chassis about its axle
         sliding = hub[RATE] + height * round_the_vertical(turning)
         return Contact(along, axle, height, self._load(i, hub), float(hub[RATE] @ along), float(sliding @ axle))
 
@@ -124,7 +126,7 @@ class Suspension:
         position."""
         still, straight = np.zeros(self.size), np.zeros(len(self.tyres))
         motions = [self.bodies.move(still, rate) for rate in np.eye(self.size)]
-        across = np.array([[own.sliding for own in self.contacts(motion, straight)] for motion in motions])
+        across = np.array([[sliding.sliding for sliding in self.contacts(motion, straight)] for motion in motions])
         mass, _ = self.bodies.inertia(motions[0], self._gravity)
         damping = np.linalg.solve(mass, across @ (self.loads[:, None] * across.T))
         return float(np.linalg.eigvals(damping).real.max())

@@ -20,13 +20,13 @@ def weights(nodes: np.ndarray, value: float) -> np.ndarray:
     """Weight (n,) of each node at a value, the end's one beyond it."""
     inside = float(np.clip(value, nodes[0], nodes[-1]))
     high = min(max(int(np.searchsorted(nodes, inside)), 1), nodes.size - 1)
-    found = np.zeros(nodes.size)
+    weights_at = np.zeros(nodes.size)
     if nodes.size == 1:
-        found[0] = 1.0
-        return found
-    found[high] = (inside - nodes[high - 1]) / (nodes[high] - nodes[high - 1])
-    found[high - 1] = 1.0 - found[high]
-    return found
+        weights_at[0] = 1.0
+        return weights_at
+    weights_at[high] = (inside - nodes[high - 1]) / (nodes[high] - nodes[high - 1])
+    weights_at[high - 1] = 1.0 - weights_at[high]
+    return weights_at
 
 
 @dataclass(frozen=True)

@@ -56,32 +56,32 @@ class Faulty:
     _valves: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        self._past = deque(maxlen=1 + max((one.samples or 0 for one in self.faults), default=0))
+        self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, given: Sample) -> Command:
         """Its answer to signals with faults, with faults."""
         time = 1e-9 * given.time
-        here = [one for one in self.faults if one.holds(time)]
+        here = [fault for fault in self.faults if fault.holds(time)]
         command = self.inner.sample(given._replace(wheels=self._signals(given.wheels, here)))
         return command if command.valves is None else Command(valves=self._stuck(np.array(command.valves), here))
 
     def _signals(self, wheels: np.ndarray, here: list[Fault]) -> np.ndarray:
         self._past.append(wheels)
         seen = wheels.copy()
-        for one in here:
-            for i in one.of(wheels.size):
-                if one.kind == "delayed":
-                    seen[i] = self._past[max(len(self._past) - 1 - (one.samples or 0), 0)][i]
-                elif one.kind == "lost" and self._seen is not None:
+        for fault in here:
+            for i in fault.of(wheels.size):
+                if fault.kind == "delayed":
+                    seen[i] = self._past[max(len(self._past) - 1 - (fault.samples or 0), 0)][i]
+                elif fault.kind == "lost" and self._seen is not None:
                     seen[i] = self._seen[i]
         self._seen = seen
         return seen
 
     def _stuck(self, valves: np.ndarray, here: list[Fault]) -> np.ndarray:
-        for one in here:
-            for i in one.of(valves.size) if one.kind == "stuck" else ():
-                if one.state is not None:
-                    valves[i] = one.state
+        for fault in here:
+            for i in fault.of(valves.size) if fault.kind == "stuck" else ():
+                if fault.state is not None:
+                    valves[i] = fault.state
                 elif self._valves is not None:
                     valves[i] = self._valves[i]
         self._valves = valves
@@ -91,6 +91,9 @@ class Faulty:
 def missing_teeth(faults: list[Fault], wheel: int, tooth: int, time: float) -> bool:
     """Whether a tooth of a wheel is missing at a time (s)."""
     return any(
-        one.kind == "tooth" and one.tooth == tooth and (one.wheels is None or wheel in one.wheels) and one.holds(time)
-        for one in faults
+        fault.kind == "tooth"
+        and fault.tooth == tooth
+        and (fault.wheels is None or wheel in fault.wheels)
+        and fault.holds(time)
+        for fault in faults
     )

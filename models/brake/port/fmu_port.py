@@ -97,7 +97,7 @@ def _references(names: dict[str, tuple[int, str]], kind: str, wheels: int) -> li
 
 def _names(description: Any, wheels: int, file: str) -> dict[str, tuple[int, str]]:
     """Variables by name; raises InputError if one is missing or of a type that does not fit."""
-    names = {one.name: (one.valueReference, one.type) for one in description.modelVariables}
+    names = {variable.name: (variable.valueReference, variable.type) for variable in description.modelVariables}
     kind = "valve" if "valve_1" in names else "pressure"
     wanted: dict[str, tuple[str, ...]] = {f"wheel_{i + 1}": ("Real",) for i in range(wheels)}
     wanted |= {f"{kind}_{i + 1}": ("Real", "Integer") if kind == "valve" else ("Real",) for i in range(wheels)}

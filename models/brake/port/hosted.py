@@ -120,6 +120,6 @@ def hosted(guest: Guest, timeout: float, start: float) -> Iterator[Hosted]:
     """
     code = f"import sys; sys.path[:] = {sys.path!r}; from models.brake.port.host import main; main(int(sys.argv[1]))"
     with connected([sys.executable, "-c", code, "{port}"], 0, timeout, STARTUP) as port:
-        own = Hosted(port.link, port.process, timeout)
-        own.begin(guest, start)
-        yield own
+        host = Hosted(port.link, port.process, timeout)
+        host.begin(guest, start)
+        yield host

@@ -42,14 +42,14 @@ class Channels:
 
     def __call__(self, number: int, values: np.ndarray) -> np.ndarray:
         """What arrives of the values (count,) of a sample."""
-        own = self.conversion
-        if own.gain != 1.0 or own.offset != 0.0:
-            values = own.gain * values + own.offset
-        if own.noise > 0.0:
-            values = values + own.noise * self._drawn(number)
-        if own.bits is not None and own.range is not None:
-            last = 2.0**own.bits - 1.0
-            values = np.rint(np.clip(values / own.range, 0.0, 1.0) * last) * own.range / last
+        conversion = self.conversion
+        if conversion.gain != 1.0 or conversion.offset != 0.0:
+            values = conversion.gain * values + conversion.offset
+        if conversion.noise > 0.0:
+            values = values + conversion.noise * self._drawn(number)
+        if conversion.bits is not None and conversion.range is not None:
+            last = 2.0**conversion.bits - 1.0
+            values = np.rint(np.clip(values / conversion.range, 0.0, 1.0) * last) * conversion.range / last
         return values
 
     def _drawn(self, number: int) -> np.ndarray:

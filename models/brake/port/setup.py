@@ -93,14 +93,14 @@ class Run:
 
 
 @contextmanager
-def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Controller, WallClock | None]]:
+def opened(table: PortTable, run: Run, controller: Controller) -> Iterator[tuple[Controller, WallClock | None]]:
     """The controller of one run, for as long as the block lasts, and its clock if it keeps to one.
 
-    own : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
+    controller : stands behind the port if the table names nothing else. Raises InputError, RunFailed.
     """
     check_port(table, run)
     with ExitStack() as stack:
-        inner = Asked(stack.enter_context(_behind(table, run, own)), WITH_SLOW if run.slow else STATES)
+        inner = Asked(stack.enter_context(_behind(table, run, controller)), WITH_SLOW if run.slow else STATES)
         clock = WallClock(inner, run.sample) if table.pace == "wall" else None
         watched: Controller = inner if clock is None else clock
         if table.log is not None:
@@ -113,7 +113,7 @@ def opened(table: PortTable, run: Run, own: Controller) -> Iterator[tuple[Contro
 
 
 @contextmanager
-def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]:
+def _behind(table: PortTable, run: Run, controller: Controller) -> Iterator[Controller]:
     """What answers."""
     with ExitStack() as stack:
         if table.command is not None or table.port is not None:
@@ -133,7 +133,7 @@ def _behind(table: PortTable, run: Run, own: Controller) -> Iterator[Controller]
                 made = stack.enter_context(hosted(guest, table.timeout, table.patience))
             yield made
         else:
-            yield own
+            yield controller
 
 
 @contextmanager

@@ -28,9 +28,9 @@ class Teeth(Strict):
 class Counted:
     """Teeth of W wheels, from sample 0 on. radius (W,): m; missing(wheel, tooth, time in s): whether one is missing."""
 
-    def __init__(self, own: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
-        self._own, self._missing = own, missing
-        self._way = (2.0 * math.pi / own.teeth * radius).tolist()
+    def __init__(self, teeth: Teeth, radius: np.ndarray, missing: Missing | None = None) -> None:
+        self._own, self._missing = teeth, missing
+        self._way = (2.0 * math.pi / teeth.teeth * radius).tolist()
         self._wheels: list[_Wheel] = []
         self._before = 0.0
 
