@@ -292,7 +292,9 @@ def engine_spectra_figure(
 
 def _few(count: int) -> tuple[plt.Figure, list[plt.Axes]]:
     """Two or three small panels beside each other."""
-    return panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
+    figure, axes = panels(count, 2 if count in (1, 2, 4) else 3, 2.6)
+    figure.set_figheight(figure.get_figheight() + 0.8)  # for title and legend
+    return figure, axes
 
 
 def _name_below(axis: plt.Axes, drop: float = 0.18) -> None:

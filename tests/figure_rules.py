@@ -25,7 +25,8 @@ def faults(figure: Figure) -> list[str]:
 
 def _texts(figure: Figure) -> list[Text]:
     """All that is written, without marks of axes beyond their ends."""
-    beyond = {id(label) for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for label in _beyond(axis)}
+    every = [own for axes in figure.axes for own in (axes, *axes.child_axes)]
+    beyond = {id(label) for axes in every for axis in (axes.xaxis, axes.yaxis) for label in _beyond(axis)}
     written = [text for text in figure.findobj(Text) if text.get_text().strip() and id(text) not in beyond]
     return [text for text in written if _visible(text)]
 

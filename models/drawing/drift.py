@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import NullLocator
 
 from models.core.told import Results
 from models.drawing.figures import (
@@ -161,6 +162,8 @@ def stiffness(sweep: dict[str, np.ndarray], level: Any, limits: Limits, grade: f
         )
         above = axis.secondary_xaxis("top", functions=turning)
         above.set_xlabel("cut-off of the equivalent high-pass [Hz]")
+        figure.draw_without_rendering()  # an axis beside another one takes its scale and its marks when it is drawn
+        above.xaxis.set_minor_locator(NullLocator())
     why = (
         "what the stiffness does"
         if grade is None

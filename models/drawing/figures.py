@@ -102,7 +102,10 @@ def heading(figure: Figure, title: str, results: Results | None = None) -> None:
     size, wide = plt.rcParams["figure.titlesize"], figure.get_figwidth()
     figure.suptitle(wrapped(title, wide, size), x=0.01, ha="left", fontweight="bold")
     if told := remarks(results or {}):
-        broken = wrapped("\n".join(told), 1.2 * wide, REMARK)
+        broken = wrapped("\n".join(told), 1.12 * wide, REMARK)
+        figure.set_figheight(
+            figure.get_figheight() + 1.2 * REMARK / 72 * (1 + broken.count("\n"))
+        )  # panels keep theirs
         lines = "\n".join((broken, *[" "] * _lines_of_legends(figure)))
         figure.supxlabel(lines, x=0.01, ha="left", fontsize=REMARK, color=BAD)
 
