@@ -17,12 +17,15 @@ function find() {
   const finding = Boolean(words.length || place.value || status.value || grounds.value);
   const fits = each => words.every(word => each.words.includes(word)) &&
     [each.status, ""].includes(status.value) && [each.grounds, ""].includes(grounds.value);
-  const counts = cases.map(each => each.groups.map(({ group, rows }) => {
+  const counts = cases.map(each => {
     const inside = each.places.includes(place.value);
-    const count = rows.filter(row => !(row.element.hidden = !(inside && fits(row)))).length;
-    group.hidden = !count;
-    return count;
-  }).reduce((sum, count) => sum + count, 0));
+    const counts = each.groups.map(({ rows }) => rows.filter(row => row.fits = inside && fits(row)).length);
+    if (counts.some(Boolean)) each.groups.forEach(({ group, rows }, i) => { /* else the whole case is hidden */
+      group.hidden = !counts[i];
+      for (const row of rows) if (row.element.hidden == row.fits) row.element.hidden = !row.fits;
+    });
+    return counts.reduce((sum, count) => sum + count, 0);
+  });
   const total = counts.reduce((sum, count) => sum + count, 0);
   cases.forEach((each, i) => {
     each.section.hidden = !counts[i];
