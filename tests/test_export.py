@@ -149,7 +149,7 @@ def test_a_cut_car_alone_moves_as_in_the_product(engine, car, tmp_path):
     drive = Drive(np.zeros((3, 6 * len(whole.hubs))))
     product = HubModel(engine, replace(whole, tree=tree, elements=smooth), drive, 1e-3, 1e-3, "native")
     assert product.division.shared == ()
-    assert error(answer.text, engine, lambda q, v: product.accelerations(0.0, q, v), whole.size, tmp_path) < 1e-10
+    assert error(answer.text, engine, lambda q, v: product.acceleration(0.0, q, v), whole.size, tmp_path) < 1e-10
 
 
 def test_parts_that_are_left_out_of_a_cut_car_are_named():
@@ -227,7 +227,7 @@ def test_a_vehicle_of_the_ride_alone_moves_as_in_the_product(engine, scene, tmp_
 def test_a_wheelset_alone_moves_as_in_the_product(engine, tmp_path):
     scene = load_scene("wheelset", None)
     text, product = text_of(scene, engine), equations_of(scene, engine, 20.0)
-    bare = bare_mujoco(product.model) if engine == "mujoco" else bare_exudyn(product.system[0])
+    bare = bare_mujoco(product.model.model) if engine == "mujoco" else bare_exudyn(product.model.mbs)
     assert error(text, engine, bare, 5, tmp_path) < 1e-10
 
 
