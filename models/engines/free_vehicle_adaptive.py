@@ -36,8 +36,7 @@ def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.nd
     """States (steps + 1, 2 n), a row at a time, and what it took."""
     import exudyn as exu
 
-    from models.engines.exudyn_system import counted
-    from models.engines.exudyn_system import start
+    from models.engines.exudyn_system import counted, start
 
     mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
     states[0], counts = begun, {"steps": 0, "force calls": 0}
