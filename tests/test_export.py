@@ -120,7 +120,7 @@ def test_the_pitch_plane_alone_moves_as_in_the_product(engine, geometry, tmp_pat
     settings = Settings({"mujoco": "RK4", "exudyn": "RK44"}[engine], 1e-3, 1.0)
     product = build(engine, replace(assemble(scene), mode="free", input=None), settings)
     states = np.random.default_rng(SEED).uniform(-0.1, 0.1, (STATES, 2, 4))
-    wanted = np.array([product.acceleration(0.0, state.ravel()) for state in states])
+    wanted = np.array([product.acceleration(0.0, *state) for state in states])
     places = [0, 1, 2, 3]
     if engine == "exudyn":
         exec_names: dict = {}

@@ -213,17 +213,17 @@ def _told(name: str, each: Overlay, count: int) -> Sequence[str]:
 
 def draw(each: Overlay, title: str, path: Path) -> None:
     """Both, and below the error, of the channels of the largest relative error."""
-    from models.drawing.figures import heading, plt, save
+    from models.drawing.figures import BLUE, DARK, VERMILION, heading, plt, save
 
     shown = each.matches[:SHOWN]
     figure, axes = plt.subplots(2, len(shown), figsize=(3.6 * len(shown) + 1.0, 5.4), sharex="col", squeeze=False)
     for (top, below), match in zip(axes.T, shown, strict=True):
         unit = match.unit or "-"
-        top.plot(match.times, match.measured, color="#222222", linewidth=1.8, label="measured")
-        top.plot(match.times, match.run, color="#d55e00", linewidth=1.0, label="run")
+        top.plot(match.times, match.measured, color=DARK, linewidth=1.8, label="measured")
+        top.plot(match.times, match.run, color=VERMILION, linewidth=1.0, label="run")
         top.set(title=match.name, ylabel=f"{match.name} [{unit}]")
-        below.plot(match.times, match.error, color="#0072b2")
-        below.plot(match.at, match.peak, "o", color="#0072b2", markersize=5)
+        below.plot(match.times, match.error, color=BLUE)
+        below.plot(match.at, match.peak, "o", color=BLUE, markersize=5)
         below.set(title=f"rms error {match.rms:.3g} {unit}, {match.relative:.1%}", xlabel="time of the run [s]")
         below.set_ylabel(f"run less measurement [{unit}]")
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 
-import twinrig
+from models.core.result import Result
 from models.drawing.figures import COLOURS, DARK, GREY, LABELS, PALE, SMALL, WIDE, heading, plt, save
+from models.systems.pitch_plane.run import run
+from models.systems.pitch_plane.scene import build
 
 DURATION, FORCE = 2.0, "f1"
 """Length of a run (s), and the front wheel's force, which is compared."""
@@ -49,20 +51,22 @@ def draw(path: Path) -> Path:
     return save(figure, path)
 
 
-def _run(engine: str, method: str, step: float) -> twinrig.Result:
+def _run(engine: str, method: str, step: float) -> Result:
     """A run by one method at one step."""
-    table = f"engines.{engine}"
-    return twinrig.run(SCENE, engine, set={f"{table}.integrator": method, f"{table}.step": step}, error=False)
+    scene = build(SCENE | {"engines": {engine: {"integrator": method, "step": step}}})
+    return run(scene, engine)
 
 
-def _forces(axis: Any, runs: dict[str, twinrig.Result]) -> None:
-    for engine, one in runs.items():
+def _forces(axis: Any, runs: dict[str, Result]) -> None:
+    for engine, result in runs.items():
         line, width = SHOWN[engine]
-        axis.plot(one.times, 1e-3 * one[FORCE], line, color=COLOURS[engine], linewidth=width, label=LABELS[engine])
+        axis.plot(
+            result.times, 1e-3 * result[FORCE], line, color=COLOURS[engine], linewidth=width, label=LABELS[engine]
+        )
     axis.set(xlabel="time [s]", title="The same force [kN] ...", xlim=(0.0, DURATION))
 
 
-def _gaps(axis: Any, runs: dict[str, twinrig.Result]) -> None:
+def _gaps(axis: Any, runs: dict[str, Result]) -> None:
     """Difference of each engine from the reference, by the largest force."""
     reference = runs["reference"]
     largest = np.abs(reference[FORCE]).max()
@@ -93,11 +97,11 @@ def _prices(axis: Any) -> None:
     axis.set(xlabel="work: force calls [-] (ring: usual step)", xlim=(4e2, 4e6), title="What accuracy costs: error [-]")
 
 
-def _price(one: twinrig.Result, truth: twinrig.Result, step: float) -> tuple[float, float]:
+def _price(result: Result, truth: Result, step: float) -> tuple[float, float]:
     """Force calls of a run, and the largest error of its force at common times by the largest force."""
     rows, fine = round(GRID / step), round(GRID / FINE)
-    error = np.abs(one[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
-    return float(one.counts()["force calls"]), float(error)
+    error = np.abs(result[FORCE][::rows] - truth[FORCE][::fine]).max() / np.abs(truth[FORCE]).max()
+    return float(result.counts()["force calls"]), float(error)
 
 
 def _idea(axis: Any) -> None:

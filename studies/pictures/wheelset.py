@@ -56,11 +56,11 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
     kept = Path(path.times[rows], path.states[rows], contacts=path.contacts[rows])
     joints = to_joints(kept.states)[:, :JOINTS]
     if engine == "mujoco":
-        poses = of_mujoco(equations.model, {"wheelset": 1}, joints)
+        poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
     else:  # by a marker in the middle of the axle: the last link of the first object
         from models.engines.exudyn_system import items
 
-        mbs, origin = equations.system[0], [0.0, 0.0, 0.0]
+        mbs, origin = equations.model.mbs, [0.0, 0.0, 0.0]
         link = items.MarkerKinematicTreeRigid(objectNumber=0, linkNumber=JOINTS - 1, localPosition=origin)
         middle = mbs.AddMarker(link)
         mbs.Assemble()

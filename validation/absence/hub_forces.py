@@ -67,7 +67,7 @@ def seen(scene: HubScene, engine: str) -> tuple[dict[str, int], bytes]:
         "turning hubs": int(head[kernel.HUBS] * (head[kernel.FRAME] != kernel.FRAMES.index("inertial"))),
         "curves between samples": int(curved),
     }
-    return counts, model.run(measurement.start(drive)).states.tobytes()
+    return counts, model.run(*np.split(measurement.start(drive), 2)).states.tobytes()
 
 
 def job(scene: HubScene, engine: str, steps: int) -> Callable[[], Any]:
