@@ -13,9 +13,9 @@ import validation.blind_spots.compiled_spoiling  # noqa: F401  makes numba know 
 from models.core.errors import InputError
 from models.machine.records import record
 from validation.blind_spots import memory
-from validation.blind_spots.audit import FUNCTIONS, TRACE, Traced, environment, line_of, prepare
-from validation.blind_spots.rewriting import ROOT, NoSuchFunction, rewritten
-from validation.blind_spots.shared import candidates, compiled_functions, shared_functions, shared_modules
+from validation.blind_spots.audit import FUNCTIONS, TRACE, Asked, Probes, Traced, environment, prepare
+from validation.blind_spots.rewriting import ROOT, NoSuchFunction, rewritten, text
+from validation.blind_spots.shared import candidates, compiled_functions, definitions, shared_functions, shared_modules
 from validation.blind_spots.spoiling import scaled, spoiled
 from validation.blind_spots.table import Line, read, uncovered, write
 from validation.report.blind_spots import blind_spots
@@ -82,15 +82,9 @@ def test_nothing_stands_before_what_a_module_takes_from_the_future():
 
 
 def test_functions_that_call_each_other_are_rewritten():
-    assert rewritten(
-        (ROOT / "models/contact/fastsim_many.py").read_text(),
-        "models.contact.fastsim_many",
-        {
-            name: PLACE
-            for module, _, name in (each.partition(":") for each in candidates())
-            if module == "models.contact.fastsim_many"
-        },
-    )
+    module = "models.contact.accuracy"
+    names = {name: PLACE for name, _ in definitions(module)}
+    assert "_spoiled_by_audit" in ast.unparse(rewritten(text(module), module, names))
 
 
 def test_compiled_code_takes_a_fault_as_it_runs_and_compiles_nothing_for_it(fault):
@@ -164,7 +158,7 @@ def folder(tmp_path_factory):
 def process(folder, faults, code):
     """What a new process prints, in which functions have faults."""
     doubles = folder / "memory"
-    shared = memory.shared(doubles)
+    shared = memory.rows(doubles)[0]
     for place in range(len(candidates())):
         shared[place] = faults.get(candidates()[place], 0.0)
     return float(subprocess.check_output([sys.executable, "-c", code], env=environment(folder, doubles), cwd=ROOT))
@@ -177,32 +171,39 @@ def test_machine_code_that_is_kept_takes_the_fault_of_each_process(folder):
     assert wrong == pytest.approx(1.01 * sound, rel=1e-14) and again == sound
 
 
-def traced(folder, name, **case):
-    """The trace of one case that runs one function and has independent rows."""
+@pytest.fixture(scope="module")
+def probes(folder):
+    """A process of an audit."""
+    with Probes(folder, workers=1) as started:
+        yield started
+
+
+def line_of(probes, name, **case):
+    """What is told of a function that one case runs, which has independent rows."""
     rows = [{"id": "contact_hertz.p0", "status": "passed", "independence": "closed form"}]
     item = {"case": "contact_hertz", "rows": rows, "seconds": 1.0, "ran": {name}, "numbers": {name}}
-    return Traced(folder, candidates(), {"contact_hertz": item | case})
+    return Asked(probes, Traced(candidates(), {"contact_hertz": item | case}), judges=True).line_of(name)
 
 
-def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(folder):
+def test_a_spoiled_function_is_noticed_by_the_rows_that_call_it(probes):
     """Hertz' ellipse by Johnson's figures and a closed form; the sound run had no failed row."""
     name = "models.contact.hertz:_contact"
-    noticed = line_of(name, traced(folder, name), judges=True)
+    noticed = line_of(probes, name)
     assert (noticed.ended, noticed.calling, noticed.left) == ("whole", 1, 0)
     assert "contact_hertz.p0" in noticed.rows and "contact_hertz.p0" in noticed.independent
 
 
-def test_a_row_that_fails_without_a_fault_notices_nothing(folder):
+def test_a_row_that_fails_without_a_fault_notices_nothing(probes):
     name = "models.contact.hertz:_contact"
     rows = [{"id": "contact_hertz.p0", "status": "failed", "independence": "closed form"}]
-    noticed = line_of(name, traced(folder, name, rows=rows), judges=True)
+    noticed = line_of(probes, name, rows=rows)
     assert noticed.rows and "contact_hertz.p0" not in noticed.rows.split("; ")
 
 
-def test_a_function_that_gives_no_number_has_a_line_that_says_so(folder):
+def test_a_function_that_gives_no_number_has_a_line_that_says_so(probes):
     name = "models.contact.hertz:_contact"
     for case, ended in (({"numbers": set()}, "no numbers"), ({"numbers": set(), "ran": set()}, "not run")):
-        line = line_of(name, traced(folder, name, **case), judges=True)
+        line = line_of(probes, name, **case)
         assert (line.ended, line.calling, line.left, line.rows) == (ended, 0, 0, "")
 
 

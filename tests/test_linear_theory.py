@@ -40,6 +40,7 @@ def test_every_row_of_the_full_case_passes(tmp_path):
     assert [row.id for row in rows if row.status in ("failed", "not run")] == []
 
 
+@pytest.mark.grounds("published")
 def test_nodes_are_the_published_ones():
     assert stacked(RATIOS[:, None], np.array([0.0, 0.25, 0.5])) == pytest.approx(np.moveaxis(TABLE, 1, 2), rel=1e-14)
     folder = Path(os.environ.get("TWINRIG_DATA", ""))
@@ -73,6 +74,7 @@ def test_every_coefficient_is_positive_to_the_ends(nu):
     assert np.isfinite(found).all() and (found > 0).all()
 
 
+@pytest.mark.grounds("closed form")
 def test_narrow_patches_are_strips():
     """a/b to 0: each strip is a rolling cylinder, C11 = pi^2 / (4 (1 - nu)) and C22 = pi^2 / 4 (Carter)."""
     c = coefficients(1e-8, 0.3)
@@ -102,6 +104,7 @@ def test_scaling_with_size():
     assert [y / x for x, y in zip(one, two, strict=True)] == pytest.approx([4, 8, 16])
 
 
+@pytest.mark.grounds("closed form")
 def test_a_bed_of_springs_answers_with_the_same_forces():
     """Integral over the ellipse of the traction that grows from the leading edge in every strip."""
     l1, l2, l3 = flexibilities(A, B, PAIR)

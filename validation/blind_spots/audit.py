@@ -1,4 +1,4 @@
-"""The audit: runs cases and tests once, then spoils each shared function in a process of its own.
+"""The audit: runs cases and tests once, then spoils each shared function in a process that is forked for it.
 
 All processes run the same rewritten modules (``planting``), whose machine code is kept in the audit's folder: ready
 after the first run, whichever function is spoiled. First judge the cases with independent rows and the tests on
@@ -11,12 +11,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
+from queue import Queue
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -41,9 +42,10 @@ BUDGETS = (8.0, 40.0)
 """Seconds of the processor, without compiling, after which no other case or test is run for a function: if something
 independent has noticed, and if not. How many are left is told."""
 FAULT = 0.01
-PATIENCE = 1200.0
+PATIENCE = 1200
 """Seconds after which a process has lost its way, as a search that never ends."""
 Told = dict[str, Any]
+Progress = Callable[[str, float], None]
 Job = tuple[list[str], list[str]]
 """Cases and tests."""
 
@@ -55,11 +57,10 @@ class Traced:
     functions : all names, by place; items : each with "numbers", the functions that gave numbers in it.
     """
 
-    folder: Path
     functions: list[str]
     items: dict[str, Told]
 
-    @property
+    @cached_property
     def numbers(self) -> set[str]:
         """Functions that gave a number anywhere."""
         return {name for item in self.items.values() for name in item["numbers"]}
@@ -77,46 +78,113 @@ class Traced:
         rows = item.get("rows", [{"id": name, "independence": item.get("grounds", "")}])
         return any(is_independent(row["id"], row["independence"]) for row in rows)
 
-    @property
-    def sound(self) -> list[str]:
+    @cached_property
+    def sound(self) -> frozenset[str]:
         """Ids of rows and tests that fail without a fault."""
         rows = (row["id"] for item in self.items.values() for row in item.get("rows", ()) if row["status"] == "failed")
-        return [*rows, *(name for name, item in self.items.items() if item.get("failed"))]
+        return frozenset((*rows, *(name for name, item in self.items.items() if item.get("failed"))))
 
 
-def audit(folder: Path, progress: Callable[[str, float], None], wanted: list[str] | None = None) -> list[Line]:
+class Probes:
+    """Processes that do jobs (``probe``), as many as there are workers; ``folder`` keeps what they compile."""
+
+    def __init__(self, folder: Path, workers: int = WORKERS) -> None:
+        self.workers = min(workers, os.cpu_count() or 1)
+        self.folder, self.idle = folder, Queue[subprocess.Popen[str]]()
+        self._place = TemporaryDirectory()
+        command = [sys.executable, "-m", "validation.blind_spots.probe"]
+        for worker in range(self.workers):
+            doubles = Path(self._place.name) / f"memory{worker}"
+            variables, pipe = environment(folder, doubles), subprocess.PIPE
+            self.idle.put(subprocess.Popen(command, cwd=ROOT, env=variables, stdin=pipe, stdout=pipe, text=True))
+
+    def __enter__(self) -> "Probes":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End the processes, which are all idle but after an error."""
+        while not self.idle.empty():
+            self.idle.get().communicate()
+        self._place.cleanup()
+
+    def map(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+        """Results of some work on each item, by as many threads as there are processes, as they end."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            for future in as_completed([pool.submit(work, item) for item in items]):
+                yield future.result()
+
+    def run(self, job: Job, out: Path, faults: dict[int, float], sound: Collection[str]) -> str:
+        """Run cases and tests with some faults, by place; returns how that ended."""
+        out.write_text("")
+        cases, tests = job
+        told: Told = {"cases": cases, "tests": tests, "out": str(out), "faults": faults, "sound": sorted(sound)}
+        told |= {"patience": PATIENCE, "budgets": BUDGETS if faults else (PATIENCE, PATIENCE)}
+        probe = self.idle.get()
+        assert probe.stdin and probe.stdout
+        probe.stdin.write(json.dumps(told) + "\n")
+        probe.stdin.flush()
+        ended = probe.stdout.readline().strip()
+        self.idle.put(probe)
+        return ended or "crashed"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Who is asked about a function: the judges of a trace, or all others."""
+
+    probes: Probes
+    traced: Traced
+    judges: bool
+
+    def line_of(self, function: str) -> Line:
+        """Spoil one function, run those asked in which it gives numbers, and tell what notices."""
+        traced, commit = self.traced, str(provenance("")["commit"])
+        callers, ended = traced.callers(function, self.judges), unspoiled(function, traced)
+        if ended or not callers:
+            return Line(function, ended or "whole", len(callers), len(callers), "", "", "", commit)
+        job = ([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
+        with TemporaryDirectory() as place:
+            out = Path(place) / "told.jsonl"
+            ended = self.probes.run(job, out, {traced.functions.index(function): FAULT}, traced.sound)
+            told = lines_of(out)
+        rows, tests = ([each for each in kind(told) if each[0] not in traced.sound] for kind in (_rows, _tests))
+        independent = [id for id, grounds in (*rows, *tests) if is_independent(id, grounds)]
+        ids = ({id for id, _ in rows}, {id for id, _ in tests}, {*independent})
+        noticed, failed, grounded = (JOINED.join(sorted(each)) for each in ids)
+        left = len(callers) - len(told)
+        return Line(function, ended, len(callers), left, noticed, failed, grounded, commit)
+
+
+def audit(folder: Path, progress: Progress, wanted: list[str] | None = None) -> list[Line]:
     """Lines of all shared functions, or of the wanted; those that ``folder`` holds already are not run again.
 
     Raises InputError where the folder belongs to other functions than the sources have now.
     """
     functions = prepare(folder)
-    traced = trace(folder, functions, jobs(with_grounds=True), progress)
-    shared = wanted or in_order(shared_functions(traced.numbers))
-    lines = measured(folder / JUDGES, shared, partial(line_of, traced=traced, judges=True), progress)
-    write(lines.values(), folder / TABLE)
-    traced = trace(folder, functions, jobs(with_grounds=False), progress)
-    shared = wanted or in_order(shared_functions(traced.numbers))
-    doubtful = [name for name in shared if name not in lines or not lines[name].is_covered]
-    more = measured(folder / OTHERS, doubtful, partial(line_of, traced=traced, judges=False), progress)
+    with Probes(folder) as probes:
+        traced = trace(probes, functions, jobs(with_grounds=True), progress)
+        shared = wanted or in_order(shared_functions(traced.numbers))
+        lines = measured(folder / JUDGES, shared, Asked(probes, traced, judges=True), progress)
+        write(lines.values(), folder / TABLE)
+        traced = trace(probes, functions, jobs(with_grounds=False), progress)
+        shared = wanted or in_order(shared_functions(traced.numbers))
+        doubtful = [name for name in shared if name not in lines or not lines[name].is_covered]
+        more = measured(folder / OTHERS, doubtful, Asked(probes, traced, judges=False), progress)
     whole = [lines[name].with_others(more[name]) if name in lines else more[name] for name in doubtful]
     whole += [line for name, line in lines.items() if name not in doubtful]
     write(whole, folder / TABLE)
     return whole
 
 
-def measured(
-    path: Path, functions: list[str], line: Callable[[str], Line], progress: Callable[[str, float], None]
-) -> dict[str, Line]:
+def measured(path: Path, functions: list[str], asked: Asked, progress: Progress) -> dict[str, Line]:
     """Lines of some functions, by name: as the file keeps them, or measured now, and then kept."""
     done = {line.function: line for line in read(path)}
     left = [name for name in functions if name not in done]
     total = len(done) + len(left)
-    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
-        for future in as_completed([pool.submit(line, name) for name in left]):
-            made = future.result()
-            done[made.function] = made
-            write(done.values(), path)
-            progress(made.function, len(done) / total)
+    for line in asked.probes.map(asked.line_of, left):
+        done[line.function] = line
+        write(done.values(), path)
+        progress(line.function, len(done) / total)
     return done
 
 
@@ -163,29 +231,30 @@ def jobs(with_grounds: bool) -> list[Job]:
     return [([name], []) for name in judged_cases()] + [([], [file]) for file in chosen]
 
 
-def trace(folder: Path, functions: list[str], jobs: list[Job], progress: Callable[[str, float], None]) -> Traced:
+def trace(probes: Probes, functions: list[str], jobs: list[Job], progress: Progress) -> Traced:
     """What runs what: read from the folder, or traced now."""
-    paths = [folder / TRACE / f"{Path(*cases, *tests).stem}.jsonl" for cases, tests in jobs]
 
-    def run_once(job: Job, path: Path) -> str:
+    def run_once(job: Job) -> Path:
+        path = probes.folder / TRACE / f"{Path(*job[0], *job[1]).stem}.jsonl"
         if not path.is_file():
-            run(folder, {}, job, [], path.with_suffix(".part"))
+            probes.run(job, path.with_suffix(".part"), {}, ())
             path.with_suffix(".part").rename(path)
-        return path.stem
+        return path
 
-    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
-        for count, name in enumerate(pool.map(run_once, jobs, paths)):
-            progress(f"trace of {name}", count / len(jobs))
-    return traced_of(folder, functions, paths)
+    paths = list[Path]()
+    for path in probes.map(run_once, jobs):
+        paths.append(path)
+        progress(f"trace of {path.stem}", len(paths) / len(jobs))
+    return traced_of(functions, sorted(paths))
 
 
-def traced_of(folder: Path, functions: list[str], paths: list[Path]) -> Traced:
+def traced_of(functions: list[str], paths: list[Path]) -> Traced:
     """The trace as kept, with functions by name."""
     lines = [line for path in paths for line in lines_of(path)]
     for line in lines:
         for kind in ("ran", "numbers"):
             line[kind] = {functions[place] for place in line[kind]}
-    return Traced(folder, functions, {line.get("case") or line["test"]: line for line in lines})
+    return Traced(functions, {line.get("case") or line["test"]: line for line in lines})
 
 
 def lines_of(path: Path) -> list[Told]:
@@ -195,54 +264,16 @@ def lines_of(path: Path) -> list[Told]:
     return [json.loads(line) for line in path.read_text().splitlines(keepends=True) if line.endswith("\n")]
 
 
-def run(folder: Path, faults: dict[int, float], job: Job, sound: list[str], out: Path) -> str:
-    """Run cases and tests in a process with some faults, by place; returns how it ended."""
-    with TemporaryDirectory() as place:
-        doubles, told = Path(place) / "memory", Path(place) / "job.json"
-        shared = memory.shared(doubles)
-        for function, fault in faults.items():
-            shared[function] = fault
-        budgets = BUDGETS if faults else (PATIENCE, PATIENCE)
-        told.write_text(
-            json.dumps({"cases": job[0], "tests": job[1], "out": str(out), "sound": sound, "budgets": budgets})
-        )
-        command = [sys.executable, "-m", "validation.blind_spots.probe", str(told)]
-        variables = environment(folder, doubles)
-        out.write_text("")
-        try:
-            ended = subprocess.run(command, cwd=ROOT, env=variables, capture_output=True, timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            return "out of time"
-    return "whole" if ended.returncode == 0 else "crashed"
-
-
 def environment(folder: Path, doubles: Path) -> dict[str, str]:
     """Variables of a process whose functions can be spoiled: machine code and bytecode stay in the audit's folder."""
-    order = {"functions": str(folder.absolute() / FUNCTIONS), "memory": str(doubles)}
+    place = folder.absolute()
+    order = {"functions": str(place / FUNCTIONS), "bytecode": str(place / "bytecode"), "memory": str(doubles)}
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(STARTUP), str(ROOT)]),
-        "PYTHONPYCACHEPREFIX": str(folder.absolute() / "bytecode"),
-        "NUMBA_CACHE_DIR": str(folder.absolute() / "machine_code"),
+        "NUMBA_CACHE_DIR": str(place / "machine_code"),
         memory.VARIABLE: json.dumps(order),
     }
-
-
-def line_of(function: str, traced: Traced, judges: bool) -> Line:
-    """Spoil one function, run judges or all others in which it gives numbers, and tell what notices."""
-    callers, commit = traced.callers(function, judges), str(provenance("")["commit"])
-    ended = unspoiled(function, traced)
-    if ended or not callers:
-        return Line(function, ended or "whole", len(callers), len(callers), "", "", "", commit)
-    job = ([name for name in callers if name in CASES], [name for name in callers if name not in CASES])
-    with TemporaryDirectory() as place:
-        out = Path(place) / "told.jsonl"
-        ended = run(traced.folder, {traced.functions.index(function): FAULT}, job, traced.sound, out)
-        told = lines_of(out)
-    failed = [sorted({each for each in failures(told) if each[0] not in traced.sound}) for failures in (_rows, _tests)]
-    independent = [id for id, grounds in (*failed[0], *failed[1]) if is_independent(id, grounds)]
-    rows, tests = (JOINED.join(id for id, _ in each) for each in failed)
-    return Line(function, ended, len(callers), len(callers) - len(told), rows, tests, JOINED.join(independent), commit)
 
 
 def unspoiled(function: str, traced: Traced) -> str:

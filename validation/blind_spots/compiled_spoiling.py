@@ -12,6 +12,7 @@ from numba.extending import intrinsic, overload
 from validation.blind_spots.memory import ADDRESS, PLACES, SYMBOL
 from validation.blind_spots.spoiling import put, scaled, spoiled
 
+_intrinsic: Any = intrinsic
 llvmlite.binding.add_symbol(SYMBOL, ADDRESS)
 
 
@@ -24,7 +25,7 @@ def _pointer(builder: Any, row: int, place: Any) -> Any:
     return builder.gep(rows, [whole(0), builder.add(place, whole(row * PLACES))])
 
 
-@intrinsic
+@_intrinsic
 def ran(typingctx: Any, place: Any) -> Any:
     """Mark a function that gives no number that could be off."""
 
@@ -35,7 +36,7 @@ def ran(typingctx: Any, place: Any) -> Any:
     return types.void(types.int64), generate
 
 
-@intrinsic
+@_intrinsic
 def factor(typingctx: Any, place: Any) -> Any:
     """Mark a function that gives a number; what the number is multiplied by."""
 
@@ -79,7 +80,7 @@ def _spoiled(value, place):
     return _product_if_off if _makes_arrays(value) else _same
 
 
-def _parts(kind: types.BaseTuple) -> list[Any]:
+def _parts(kind: Any) -> list[Any]:
     """Types of what a tuple holds, and of what tuples in it hold."""
     return [inner for part in kind for inner in (_parts(part) if isinstance(part, types.BaseTuple) else [part])]
 

@@ -12,10 +12,12 @@ import os
 from pathlib import Path
 
 VARIABLE = "TWINRIG_BLIND_SPOTS"
-"""JSON that the environment hands on: {"functions": path of a list of names, "memory": path of the file of doubles}."""
+"""JSON that the environment hands on: {"functions": path of a list of names, "memory": path of the file of doubles,
+"bytecode": folder of the code of rewritten modules}."""
 PLACES = 8192
 """Most functions that can be told apart."""
-BYTES = 3 * 8 * PLACES
+Row = ctypes.c_double * PLACES
+BYTES = 3 * ctypes.sizeof(Row)
 SYMBOL = "twinrig_blind_spots"
 
 
@@ -25,25 +27,34 @@ def order() -> dict[str, str]:
     return told
 
 
-def shared(path: Path) -> memoryview:
-    """The doubles of a file as processes share them; the file is made, all zero, where there is none."""
-    if not path.is_file():
-        path.write_bytes(bytes(BYTES))
-    with path.open("r+b") as file:
-        return memoryview(mmap.mmap(file.fileno(), BYTES)).cast("d")
+def rows(path: Path | None) -> list[ctypes.Array[ctypes.c_double]]:
+    """The three rows of a file as processes share them, or of memory that no other has; all zero where they are new."""
+    if path is None:
+        memory = mmap.mmap(-1, BYTES)
+    else:
+        path.touch()
+        os.truncate(path, BYTES)
+        with path.open("r+b") as file:
+            memory = mmap.mmap(file.fileno(), BYTES)
+    return [Row.from_buffer(memory, row * ctypes.sizeof(Row)) for row in range(3)]
 
 
-ROWS = shared(Path(order()["memory"])) if order() else memoryview(mmap.mmap(-1, BYTES)).cast("d")
-FAULTS, RAN, NUMBERS = (ROWS[row * PLACES : (row + 1) * PLACES] for row in range(3))
+FAULTS, RAN, NUMBERS = rows(Path(order()["memory"]) if order() else None)
 """Of each function: 0.01 where its output is 1 % off, else 0; 1 where it ran; 1 where it gave or wrote a number."""
-ADDRESS = ctypes.addressof(ctypes.c_double.from_buffer(ROWS))
+ADDRESS = ctypes.addressof(FAULTS)
 
 
-def places(marks: memoryview) -> list[int]:
+def places(marks: ctypes.Array[ctypes.c_double]) -> list[int]:
     """Functions that are marked."""
     return [place for place, mark in enumerate(marks) if mark]
 
 
+def clear(row: ctypes.Array[ctypes.c_double]) -> None:
+    """Take the faults or the marks of all functions away."""
+    ctypes.memset(row, 0, ctypes.sizeof(Row))
+
+
 def forget() -> None:
     """Take the marks of all functions away; faults stay."""
-    RAN[:] = NUMBERS[:] = memoryview(bytes(8 * PLACES)).cast("d")
+    clear(RAN)
+    clear(NUMBERS)

@@ -11,11 +11,11 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from typing import Any
 
+from validation.blind_spots.memory import order
+
 
 def start() -> None:
     """Do what the environment says; nothing without it."""
-    from validation.blind_spots.memory import order
-
     if order():
         sys.meta_path.insert(0, Planter(json.loads(Path(order()["functions"]).read_text())))
 
@@ -47,7 +47,15 @@ class _Rewriting(SourceFileLoader):
         super().__init__(fullname, path)
         self.names = names
 
-    def source_to_code(self, data: Any, path: Any, *, _optimization: int = -1) -> Any:
+    def get_code(self, fullname: str) -> Any:
+        """The rewritten module's code, kept apart from that of the module as it stands in the sources."""
+        earlier, sys.pycache_prefix = sys.pycache_prefix, order()["bytecode"]
+        try:
+            return super().get_code(fullname)
+        finally:
+            sys.pycache_prefix = earlier
+
+    def source_to_code(self, data: Any, path: Any, *, _optimization: int = -1) -> Any:  # type: ignore[override]
         from validation.blind_spots.rewriting import rewritten
 
         parsed = rewritten(bytes(data).decode(), self.name, self.names)

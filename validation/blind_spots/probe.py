@@ -1,13 +1,19 @@
 """A process of an audit: runs cases and tests, and tells what of each failed and which functions it ran.
 
-``python -m validation.blind_spots.probe JOB``: a JSON file with "cases" and "tests" (what pytest is given); "out", to
-which a line of JSON is added for each case and test that has ended; "sound", ids that fail without a fault; and
-"budgets", seconds of the processor after which nothing more begins: if something independent has noticed, and if not.
+It reads jobs from its standard input and imports the cases that they name, each once, without a fault. For each job it
+starts a fork of itself, in which nothing is left of an earlier fault, and answers how that has ended. A job is a line
+of JSON: "cases" and "tests" (what pytest is given); "out", a file to which a line of JSON is added for each case and
+test that has ended; "faults", by the place of the function; "sound", ids that fail without a fault; "patience", seconds
+after which the fork is stopped; and "budgets", seconds of the processor after which nothing more begins: if something
+independent has noticed, and if not.
 """
 
 import json
 import os
+import signal
 import sys
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -75,8 +81,6 @@ class Told:
 
 def run_case(name: str, told: Told) -> None:
     """Measure the quick share of a case; a case that breaks has one row, which failed."""
-    from importlib import import_module
-
     from validation.common.rows import rested
 
     told.begin()
@@ -84,7 +88,9 @@ def run_case(name: str, told: Told) -> None:
         case = import_module(f"validation.cases.{name}")
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             rows, _ = rested(name, lambda: case.measure(True, Path(folder)))
-        lines = [{"id": row.id, "status": row.status, "independence": row.independence} for row in rows]
+        lines: list[dict[str, str]] = [
+            {"id": row.id, "status": row.status, "independence": row.independence} for row in rows
+        ]
     except Exception as error:
         lines = [{"id": f"{name}.broken", "status": "failed", "independence": "none"}]
         told.refused |= is_of_numba(error)
@@ -117,7 +123,7 @@ class Watching:
         """A part of a test has ended."""
         self.failed |= report.failed
         if report.when == "teardown":
-            marked = dict(report.user_properties).get("grounds", "")
+            marked = str(dict(report.user_properties).get("grounds", ""))
             line = {"test": report.nodeid, "failed": self.failed, "grounds": marked}
             self.told.end(line, [(report.nodeid, marked)] if self.failed else [])
             if self.session is not None and self.told.is_enough():
@@ -135,15 +141,44 @@ class Watching:
             item.user_properties.append(("grounds", marker.args[0]))
 
 
-def main(job: dict[str, Any]) -> None:
-    """Cases first, and then tests."""
+def work(job: dict[str, Any]) -> None:
+    """Tests first, which are quicker, and then cases."""
+    signal.alarm(job["patience"])
+    for place, fault in job["faults"].items():
+        memory.FAULTS[int(place)] = fault
     told = Told(job)
+    if job["tests"]:
+        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
     for name in job["cases"]:
         if not told.is_enough():
             run_case(name, told)
-    if job["tests"] and not told.is_enough():
-        pytest.main(["-q", "-p", "no:cacheprovider", "--tb=no", *job["tests"]], plugins=[Watching(told)])
+
+
+def ended(job: dict[str, Any]) -> str:
+    """Do a job in a fork; returns how it ended, as ``Line.ended`` tells it."""
+    memory.clear(memory.FAULTS)
+    for name in job["cases"]:
+        with suppress(Exception):  # a module that breaks as it is imported breaks again where its case is run
+            import_module(f"validation.cases.{name}")
+    child = os.fork()
+    if child == 0:
+        with suppress(BaseException):
+            work(job)
+            os._exit(0)
+        os._exit(1)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return {0: "whole", -signal.SIGALRM: "out of time"}.get(status, "crashed")
+
+
+def main() -> None:
+    """Do jobs until there are no more; what they print goes nowhere."""
+    answers = os.fdopen(os.dup(1), "w")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    for line in sys.stdin:
+        print(ended(json.loads(line)), file=answers, flush=True)
 
 
 if __name__ == "__main__":
-    main(json.loads(Path(sys.argv[1]).read_text()))
+    main()

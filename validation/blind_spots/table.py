@@ -52,11 +52,14 @@ class Line:
         return sum(len(text.split(JOINED)) for text in (self.rows, self.tests) if text)
 
     def with_others(self, line: "Line") -> "Line":
-        """This line of judges, and one of all others, as one."""
-        rows, tests = (JOINED.join(filter(None, texts)) for texts in ((self.rows, line.rows), (self.tests, line.tests)))
-        calling, left = self.calling + line.calling, self.left + line.left
-        ended = line.ended if self.ended in ("whole", "not run", "no numbers") else self.ended
-        return replace(self, ended=ended, calling=calling, left=left, rows=rows, tests=tests)
+        """This line, and that of others that were asked about the same function, as one."""
+        texts = {
+            name: JOINED.join(filter(None, (getattr(self, name), getattr(line, name))))
+            for name in ("rows", "tests", "independent")
+        }
+        made = replace(self, calling=self.calling + line.calling, left=self.left + line.left)
+        made = replace(made, ended=line.ended if self.ended in ("whole", "not run", "no numbers") else self.ended)
+        return Line(**{**asdict(made), **texts})
 
 
 def read(path: Path = KEPT) -> list[Line]:
