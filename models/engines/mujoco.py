@@ -233,10 +233,12 @@ class MujocoModel:
         return Trajectory(times, states, enforced, {"steps": n, "force calls": calls})
 
     def controls(self) -> np.ndarray:
-        """Controls (steps, nu) of all actuators: springs take none, the wheels' motors come last."""
+        """Controls (steps, nu) of all actuators, the wheels' motors last; (steps, 0) where only springs act, which take
+        none."""
+        if self.drive.controls is None:
+            return np.zeros((self.settings.steps, 0))
         padded = np.zeros((self.settings.steps, self.model.nu))
-        if self.drive.controls is not None:
-            padded[:, self.model.nu - 2 :] = self.drive.controls
+        padded[:, self.model.nu - 2 :] = self.drive.controls
         return padded
 
     def acceleration(self, time: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -24,7 +24,8 @@ def warnings(data: mujoco.MjData) -> str:
 
 
 def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, controls: np.ndarray) -> np.ndarray:
-    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step.
+    """Positions and rates (steps + 1, 2 n) from ``start`` (2 n,), with controls (steps, nu) held over each step,
+    or none (steps, 0).
 
     In chunks, so that a run that has failed is not carried to its end. RunFailed where MuJoCo stops, starts again at
     time zero or warns; the guard names a worse reason if there is one.
@@ -36,7 +37,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
         warning.number = 0
     with quiet(), marching(lambda: data.time / times[-1]):
         for first, last in _chunks(steps):
-            rows, held = path[first + 1 : last + 1], controls[None, first:last] if model.nu else None
+            rows, held = path[first + 1 : last + 1], controls[None, first:last] if controls.size else None
             rollout.rollout(model, data, path[None, first], held, nstep=len(rows), state=rows[None])
             late = np.abs(rows[:, 0] - times[first + 1 : last + 1]) > 1e-6 * times[-1]
             if late.any() or warnings(data):

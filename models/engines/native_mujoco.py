@@ -64,7 +64,7 @@ def add_parts(spec: mujoco.MjSpec, vehicle: SpatialVehicle, parts: Sequence[Nati
 
 def add_ground_spring(spec: mujoco.MjSpec, vehicle: SpatialVehicle, spring: GroundSpring) -> None:
     """An actuator along each axis of space on which something acts, between sites on the body and on the ground."""
-    number, name = len(spec.actuators), [body.name for body in vehicle.bodies].index(spring.body)
+    number, name = len(spec.sites), [body.name for body in vehicle.bodies].index(spring.body)
     tip, foot = f"ground spring {number}", f"ground {number}"
     spec.body(str(name)).add_site(name=tip, pos=np.subtract(spring.point, vehicle.body(spring.body).position))
     spec.worldbody.add_site(name=foot, pos=spring.anchor)

@@ -57,11 +57,13 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
     joints = to_joints(kept.states)[:, :JOINTS]
     if engine == "mujoco":
         poses = of_mujoco(equations.model.model, {"wheelset": 1}, joints)
-    else:  # by a marker in the middle of the axle: the last link of the first object
+    else:  # by a marker in the middle of the axle: the last link of its tree
         from models.engines.exudyn_system import items
 
         mbs, origin = equations.model.mbs, [0.0, 0.0, 0.0]
-        link = items.MarkerKinematicTreeRigid(objectNumber=0, linkNumber=JOINTS - 1, localPosition=origin)
+        link = items.MarkerKinematicTreeRigid(
+            objectNumber=equations.model.tree, linkNumber=JOINTS - 1, localPosition=origin
+        )
         middle = mbs.AddMarker(link)
         mbs.Assemble()
         poses = of_exudyn(mbs, {"wheelset": partial(mbs.GetMarkerOutput, middle)}, joints)

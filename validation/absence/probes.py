@@ -8,11 +8,13 @@ import json
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 from unittest import mock
+
+import numpy as np
 
 from models.engines.model import Model
 
@@ -128,7 +130,7 @@ def _watched(function: Callable[..., Any], seen: March) -> Callable[..., Any]:
             sys.setprofile(None)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
-        seen.memory += peak - _size(result)
+        seen.memory += peak - _size(result, [*args, *options.values()])
         return result
 
     return call
@@ -138,10 +140,12 @@ def _count(seen: March, event: str) -> None:
     seen.frames += event == "call"
 
 
-def _size(result: Any) -> int:
-    """Bytes of the arrays that a march returned."""
+def _size(result: Any, given: Sequence[Any]) -> int:
+    """Bytes of the arrays that a march returned, without those that it was given to fill."""
     parts = result if isinstance(result, tuple) else (result,)
-    return sum(getattr(part, "nbytes", 0) for part in parts)
+    arrays = [part for part in parts if isinstance(part, np.ndarray)]
+    filled = [array for array in given if isinstance(array, np.ndarray)]
+    return sum(array.nbytes for array in arrays if not any(np.may_share_memory(array, each) for each in filled))
 
 
 def user_functions(model: Any) -> int:

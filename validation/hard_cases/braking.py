@@ -187,7 +187,6 @@ CASES = (
         0.0,
         "exact",
         trucks.lagging_at_rest,
-        {"exudyn": "refused", "mujoco": "refused"},
     ),
     Case(
         "wheel exactly on the line",
