@@ -61,8 +61,7 @@ def _motion(engine: str, duration: float, times: np.ndarray) -> Motion:
         from models.engines.exudyn_system import items
 
         mbs, origin = equations.model.mbs, [0.0, 0.0, 0.0]
-        tree, last = equations.model.tree, JOINTS - 1
-        link = items.MarkerKinematicTreeRigid(objectNumber=tree, linkNumber=last, localPosition=origin)
+        link = items.MarkerKinematicTreeRigid(
             objectNumber=equations.model.tree, linkNumber=JOINTS - 1, localPosition=origin
         )
         middle = mbs.AddMarker(link)
