@@ -141,7 +141,7 @@ def _exact(duration: float) -> list[Row]:
         exact = Bounces(assembly, STEP).path(assembly.initial, round(duration / STEP))
         for engine in ALL:
             error = float(np.abs(simulate(lifting, engine).states - exact).max())
-            name = f"lift_off.exact.{engine}.{'stiff' if override else 'lifting'}"
+            name = f"lift_off.exact.{engine}.{'stiff' if override else 'own'}"
             rows.append(
                 Observed(
                     name,
