@@ -33,14 +33,14 @@ def _parts(text: str) -> tuple[str, list[str]]:
     return NUMBER.sub("#", text), NUMBER.findall(text)
 
 
-def _same(one: str, other: str) -> bool:
+def _same(shown: str, printed: str) -> bool:
     """Whether two numbers agree to the last digit that both have."""
-    if one == other:
+    if shown == printed:
         return True
-    first, second = Decimal(one), Decimal(other)
+    first, second = Decimal(shown), Decimal(printed)
     if max(abs(first), abs(second)) < ROUNDING:
         return True
-    if not {".", "e"} & {*one, *other}:
+    if not {".", "e"} & {*shown, *printed}:
         return False
     digit = Decimal(1).scaleb(max(int(number.as_tuple().exponent) for number in (first, second)))
     return abs(first - second) <= digit

@@ -51,16 +51,18 @@ def blocks(text: str) -> list[Block]:
     """All fenced blocks and marked images of a page, in order."""
     from markdown_it import MarkdownIt
 
-    lines, found, mark = text.splitlines(keepends=True), [], ""
+    lines, blocks_of_page, mark = text.splitlines(keepends=True), [], ""
     for token in MarkdownIt("commonmark").parse(text):
         if token.type == "html_block":
             matched = MARK.fullmatch(token.content.strip())
             mark = matched[1] if matched else ""
         elif token.type == "fence" and token.map:
             first, last = token.map
-            found.append(Block(mark, token.info.strip(), "".join(lines[first + 1 : last - 1]), first + 1, last - 1))
+            blocks_of_page.append(
+                Block(mark, token.info.strip(), "".join(lines[first + 1 : last - 1]), first + 1, last - 1)
+            )
             mark = ""
         elif token.type == "inline" and mark.startswith("picture: ") and token.map:
-            found += [Block(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
+            blocks_of_page += [Block(mark, "image", name, *token.map) for name in IMAGE.findall(token.content)]
             mark = ""
-    return found
+    return blocks_of_page

@@ -89,7 +89,7 @@ def _inner(annotation: Any) -> tuple[str, type[BaseModel] | None]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "", annotation
     if origin in (Union, UnionType, Annotated):
-        return next((found for found in map(_inner, arguments) if found[1]), ("", None))
+        return next((pair for pair in map(_inner, arguments) if pair[1]), ("", None))
     if origin in (dict, list, tuple, Mapping) and arguments:
         place, inner = _inner(arguments[-1] if origin is not list else arguments[0])
         return ("[]" if origin is list else ".NAME") + place, inner

@@ -363,9 +363,11 @@ def _changes(axis: Any, scene_choice: SceneChoice) -> None:
     axis.legend(fontsize=SMALL, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _told_of(one: SceneChoice, effect: Alone) -> str:
+def _told_of(choice_of: SceneChoice, effect: Alone) -> str:
     """Name of an effect, and whether it went: one that changes little alone may matter beside others that went."""
-    return effect.effect.replace("_", " ") + (" (left out)" if effect.effect in one.choice.left_out else " (stays)")
+    return effect.effect.replace("_", " ") + (
+        " (left out)" if effect.effect in choice_of.choice.left_out else " (stays)"
+    )
 
 
 def _activity(axis: Any, scene_choice: SceneChoice) -> None:

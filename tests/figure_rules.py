@@ -25,7 +25,7 @@ def faults(figure: Figure) -> list[str]:
 
 def _texts(figure: Figure) -> list[Text]:
     """All that is written, without marks of axes beyond their ends."""
-    every = [own for axes in figure.axes for own in (axes, *axes.child_axes)]
+    every = [panel for axes in figure.axes for panel in (axes, *axes.child_axes)]
     beyond = {id(label) for axes in every for axis in (axes.xaxis, axes.yaxis) for label in _beyond(axis)}
     written = [text for text in figure.findobj(Text) if text.get_text().strip() and id(text) not in beyond]
     return [text for text in written if _visible(text)]
@@ -116,8 +116,8 @@ def _places(figure: Figure, texts: list[Text]) -> list[str]:
     boxes = [(text.get_text(), _box(text)) for text in straight]
     boxes += [("a legend", legend.get_window_extent()) for legend in legends]
     said = [
-        f"{one!r} and {other!r} lie on one another"
-        for (one, first), (other, second) in combinations(boxes, 2)
+        f"{word!r} and {other!r} lie on one another"
+        for (word, first), (other, second) in combinations(boxes, 2)
         if _overlap(first, second)
     ]
     edge = figure.bbox.padded(TOUCH)
@@ -131,8 +131,8 @@ def _box(text: Text) -> Bbox:
     return Bbox.from_extents(box.x0, box.y0 + empty / len(lines) * box.height, box.x1, box.y1)
 
 
-def _overlap(one: Bbox, other: Bbox) -> bool:
-    wide, high = min(one.x1, other.x1) - max(one.x0, other.x0), min(one.y1, other.y1) - max(one.y0, other.y0)
+def _overlap(box: Bbox, other: Bbox) -> bool:
+    wide, high = min(box.x1, other.x1) - max(box.x0, other.x0), min(box.y1, other.y1) - max(box.y0, other.y0)
     return wide > TOUCH and high > TOUCH
 
 

@@ -149,13 +149,14 @@ def read(path: str | Path) -> "Result":
     return Result(load_result(Path(path)).data)
 
 
-def compare(one: "Result | str | Path", two: "Result | str | Path", shift: float | None = None) -> "Report":
-    """Lay two results of one kind beside each other, or a measurement over a result.
+def compare(first: "Result | str | Path", second: "Result | str | Path", shift: float | None = None) -> "Report":
+    """Lay two results of the same kind beside each other, or a measurement over a result.
 
-    Each is a result or the file of a saved one; ``two`` may be the file of a measurement, whose channels have the names
-    of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of ``Difference``, those
-    that differ most first: ``two`` less ``one``, with the place where it is largest and whether it lies within the
-    errors that both state. That of a measurement is an ``Overlay``: the time shift, and the error of every channel.
+    Each is a result or the file of a saved result; ``second`` may be the file of a measurement, whose channels have the
+    names of the run's with units in brackets, as ``f1 [kN]``. The detail of two results is a list of ``Difference``,
+    those that differ most first: ``second`` less ``first``, with the place where it is largest and whether it lies
+    within the errors that both state. That of a measurement is an ``Overlay``: the time shift, and the error of every
+    channel.
 
     shift : s, what the measurement's clock shows at the run's time 0; sought where None. Raises InputError for what has
     nothing in common.
@@ -164,16 +165,16 @@ def compare(one: "Result | str | Path", two: "Result | str | Path", shift: float
     from studies.command.comparison import compare_runs, lines
     from twinrig.report import Report
 
-    if isinstance(two, str | Path) and Path(two).suffix != ".nc" and is_measurement(Path(two)):
+    if isinstance(second, str | Path) and Path(second).suffix != ".nc" and is_measurement(Path(second)):
         from studies.command.against_measurement import overlay
 
-        laid = overlay(_result(one), two, shift)
+        laid = overlay(_result(first), second, shift)
         values = {"shift": laid.shift.seconds, "channels": {each.name: each.values() for each in laid.matches}}
-        return Report((f"{two} over {_name(one, 'the run')}", *laid.lines()), values, laid)
+        return Report((f"{second} over {_name(first, 'the run')}", *laid.lines()), values, laid)
     if shift is not None:
         raise InputError("compare", "shift", shift, "belongs to a comparison of a run with a measurement")
-    names = (_name(one, "the first"), _name(two, "the second"))
-    differences, notes = compare_runs(_result(one), _result(two), names)
+    names = (_name(first, "the first"), _name(second, "the second"))
+    differences, notes = compare_runs(_result(first), _result(second), names)
     values = {each.name: {key: getattr(each, key) for key in ("largest", "rms", "at", "share")} for each in differences}
     return Report((f"{names[1]} less {names[0]}", *lines(differences, notes)), values, differences)
 

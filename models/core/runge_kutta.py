@@ -16,8 +16,8 @@ STAGES = 4
 def step_on(rate: Callable[[float, np.ndarray], np.ndarray], time: float, state: np.ndarray, step: float) -> np.ndarray:
     """The state after a step (s), by its rate at a time (s) and a state, which is asked at 0, 1/2, 1/2 and 1 step."""
     half = 0.5 * step
-    one = rate(time, state)
-    two = rate(time + half, state + half * one)
-    three = rate(time + half, state + half * two)
-    four = rate(time + step, state + step * three)
-    return state + step / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+    first = rate(time, state)
+    second = rate(time + half, state + half * first)
+    third = rate(time + half, state + half * second)
+    fourth = rate(time + step, state + step * third)
+    return state + step / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)

@@ -94,8 +94,8 @@ def _correlations(run: np.ndarray, measured: np.ndarray, there: np.ndarray) -> n
     safe = np.maximum(count, 1.0)
     spread = (over(mask, x**2) - sums**2 / safe) * (over(y**2, ones) - means**2 / safe)
     enough = (count >= LEAST * min(len(x), mask.sum())) & (spread > (1e-6 * safe) ** 2)
-    found = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
-    return np.where(enough, found, -1.0)
+    likeness = (over(y, x) - sums * means / safe) / np.sqrt(np.where(enough, spread, 1.0))
+    return np.where(enough, likeness, -1.0)
 
 
 def _refined(pairs: Sequence[Pair], coarse: float, step: float) -> Shift:

@@ -110,9 +110,14 @@ def _within(match: Match) -> str:
     return f"; rms within the run's own error of {match.stated:.2g}" if match.rms <= match.stated else ""
 
 
-def against(one: Path, two: Path) -> bool:
+def against(run: Path, measurement: Path) -> bool:
     """Whether a comparison is of a run with a measurement: a saved result or a folder, and a file of measurements."""
-    return (one.is_dir() or one.suffix == ".nc") and not two.is_dir() and two.suffix != ".nc" and is_measurement(two)
+    return (
+        (run.is_dir() or run.suffix == ".nc")
+        and not measurement.is_dir()
+        and measurement.suffix != ".nc"
+        and is_measurement(measurement)
+    )
 
 
 def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overlay:
@@ -133,12 +138,12 @@ def overlay(run: Result, file: str | Path, shift: float | None = None) -> Overla
         name = next((each for each in theirs if suggestion(each, tuple(ours))), theirs[0] if theirs else None)
         raise InputError(file, "", name, "no channel has the name of one of the run", tuple(ours))
     pairs = {channel.name: _pair(source, channel, ours[channel.name]) for channel in named}
-    found = time_shift(list(pairs.values())) if shift is None else Shift(shift, np.nan)
-    matches = [_match(name, pair, ours[name].unit, found.seconds, run) for name, pair in pairs.items()]
+    moved_by = time_shift(list(pairs.values())) if shift is None else Shift(shift, np.nan)
+    matches = [_match(name, pair, ours[name].unit, moved_by.seconds, run) for name, pair in pairs.items()]
     kept = [match for match in matches if match is not None]
     if not kept:
-        raise InputError(file, "time", found.seconds, "at this time shift (s) no sample lies within the run")
-    return Overlay(found, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours)])
+        raise InputError(file, "time", moved_by.seconds, "at this time shift (s) no sample lies within the run")
+    return Overlay(moved_by, sorted(kept, key=lambda each: -each.relative), [*_notes(source, ours)])
 
 
 def _notes(source: Source, ours: Mapping[str, Quantity]) -> Iterator[str]:
@@ -184,9 +189,9 @@ def runs_of(place: Path) -> dict[str, Result]:
     return {file.stem: load(file) for file in files}
 
 
-def report(one: Path, two: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
+def report(run_path: Path, measurement: Path, folder: Path, shift: float | None = None) -> dict[str, Any]:
     """Lay a measurement over the run or the runs of a folder, save ``compare.csv`` and figures, say it in lines."""
-    overlays = {name: overlay(run, two, shift) for name, run in runs_of(one).items()}
+    overlays = {name: overlay(run, measurement, shift) for name, run in runs_of(run_path).items()}
     with whole_file(folder / "compare.csv") as part, part.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("run", *HEADS))
@@ -194,10 +199,14 @@ def report(one: Path, two: Path, folder: Path, shift: float | None = None) -> di
             for m in each.matches:
                 writer.writerow((name, m.name, m.unit, m.rms, m.relative, m.peak, m.at, m.stated))
     for name, each in overlays.items():
-        draw(each, f"{two.name} over {name}", folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"))
+        draw(
+            each,
+            f"{measurement.name} over {name}",
+            folder / (f"compare_{name}.png" if len(overlays) > 1 else "compare.png"),
+        )
     table = [line for name, each in overlays.items() for line in _told(name, each, len(overlays))]
     return {
-        "scene": f"{two} over {one}",
+        "scene": f"{measurement} over {run_path}",
         "folder": str(folder),
         "failed": {},
         "shift": {name: each.shift.seconds for name, each in overlays.items()},

@@ -89,12 +89,12 @@ def draw(swept: Swept, folder: Path) -> list[str]:
 
 def _changing(columns: Columns) -> dict[str, dict[str, list[Any]]]:
     """Quantities that change -> curve of each implementation, "" where there is but one."""
-    found: dict[str, dict[str, list[Any]]] = {}
+    panels: dict[str, dict[str, list[Any]]] = {}
     for name, column in columns.items():
         first, _, rest = name.partition(", ")
         engine, what = (first, rest) if rest and first in LABELS else ("", name)
-        found.setdefault(what, {})[engine] = column
-    return {what: own for what, own in found.items() if any(moves(column) for column in own.values())}
+        panels.setdefault(what, {})[engine] = column
+    return {what: panel for what, panel in panels.items() if any(moves(column) for column in panel.values())}
 
 
 def there(column: list[Any]) -> list[Any]:

@@ -37,7 +37,7 @@ def _rise_row(engine: str) -> Row:
     return Observed(
         f"braking_relaxation.rise.{engine}",
         SYSTEM,
-        "slip angles of wheels that are turned at once, over three relaxation lengths, beside 1 - exp(-u t / sigma)",
+        "difference of the slip angles of wheels that are turned at once from 1 - exp(-u t / sigma)",
         rise_apart(engine),
         "of the angle in the end",
     ).at_most(2e-6, "first order by the way; what friction of a millionth leaves of the course", "closed form")
@@ -58,15 +58,15 @@ def turn(engine: str | None, length: float, stiffer: float | None = None, durati
     without an engine in the plane."""
     vehicle = car() if stiffer is None else box(stiffer, 0.01)
     torques, substeps = steady(*TURNING), 2 if stiffer is None else 4
-    own = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
-    return replace(own, relaxation=np.full(4, length) if length else None).run(torques, 10.0, duration)
+    vehicle_on_tyres = braked(vehicle, surface("wet"), engine, 0.015, substeps=substeps)
+    return replace(vehicle_on_tyres, relaxation=np.full(4, length) if length else None).run(torques, 10.0, duration)
 
 
 def _short_row(engine: str) -> Row:
     return Observed(
         "braking_relaxation.short",
         SYSTEM,
-        "how far tyres of 0.2 m move the end of a braked turn from that without relaxation, by those of 0.1 m",
+        "ratio of how far a relaxation length of 0.2 m moves the end of a braked turn to how far 0.1 m moves it",
         short_ratio(engine),
         "",
     ).within(2.0, 0.05, "to first order in the length, whose limit is a tyre that answers at once", "closed form")
@@ -74,17 +74,17 @@ def _short_row(engine: str) -> Row:
 
 def short_ratio(engine: str) -> float:
     """Ratio of the moves (m, rad) of the first coordinates."""
-    none, one, two = (turn(engine, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
-    return float(np.abs(two - none).max() / np.abs(one - none).max())
+    none, short, long = (turn(engine, length).states[-1, 0, :3] for length in (0.0, 0.1, 0.2))
+    return float(np.abs(long - none).max() / np.abs(short - none).max())
 
 
 def _reference_row(vehicle: str, engine: str, duration: float) -> Row:
-    found = whole.run(whole.VEHICLES[vehicle](), engine, duration, lags=True)
+    path = whole.run(whole.VEHICLES[vehicle](), engine, duration, lags=True)
     return Observed(
         f"braking_relaxation.reference.{vehicle}.{engine}",
         SYSTEM,
-        f"{duration:g} s of a stop of the {vehicle} on tyres that relax in {engine}, a slip controller in the loop",
-        whole.paths_apart(found, whole.plain_run(vehicle, duration, lags=True)),
+        f"difference of {duration:g} s of a stop in {engine} from plain code, {vehicle} on relaxing tyres, slip control",
+        whole.paths_apart(path, whole.plain_run(vehicle, duration, lags=True)),
         "m, rad, per s",
     ).at_most(1e-10, "the same steps in plain code, whose lag is an exponential of a matrix", "native")
 
@@ -97,8 +97,12 @@ def _stiff_row() -> Row:
     return Observed(
         "braking_relaxation.stiff",
         SYSTEM,
-        "how far the box on relaxing tyres ends a braked turn from the plane vehicle, springs 100 times as stiff by "
-        "the plain ones",
+        "ratio of how far the box on relaxing tyres ends a braked turn from the plane vehicle with springs 100 times "
+        "as stiff to how far it does with its usual ones",
         apart[1] / apart[0],
         "",
-    ).at_most(0.1, "the plane vehicle is the limit, reached with the time that dampers take, a tenth", "shared kernel")
+    ).at_most(
+        0.1,
+        "springs 100 and dampers 10 times as stiff: deflections fall to 1 %, the times that they take to a tenth",
+        "shared kernel",
+    )

@@ -42,8 +42,8 @@ def _stop() -> float:
 
 
 def _lagging() -> float:
-    found = whole.run(whole.car(), ENGINE, DURATION, lags=True)
-    return whole.paths_apart(found, whole.plain_run("car", DURATION, lags=True))
+    path = whole.run(whole.car(), ENGINE, DURATION, lags=True)
+    return whole.paths_apart(path, whole.plain_run("car", DURATION, lags=True))
 
 
 CHECKS = {

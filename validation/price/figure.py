@@ -157,10 +157,10 @@ def _defaults(ax: Axes, measured: Measured, kind: str) -> None:
             continue
         place = (p.cost(kind), measured.error(p))
         ax.plot(*place, "o", **ring, zorder=5)
-        own = _within(ax, [place])[0]
-        corner = _emptiest(taken, own, names)
+        around = _within(ax, [place])[0]
+        corner = _emptiest(taken, around, names)
         names.append(corner + LABEL * np.array([0.5, 0.0]))
-        way = own + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - own)
+        way = around + np.linspace(0.0, 1.0, 9)[:, None] * (names[-1] - around)
         taken = np.vstack([taken, corner + LABEL * np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), way])
         ax.annotate(
             f"{owner} default:\n{p.setting.method},\n{p.setting.label()}",

@@ -23,7 +23,7 @@ def lag_on(
     """
     (u, v), stiffness = speeds, np.sqrt(max(slope, SLOWEST) * GRAVITY * length)
     before = np.where(np.isnan(angle), v / np.maximum(np.abs(u), SLOWEST), angle)
-    after = np.array([_taken_up(*own, time) for own in zip(before, np.abs(u), v, length, strict=True)])
+    after = np.array([_taken_up(*wheel, time) for wheel in zip(before, np.abs(u), v, length, strict=True)])
     fade = np.clip(1.0 - np.abs(u) / SLOW, 0.0, 1.0)
     return after, after + fade**2 * v * 2.0 * DAMPING / stiffness
 

@@ -52,8 +52,9 @@ def describe(scene: HandlingScene) -> str:
 
 
 def _adaptive(scene: HandlingScene, engine: str) -> str:
-    own, step = scene.engines[engine], scene.run.step
-    return f"{own.integrator} in its place, which picks its own steps to {own.tolerance:g}, rows every {step:g} s"
+    adaptive, step = scene.engines[engine], scene.run.step
+    steps = f"which picks its own steps to {adaptive.tolerance:g}, rows every {step:g} s"
+    return f"{adaptive.integrator} in its place, {steps}"
 
 
 def _manoeuvre(scene: HandlingScene, name: str) -> str:

@@ -107,9 +107,9 @@ class HandlingScene(SceneFile):
 
     def adaptive(self, engine: str, manoeuvre: str) -> Settings | None:
         """How an engine that picks its own steps marches a manoeuvre; None for Runge-Kutta 4."""
-        own = self.engines.get(engine)
+        adaptive = self.engines.get(engine)
         duration = self.manoeuvres[manoeuvre].duration
-        return None if own is None else Settings(own.integrator, self.run.step, duration, own.tolerance)
+        return None if adaptive is None else Settings(adaptive.integrator, self.run.step, duration, adaptive.tolerance)
 
     def handling(self, name: str) -> Handling:
         """Vehicle, tyres, road and controls of one manoeuvre."""
@@ -130,19 +130,19 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Ha
         _check_times(scene, place, manoeuvre)
         for control, limits in LIMITS.items():
             _check_knots(scene, f"{place}.{control}", getattr(manoeuvre, control), *limits)
-    for engine, own in scene.engines.items():
-        _check_engine(scene, engine, own)
+    for engine, adaptive in scene.engines.items():
+        _check_engine(scene, engine, adaptive)
     return with_own(scene)
 
 
-def _check_engine(scene: HandlingScene, engine: str, own: Adaptive) -> None:
+def _check_engine(scene: HandlingScene, engine: str, adaptive: Adaptive) -> None:
     """Refuse an engine, or an integrator, that does not pick its own steps."""
     if engine not in ADAPTIVE:
         allowed = "no engine with integrators that pick their own steps"
         raise InputError(scene.file, f"engines.{engine}", engine, allowed, tuple(ADAPTIVE))
-    if own.integrator not in ADAPTIVE[engine]:
+    if adaptive.integrator not in ADAPTIVE[engine]:
         allowed = "no integrator of this engine that picks its own steps"
-        raise InputError(scene.file, f"engines.{engine}.integrator", own.integrator, allowed, ADAPTIVE[engine])
+        raise InputError(scene.file, f"engines.{engine}.integrator", adaptive.integrator, allowed, ADAPTIVE[engine])
 
 
 def _check_times(scene: HandlingScene, place: str, manoeuvre: Manoeuvre) -> None:
