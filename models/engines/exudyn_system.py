@@ -8,7 +8,6 @@ import exudyn as exu
 import exudyn.itemInterface as typed_items
 import numpy as np
 
-from models.core.errors import RunFailed
 from models.core.waiting import marching
 from models.engines.assembly import Settings
 from models.engines.catalogue import CATALOGUE
@@ -109,9 +108,14 @@ def solve(mbs: Any, settings: Settings, options: Any = None) -> str:
     ti = options.timeIntegration
     ti.numberOfSteps, ti.endTime, ti.verboseMode = settings.steps, settings.duration, 0
     ti.adaptiveStep = ti.explicit.computeEndOfStepAccelerations = False
+    with marching(lambda: mbs.systemData.GetTime() / settings.duration):
+        return ended(mbs, settings.integrator, options)
+
+
+def ended(mbs: Any, integrator: str, options: Any) -> str:
+    """How Exudyn's solver ended, as a phrase; empty if well."""
     try:
-        with marching(lambda: mbs.systemData.GetTime() / settings.duration):
-            done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, settings.integrator))
+        done = mbs.SolveDynamic(options, solverType=getattr(exu.DynamicSolverType, integrator))
     except (exu.ExudynError, RuntimeError, ValueError) as error:
         if "KeyboardInterrupt" in str(error):
             raise KeyboardInterrupt from error
@@ -127,9 +131,3 @@ def counted(mbs: Any) -> dict[str, int]:
     explicit = hasattr(solver, "GetNumberOfStages")
     calls = tried * solver.GetNumberOfStages() if explicit else solver.it.newtonStepsCount + steps
     return {"steps": steps, "force calls": calls, "Jacobians": solver.it.newtonJacobiCount}
-
-
-def solve_or_fail(mbs: Any, settings: Settings, options: Any = None) -> None:
-    """``solve``; RunFailed where the solver stops or reports failure."""
-    if note := solve(mbs, settings, options):
-        raise RunFailed("exudyn", note.lstrip("; "))

@@ -34,22 +34,13 @@ def march_adaptively(model: FreeModel, q: np.ndarray, v: np.ndarray, settings: S
 
 def _in_exudyn(model: Any, begun: np.ndarray, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
     """States (steps + 1, 2 n), a row at a time, and what it took."""
-    import exudyn as exu
-
-    from models.engines.exudyn_system import counted, start
+    from models.engines.exudyn_system import counted, ended, start
 
     mbs, states = model.mbs, np.empty((settings.steps + 1, begun.size))
     states[0], counts = begun, {"steps": 0, "force calls": 0}
-    solver = getattr(exu.DynamicSolverType, settings.integrator)
     for i in range(settings.steps):
         start(mbs, *np.split(states[i], 2))
-        try:
-            done = mbs.SolveDynamic(_options(i * settings.step, settings), solverType=solver)
-        except (exu.ExudynError, RuntimeError, ValueError) as error:
-            if "KeyboardInterrupt" in str(error):
-                raise KeyboardInterrupt from error
-            done = False
-        if not done:
+        if ended(mbs, settings.integrator, _options(i * settings.step, settings)):
             raise RunFailed("exudyn", "no step is short enough for its tolerance", i * settings.step, states[i])
         data, took = mbs.systemData, counted(mbs)
         states[i + 1] = np.concatenate((data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))

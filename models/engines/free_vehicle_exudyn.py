@@ -5,8 +5,9 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from models.core.errors import RunFailed
 from models.engines.assembly import Settings
-from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve_or_fail, start
+from models.engines.exudyn_system import items, mass_and_force, packed_forces, recorders, solve, start
 from models.engines.exudyn_tree import Build, add_tree
 from models.engines.free_vehicle import Driven, FreeModel
 from models.engines.native_exudyn import add_ground_spring, add_parts, built_elements
@@ -62,5 +63,6 @@ class FreeExudyn(FreeModel):
     def march(self, q: np.ndarray, v: np.ndarray, steps: int, step: float) -> np.ndarray:
         """Positions and rates (steps + 1, 2 n) by Exudyn's RK44; RunFailed where it stops."""
         start(self.mbs, q, v)
-        solve_or_fail(self.mbs, Settings("RK44", step, steps * step))
+        if note := solve(self.mbs, Settings("RK44", step, steps * step)):
+            raise RunFailed("exudyn", note.lstrip("; "))
         return np.hstack([self.mbs.GetSensorStoredData(sensor)[:, 1:] for (sensor,) in self._sensors])
