@@ -6,6 +6,7 @@ the newest report of the machine in that page, too (``docs.website``).
 
 import ast
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +61,9 @@ def rows(report: Path) -> str:
 
 
 def _cell(value: Any) -> str:
+    """Text of a cell; brackets are escaped, as a pair of them would be a link to a reference."""
     text = "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
-    return text.replace("|", "\\|").replace("\n", " ")
+    return re.sub(r"([|\[\]])", r"\\\1", text).replace("\n", " ")
 
 
 def main(path: Path = PAGE) -> None:

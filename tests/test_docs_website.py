@@ -12,7 +12,7 @@ from docs.website import copy_pages
 
 ROW = {
     "id": "audit.one",
-    "quantity": "a | b",
+    "quantity": "a | b [1] [2]",
     "expected": 0.0,
     "tolerance": 1e-12,
     "independence": "native",
@@ -36,7 +36,7 @@ def test_the_rows_are_those_of_the_newest_report(tmp_path):
         os.utime(path, (1e9 - age, 1e9 - age))
     report = newest_report(tmp_path)
     assert report == tmp_path / "new" / "results.json"
-    assert rows(report).splitlines()[-1] == "| `audit.one` | a \\| b | 0 | 1e-12 | native | passed |"
+    assert rows(report).splitlines()[-1] == "| `audit.one` | a \\| b \\[1\\] \\[2\\] | 0 | 1e-12 | native | passed |"
 
 
 def entries(nav):
