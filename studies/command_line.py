@@ -47,6 +47,8 @@ def common(
     """Options that belong to no command."""
 
 
+Work = Callable[[Any], dict[str, Any]]
+"""A study, which is given what it tells its progress to, and returns its summary."""
 SceneName = Annotated[str, typer.Argument(help="A scene file, or the name of one from `twinrig list`.")]
 Changes = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key, e.g. run.step=5e-4; repeatable.")
@@ -61,6 +63,7 @@ Sweep = Annotated[
 ]
 NoError = Annotated[bool, typer.Option("--no-error", help="Do not estimate the error of steps or cells.")]
 Strictly = Annotated[bool, typer.Option("--strict", help="End with code 1 where an assumption is broken.")]
+Profile = Annotated[bool, typer.Option("--profile", help="Tell where the time goes: imports, kernels, marches.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")]
 
 
@@ -173,9 +176,11 @@ def run_scene(
     changes: Changes = None,
     no_error: NoError = False,
     strict: Strictly = False,
+    profile: Profile = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a scene and save its results and figures."""
+    watched = _watched(profile)
     if sweep is not None:
         from studies.command.sweep import RECORDS, points
         from studies.command.sweep import run as run_points
@@ -183,7 +188,7 @@ def run_scene(
         job = points(sweep, scene, changes or (), engine, not no_error)
         folder = _folder(f"{Path(scene).stem}-sweep", RECORDS, "", out, resume)
         work = partial(run_points, replace(job, folder=folder))
-        return _finish(work, folder, as_json, strict=strict)
+        return _finish(watched(work), folder, as_json, strict=strict)
     loaded = load_scene(scene, changes)
     loaded = loaded.model_copy(update={"error": loaded.error and not no_error})
     engines = engines_of(engine or getattr(getattr(loaded, "run", None), "engine", None), loaded.system)
@@ -193,7 +198,17 @@ def run_scene(
         folder = _folder(Path(loaded.file).stem, getattr(module, "BLOCKS", None), loaded.study, out, resume)
         doubts = findings_of(loaded)
         work = partial(module.run, loaded, engines, folder)
-        _finish(work, folder, as_json, doubts, strict, loaded.system)
+        _finish(watched(work), folder, as_json, doubts, strict, loaded.system)
+
+
+def _watched(profile: bool) -> Callable[[Work], Work]:
+    """What makes a work tell at its end where the time has gone from now on; nothing where nobody wants to know."""
+    if not profile:
+        return lambda work: work
+    from studies.command.profile import Watch
+
+    watch = Watch()
+    return lambda work: partial(watch.told, work)
 
 
 @contextmanager
@@ -345,12 +360,7 @@ def _blind_spots(more: bool, out: Path | None, resume: Path | None) -> None:
 
 
 def _finish(
-    work: Callable[[Any], dict[str, Any]],
-    folder: Path,
-    as_json: bool,
-    doubts: tuple[Finding, ...] = (),
-    strict: bool = False,
-    system: str = "",
+    work: Work, folder: Path, as_json: bool, doubts: tuple[Finding, ...] = (), strict: bool = False, system: str = ""
 ) -> None:
     """Do the work, whose results go into ``folder``, with a progress bar, and print its summary.
 

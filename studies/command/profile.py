@@ -1,0 +1,112 @@
+"""Where the time of a run goes: a thread looks every few milliseconds at what the main thread does.
+
+Nothing is built into the models for it, so a run without it costs what it did. Forces that are compiled into a march
+belong to that march; those that an engine asks Python for have a line of their own.
+"""
+
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import PurePath
+from types import FrameType
+from typing import Any
+
+EVERY = 0.004
+"""s between two looks."""
+BEGIN, IMPORTS, KERNELS = "start of Python", "imports", "compiling and loading kernels"
+FIGURES, SAVING, REST = "figures", "saving", "everything else"
+BESIDE = "marching beside the engines"
+"""A controller, wheels in steps of their own, or equations that belong to no engine."""
+LIBRARIES = {
+    "numba": KERNELS,
+    "llvmlite": KERNELS,
+    "matplotlib": FIGURES,
+    "mpl_toolkits": FIGURES,
+    "PIL": FIGURES,
+    "drawing": FIGURES,
+    "pictures": FIGURES,
+    "h5netcdf": SAVING,
+    "h5py": SAVING,
+    "backends": SAVING,
+}
+"""What is done within a library or a folder of ours."""
+ENGINES = ("exudyn", "mujoco", "reference")
+MARCHES = frozenset(
+    ("march", "march_adaptively", "solve", "ended", "run", "rollout", "SolveDynamic", "_marched", "_fixed", "_adaptive")
+)
+"""Functions in which an engine marches; in all others it is being built, or answers for a single state."""
+FORCES = frozenset(("force", "forces", "law"))
+"""Functions that an engine asks for forces."""
+
+
+class Watch:
+    """Seconds of the main thread by what it did, from ``begin`` until ``told``."""
+
+    def __init__(self) -> None:
+        self.seconds: Counter[str] = Counter({BEGIN: time.process_time()})
+        self._main, self._over = threading.main_thread().ident, threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+
+    def _look(self) -> None:
+        """Give the time since the last look to what is seen now: a call that lets no thread in ends before a look."""
+        last = time.perf_counter()
+        while not self._over.wait(EVERY):
+            now = time.perf_counter()
+            frame = sys._current_frames().get(self._main or 0)
+            self.seconds[REST if frame is None else part_of(frame)] += now - last
+            last = now
+
+    def told(self, work: Callable[[Any], dict[str, Any]], progress: Any) -> dict[str, Any]:
+        """Do the work, end the watch, and add its lines to the summary of the work."""
+        summary = work(progress)
+        self._over.set()
+        self._thread.join()
+        spent = dict(self.seconds.most_common())
+        return summary | {"profile": spent, "table": [*summary.get("table", []), *lines(spent)]}
+
+
+def part_of(frame: FrameType) -> str:
+    """Which part of a run a stack of calls belongs to, by its innermost frame that tells."""
+    engine, forces = "", False
+    for name, path in _calls(frame):
+        if name == "<module>" or path.parts[:1] == ("<frozen importlib._bootstrap>",):
+            return IMPORTS
+        for folder in (*path.parts[-4:-1], path.stem):
+            if folder in LIBRARIES:
+                return LIBRARIES[folder]
+        if path.stem.endswith(("_figure", "_figures")) or name == "_figure":
+            return FIGURES
+        if (name, path.stem) == ("save", "result") or path.stem == "whole_files":
+            return SAVING
+        forces = forces or name in FORCES
+        within = _engine(path)
+        engine = engine or within
+        if name in MARCHES and (within or path.stem == "march"):
+            part = f"marching in {engine}" if engine else BESIDE
+            return f"forces asked for by {engine}" if engine and forces else part
+    return f"building in {engine}" if engine else REST
+
+
+def _calls(frame: FrameType | None) -> Iterator[tuple[str, PurePath]]:
+    """Names and files of the functions of a stack, the innermost first, down to the script itself."""
+    while frame is not None and frame.f_globals.get("__name__") != "__main__":
+        yield frame.f_code.co_name, PurePath(frame.f_code.co_filename)
+        frame = frame.f_back
+
+
+def _engine(path: PurePath) -> str:
+    """The engine that a file belongs to: of its own package, or ours around it; else empty."""
+    if path.parent.name in ENGINES:
+        return path.parent.name
+    named = (engine for engine in ENGINES if engine in path.stem)
+    return next(named, "") if path.parent.name == "engines" else ""
+
+
+def lines(spent: dict[str, float]) -> list[str]:
+    """The table that is printed: seconds and shares, the largest first."""
+    whole = sum(spent.values())
+    rows = [f"    {part:<30} {seconds:8.2f} s {seconds / whole:6.1%}" for part, seconds in spent.items()]
+    return [f"  where {whole:.1f} s went, by a look every {1000 * EVERY:.0f} ms", *rows]

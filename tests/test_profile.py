@@ -1,0 +1,55 @@
+"""Where the time of a run goes: which part a stack of calls belongs to, and the table that is printed."""
+
+import json
+import time
+
+import pytest
+
+from studies.command import profile
+
+
+def stack(*calls):
+    """A frame as Python has it, from (function, file), the outermost first."""
+    from types import SimpleNamespace as Plain
+
+    frame = Plain(f_code=Plain(co_name="main", co_filename="x.py"), f_globals={"__name__": "__main__"}, f_back=None)
+    for name, file in calls:
+        code = Plain(co_name=name, co_filename=file)
+        frame = Plain(f_code=code, f_globals={"__name__": "x"}, f_back=frame)
+    return frame
+
+
+@pytest.mark.parametrize(
+    ("calls", "part"),
+    [
+        ([("run", "studies/single_run.py")], "everything else"),
+        ([("run", "models/engines/exudyn.py"), ("_SolveDynamic", "exudyn/solver.py")], "marching in exudyn"),
+        ([("run", "models/engines/exudyn.py"), ("force", "models/engines/exudyn.py")], "forces asked for by exudyn"),
+        ([("__init__", "models/engines/free_vehicle_mujoco.py")], "building in mujoco"),
+        ([("run", "models/systems/braking/march.py")], profile.BESIDE),
+        ([("run", "models/systems/braking/march.py"), ("_moved", "models/engines/exudyn.py")], "marching in exudyn"),
+        ([("run", "models/engines/exudyn.py"), ("compile", "numba/core/dispatcher.py")], profile.KERNELS),
+        ([("compile", "numba/core/dispatcher.py"), ("<module>", "llvmlite/ir.py")], profile.IMPORTS),
+        ([("_figure", "studies/single_run.py"), ("draw", "matplotlib/axes/_axes.py")], profile.FIGURES),
+        ([("save", "models/core/result.py"), ("sort", "numpy/x.py")], profile.SAVING),
+    ],
+)
+def test_the_innermost_call_that_tells_decides(calls, part):
+    assert profile.part_of(stack(*calls)) == part
+
+
+def test_all_the_time_of_the_work_is_told_and_no_more():
+    begun = time.perf_counter()
+    summary = profile.Watch().told(lambda progress: time.sleep(0.3) or {"table": ["first"]}, None)
+    taken, told = time.perf_counter() - begun, summary["profile"]
+    told.pop(profile.BEGIN)
+    assert 0.25 < sum(told.values()) <= taken and summary["table"][0] == "first"
+
+
+def test_a_run_tells_it_when_it_is_asked_to(twinrig, empty_folder, capsys):
+    asked = ("run", "release", "--set", "run.duration=0.05", "--engine", "reference", "--json")
+    assert twinrig(*asked, "--profile") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {profile.BEGIN, profile.FIGURES} <= told["profile"].keys() and min(told["profile"].values()) > 0.0
+    assert twinrig(*asked) == 0
+    assert "profile" not in json.loads(capsys.readouterr().out)
