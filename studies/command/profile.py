@@ -7,7 +7,7 @@ belong to that march; those that an engine asks Python for have a line of their 
 import sys
 import threading
 import time
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import PurePath
 from types import FrameType
@@ -45,7 +45,7 @@ class Watch:
     """Seconds of the main thread by what it did, from ``begin`` until ``told``."""
 
     def __init__(self) -> None:
-        self.seconds: Counter[str] = Counter({BEGIN: time.process_time()})
+        self.seconds = defaultdict[str, float](float, {BEGIN: time.process_time()})
         self._main, self._over = threading.main_thread().ident, threading.Event()
         self._thread = threading.Thread(target=self._look, daemon=True)
         self._thread.start()
@@ -64,7 +64,7 @@ class Watch:
         summary = work(progress)
         self._over.set()
         self._thread.join()
-        spent = dict(self.seconds.most_common())
+        spent: dict[str, float] = dict(sorted(self.seconds.items(), key=lambda part: -part[1]))
         return summary | {"profile": spent, "table": [*summary.get("table", []), *lines(spent)]}
 
 
