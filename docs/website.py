@@ -51,7 +51,8 @@ def build(site: Path, work: Path, as_shown: bool) -> bool:
     well = as_shown or run_pages(pages(sources), check=False, strict=True)
     add_rows(sources)
     add_pictures(ROOT / "results", sources / "docs" / "gallery.md")
-    shutil.copyfile(ROOT / "docs" / "mkdocs.yml", work / "mkdocs.yml")
+    for name in ("mkdocs.yml", "mathml.py"):
+        shutil.copyfile(ROOT / "docs" / name, work / name)
     command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     command += ["--config-file", str(work / "mkdocs.yml"), "--site-dir", str(site.absolute())]
     subprocess.run(command, check=True, cwd=ROOT, env=os.environ | QUIET)

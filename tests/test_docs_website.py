@@ -4,8 +4,10 @@ import json
 import os
 from fnmatch import fnmatchcase
 
+import pytest
 import yaml
 
+from docs.mathml import on_page_content
 from docs.pages import ROOT, pages
 from docs.validation_cases import newest_report, rows
 from docs.website import copy_pages
@@ -56,3 +58,12 @@ def test_every_page_has_a_place_in_the_navigation():
     for page in pages():
         name = str(page.relative_to(ROOT))
         assert any(fnmatchcase(name, path) for path in paths), name
+
+
+def test_formulas_are_drawn_without_a_script():
+    line, display = r'<span class="arithmatex">\(a &lt; b_1\)</span>', r'<div class="arithmatex">\[\frac{1}{2}\]</div>'
+    drawn = on_page_content(f"<p>{line}</p>{display}", page="x.md")
+    assert drawn.count("<math") == 2 and "arithmatex" not in drawn and 'display="block"' in drawn
+    for formula, said in (("x^", "cannot be read"), (r"\fraction{1}{2}", "a command that is not known")):
+        with pytest.raises(ValueError, match=rf"^x\.md: the formula .* {said}"):
+            on_page_content(rf'<div class="arithmatex">\[{formula}\]</div>', page="x.md")
