@@ -304,11 +304,12 @@ def export(
     twinrig, such as tyres, stay behind; the file and the terminal name each of them.
     """
     from studies.command.export import export as write
+    from studies.command.export import lines as written
 
     loaded = load_scene(scene, changes)
     with waiting("building the vehicle", loaded.system):
-        lines = write(loaded, engine, out)
-    print("\n".join(lines))
+        told = write(loaded, engine, out)
+    print("\n".join(written(loaded.title, told)))
 
 
 @app.command()

@@ -168,7 +168,7 @@ def test_validate_hands_on_what_the_report_says(empty_folder, monkeypatch):
     report = twinrig.validate(quick=True)
     assert repr(report) == "3 rows: 1 failed, True, twinrig.validate(quick=True)" and report.detail == 1
     assert report.values == {"folder": str(Path("results/validate-quick")), "results": {"rows": 3}}
-    with pytest.raises(twinrig.InputError, match=r"^out = .*name a new or empty folder"):
+    with pytest.raises(twinrig.InputError, match=r"^folder = .*name a new or empty folder"):
         twinrig.validate(quick=True, folder=report.values["folder"])
 
 
@@ -206,6 +206,9 @@ ERRORS = {
     "no result": (lambda r: twinrig.compare("study_road", r), "give what twinrig.run returns"),
     "no price": (lambda r: twinrig.price("ride", 1.0), "accuracy is priced in scenes of other systems"),
     "tolerance": (lambda r: twinrig.price("study_road", -1.0), "^tolerance = -1.0: must be a finite number above 0"),
+    "no engine": (lambda r: twinrig.export("handling", "adams"), "^engine = 'adams': no engine that has files"),
+    "no vehicle": (lambda r: twinrig.export("contact_ellipse", "mujoco"), "no vehicle that an engine builds"),
+    "no such file": (lambda r: twinrig.export("handling", "mujoco", "x.py"), "^file = 'x.py': must end in .xml"),
     "no quantities": (lambda r: twinrig.choose("study_road"), "quantities: is missing"),
 }
 
@@ -215,6 +218,15 @@ def test_a_beginners_error_is_answered_with_the_remedy(mistake, result):
     ask, said = ERRORS[mistake]
     with pytest.raises(twinrig.InputError, match=said):
         ask(result)
+
+
+def test_a_vehicle_is_written_as_a_file_of_an_engine(tmp_path):
+    file = tmp_path / "car.xml"
+    report = twinrig.export("handling", "mujoco", file)
+    assert file.read_text().startswith("<") and report.values["file"] == str(file)
+    assert any("tyre" in text for text in report.values["left out"]) and "left out:" in repr(report)
+    with pytest.raises(twinrig.InputError, match="nothing is overwritten"):
+        twinrig.export("handling", "mujoco", file)
 
 
 def test_an_unlikely_vehicle_is_told_in_the_result_and_where_the_run_is_refused():

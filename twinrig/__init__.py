@@ -18,7 +18,7 @@ from twinrig import shadowed
 shadowed.check()
 
 from models.core.errors import InputError, RunFailed  # noqa: E402  only ours, as was just checked
-from twinrig.calls import choose, compare, load, price, read, run, validate  # noqa: E402
+from twinrig.calls import choose, compare, export, load, price, read, run, validate  # noqa: E402
 
 if TYPE_CHECKING:
     from twinrig.report import Report
@@ -33,6 +33,7 @@ __all__ = [
     "Scene",
     "choose",
     "compare",
+    "export",
     "load",
     "price",
     "read",

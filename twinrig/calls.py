@@ -1,4 +1,4 @@
-"""What users call: load, run, compare, price, choose, validate; thin, on what the command line has, too.
+"""What users call: load, run, compare, price, choose, export, validate; thin, on what the command line has, too.
 
 Heavy packages are imported by the functions that use them.
 """
@@ -123,8 +123,8 @@ def _engines(scene: Any, asked: str, optional: bool) -> tuple[str, tuple[str, ..
 
 
 @contextmanager
-def _as_library(scene: Any = None) -> "Iterator[None]":
-    """Messages that name an option of the command line name the argument instead.
+def _as_library(scene: Any = None, **names: str) -> "Iterator[None]":
+    """Messages that name an option of the command line name the argument instead, of the same name if not in ``names``.
 
     What is unlikely about the vehicle of a scene that is refused is a note of the error: it may be the cause.
     """
@@ -134,7 +134,8 @@ def _as_library(scene: Any = None) -> "Iterator[None]":
         yield
     except InputError as error:
         if error.file.startswith("--"):
-            renamed = InputError(error.file.lstrip("-"), error.place, error.value, error.allowed, error.choices)
+            option = error.file.lstrip("-")
+            renamed = InputError(names.get(option, option), error.place, error.value, error.allowed, error.choices)
             raise renamed from None
         for line in causes(scene) if scene is not None else ():
             error.add_note(line)
@@ -264,6 +265,24 @@ def _choosing(scene: "Scene", quantities: "list[str] | None", tolerance: float |
     return scene.with_(changes) if changes else scene
 
 
+def export(scene: AnyScene, engine: str, file: str | Path | None = None, *, set: Changes = None) -> "Report":
+    """Write the native part of a scene's vehicle as a file of an engine that opens without twinrig.
+
+    engine : "mujoco" for an MJCF, "exudyn" for a script in Python; file : SCENE_ENGINE.xml or .py in the current folder
+    if None. The values name the file, what it has and what is left out: forces that are functions of twinrig. Raises
+    InputError for a scene without a vehicle that an engine builds, and for a file that is there already.
+    """
+    from studies.command.export import export as write
+    from studies.command.export import lines
+    from studies.command.waiting import waiting
+    from twinrig.report import Report
+
+    loaded = load(scene, set).checked
+    with _as_library(loaded, out="file"), waiting("building the vehicle", loaded.system):
+        told = write(loaded, engine, None if file is None else Path(file))
+    return Report(tuple(lines(loaded.title, told)), told)
+
+
 def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
     """Run the validation cases and write the report into a folder, a new one in ``results`` if none is named.
 
@@ -283,5 +302,5 @@ def validate(quick: bool = False, folder: str | Path | None = None) -> "Report":
 def _new_folder(wanted: str | Path | None, name: str) -> Path:
     from models.core.result_folders import new_folder
 
-    with _as_library():
+    with _as_library(out="folder"):
         return new_folder(None if wanted is None else Path(wanted), name)

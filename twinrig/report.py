@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What ``compare``, ``price``, ``choose`` and ``validate`` answer.
+    """What ``compare``, ``price``, ``choose``, ``export`` and ``validate`` answer.
 
     lines : as the command line prints them; values : plain values, those of ``--json``; detail : in the types of the
     module that computed it.

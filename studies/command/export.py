@@ -40,12 +40,17 @@ def target(scene: Any, engine: str, out: Path | None) -> Path:
     return path
 
 
-def export(scene: Any, engine: str, out: Path | None) -> list[str]:
-    """Write the file; lines that say what it has and what it leaves out."""
+def export(scene: Any, engine: str, out: Path | None) -> dict[str, Any]:
+    """Write the file; what was written where: its "file", what it "has", and what is "left out", a sentence each."""
     answer = exported(scene, engine)
     path = target(scene, engine, out)
     write_whole(path, answer.text)
-    left_out = [f"    {text}" for text in answer.left_out]
+    return {"file": str(path), "has": [*answer.has], "left out": [*answer.left_out]}
+
+
+def lines(title: str, told: dict[str, Any]) -> list[str]:
+    """What the command prints of a scene's title and of what ``export`` tells."""
+    path, left_out = told["file"], [f"    {text}" for text in told["left out"]]
     head = "  left out:" if left_out else "  leaves nothing out"
-    opened = f"python -m mujoco.viewer --mjcf={path}" if engine == "mujoco" else f"python {path}"
-    return [f"{scene.title}: {path}", f"  has {', '.join(answer.has)}", head, *left_out, f"  open it: {opened}"]
+    opened = f"python -m mujoco.viewer --mjcf={path}" if path.endswith(SUFFIXES["mujoco"]) else f"python {path}"
+    return [f"{title}: {path}", f"  has {', '.join(told['has'])}", head, *left_out, f"  open it: {opened}"]
