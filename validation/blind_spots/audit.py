@@ -43,7 +43,9 @@ BUDGETS = (8.0, 40.0)
 independent has noticed, and if not. How many are left is told."""
 FAULT = 0.01
 PATIENCE = 1200
-"""Seconds after which a process has lost its way, as a search that never ends."""
+"""Seconds of the processor after which a case or test without a fault has lost its way."""
+LOST = 120
+"""Seconds of the processor after which one with a fault has, as a stop whose wheels never come to rest."""
 Told = dict[str, Any]
 Progress = Callable[[str, float], None]
 Job = tuple[list[str], list[str]]
@@ -118,7 +120,7 @@ class Probes:
         out.write_text("")
         cases, tests = job
         told: Told = {"cases": cases, "tests": tests, "out": str(out), "faults": faults, "sound": sorted(sound)}
-        told |= {"patience": PATIENCE, "budgets": BUDGETS if faults else (PATIENCE, PATIENCE)}
+        told |= {"patience": LOST, "budgets": BUDGETS} if faults else {"patience": PATIENCE, "budgets": [PATIENCE] * 2}
         probe = self.idle.get()
         assert probe.stdin and probe.stdout
         probe.stdin.write(json.dumps(told) + "\n")

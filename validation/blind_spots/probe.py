@@ -4,8 +4,8 @@ It reads jobs from its standard input and imports the cases that they name, each
 starts a fork of itself, in which nothing is left of an earlier fault, and answers how that has ended. A job is a line
 of JSON: "cases" and "tests" (what pytest is given); "out", a file to which a line of JSON is added for each case and
 test that has ended; "faults", by the place of the function; "sound", ids that fail without a fault; "patience", seconds
-after which the fork is stopped; and "budgets", seconds of the processor after which nothing more begins: if something
-independent has noticed, and if not.
+of the processor after which the fork is stopped; and "budgets", seconds of the processor after which nothing more
+begins: if something independent has noticed, and if not.
 """
 
 import json
@@ -143,7 +143,7 @@ class Watching:
 
 def work(job: dict[str, Any]) -> None:
     """Tests first, which are quicker, and then cases."""
-    signal.alarm(job["patience"])
+    signal.setitimer(signal.ITIMER_PROF, job["patience"])
     for place, fault in job["faults"].items():
         memory.FAULTS[int(place)] = fault
     told = Told(job)
@@ -167,7 +167,7 @@ def ended(job: dict[str, Any]) -> str:
             os._exit(0)
         os._exit(1)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    return {0: "whole", -signal.SIGALRM: "out of time"}.get(status, "crashed")
+    return {0: "whole", -signal.SIGPROF: "out of time"}.get(status, "crashed")
 
 
 def main() -> None:
