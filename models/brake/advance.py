@@ -42,8 +42,9 @@ def ended(motion, plane):
 
 @inlined
 def parts_of(state, regular):
-    """How many parts of a step keep the speed ``regular`` (m/s), below which slip angles are too small, below that of
-    the vehicle: otherwise it would yield sideways, and yaw on split friction, by as much too far."""
+    """Number of parts into which a step is cut to keep the speed ``regular`` (m/s), below which slip angles are too
+    small, below that of the vehicle: otherwise it would yield sideways, and yaw on split friction, by as much too
+    far."""
     speed = math.hypot(state[1, 0], state[1, 1])
     return 1 if speed == 0.0 else int(min(math.ceil(regular / speed), MOST_PARTS))
 

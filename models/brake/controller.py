@@ -1,4 +1,5 @@
-"""What stands at the port: a controller is asked once per sample, and answers with what its valves do."""
+"""The port between a vehicle and a brake controller, which is asked once per sample and answers with commands to
+valves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ LARGEST_PRESSURE = 300.0
 
 
 class Sample(NamedTuple):
-    """What goes to the controller.
+    """The signals that a controller is given at a sample.
 
     number : of the sample, from 0; time : ns since the start; wheels (W,) : wheel-speed signals times the wheel's
     radius (m/s), never negative, as a toothed wheel does not tell which way it turns; brake : whether the switch at the
@@ -32,7 +33,7 @@ class Sample(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What comes back: states (W,) of the valves, or pressures (W,) in bar instead."""
+    """The controller's answer to a sample: states (W,) of the valves, or pressures (W,) in bar instead."""
 
     valves: np.ndarray | None = None
     pressures: np.ndarray | None = None

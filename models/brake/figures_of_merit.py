@@ -1,4 +1,4 @@
-"""What test engineers call a stop: decelerations, distances, adhesion utilisation, split friction, turns.
+"""Figures that test engineers state of a stop: decelerations, distances, adhesion utilisation, split friction, turns.
 
 Formulas of UN Regulation 13, of ISO 21994, 16552 and 14794 as they are commonly quoted: not checked against the text of
 the regulation or standard. Speeds in m/s, times in s, distances in m, forces in N; z is a deceleration by g.

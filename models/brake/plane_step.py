@@ -197,7 +197,7 @@ def stage(motion, before, after, step, most, vehicle, frame):
 
 @lean
 def by_means(motion, before, after, step, vehicle, frame):
-    """As ``stage``, where loads jump between two answers and have one only as a mean of them.
+    """Accelerations as from ``stage``, where wheel loads jump between two answers and have one only as a mean of them.
 
     So it is of a slow wheel at the edge of locking: a little less load, and it locks at once; a little more, and it
     rolls within a fraction of the step. Each round moves the accelerations by a share of their change, and the means of

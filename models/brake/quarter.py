@@ -50,7 +50,8 @@ class Quarter(Strict):
 
     @property
     def plane(self) -> Plane:
-        """As compiled functions take it: unit and group are the only ones, the wheel is at the centre."""
+        """The vehicle of this wheel as compiled functions take it: unit and group are the only ones, the wheel is at
+        the centre."""
         none, unit = np.zeros(1, dtype=np.int64), np.ones(1)
         return Plane(
             self.mass * unit,

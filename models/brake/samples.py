@@ -63,8 +63,8 @@ def parts(rows: list[np.ndarray], like: Row) -> Row:
 
 
 class Told(NamedTuple):
-    """What holds for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,) in bar,
-    of which the first is not a number where valves hold, and steer angles (W,) in rad."""
+    """Commands that hold for the next samples, whose number is samples (1,): states of the valves (W,), pressures (W,)
+    in bar, of which the first is not a number where valves hold, and steer angles (W,) in rad."""
 
     samples: np.ndarray
     valves: np.ndarray
@@ -73,8 +73,9 @@ class Told(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What is recorded: now (k,), the moment as numbers of which the first is the time (s); rows (m, k), such moments,
-    of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or after."""
+    """Record of the samples: now (k,), the present state as numbers of which the first is the time (s); rows (m, k),
+    such moments, of which the first ``left`` (1,) have not been taken; until (s): the last sample ends then or
+    after."""
 
     now: np.ndarray
     rows: np.ndarray

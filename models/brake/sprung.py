@@ -37,7 +37,7 @@ class Sprung:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates of the vehicle on its suspension."""
         return len(self.handling.vehicle.coordinates())
 
     @property

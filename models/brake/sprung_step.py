@@ -54,8 +54,8 @@ HELD = 4
 
 
 class Held(NamedTuple):
-    """What the wheels hold over a step, each (W,): steer angle (rad), mean forces on the tyre along and across it (N),
-    and the mean moment that speeds up the wheel's turning (N m)."""
+    """Wheel quantities that are constant over a step, each (W,): steer angle (rad), mean forces on the tyre along and
+    across it (N), and the mean moment that speeds up the wheel's turning (N m)."""
 
     steer: np.ndarray
     force_x: np.ndarray
@@ -73,7 +73,8 @@ class Contacts(NamedTuple):
 
 
 class AtWheels(NamedTuple):
-    """What is at the wheels: what they hold, what is known of them, and what they are on.
+    """Data at the wheels: quantities that are constant over a step, the state of each wheel, and the surfaces under
+    them.
 
     The wheels' rates are the changes of the speeds along them, kept from step to step.
     """
@@ -85,7 +86,7 @@ class AtWheels(NamedTuple):
 
 @lean
 def held_of(numbers):
-    """What the wheels hold by the end of a table of numbers."""
+    """Views of the constant wheel quantities, which are the last numbers of a table for compiled forces."""
     wheels = int(numbers[TYRES])
     rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
     return Held(rows[0], rows[1], rows[2], rows[3])
@@ -170,7 +171,7 @@ UPRIGHT = 0.5
 
 
 class OnEngine(NamedTuple):
-    """What steps need besides what those in the plane need.
+    """Data that a step of a vehicle on its suspension needs beside those of a step in the plane.
 
     numbers : the table, at whose end is what the wheels hold; contacts : of the state whose ``forces`` (n,) were taken;
     middle (2, n) : state in the middle of a step; rates (n,) : accelerations; liveliness : see ``OnSprings``; engine :
@@ -205,7 +206,8 @@ def march(engine: Any, q: np.ndarray, v: np.ndarray) -> bool:
 
 
 def advance(motion, torques, step, steer, vehicle, course):
-    """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+    """Advance the vehicle on its suspension as ``models.brake.advance.advance`` does in the plane, the state (2, n)
+    having all coordinates and their rates.
 
     A run begins with accelerations of zero. The engine's step is ``step``. At its start the speeds along the wheels are
     taken to change as they did in the last one.

@@ -42,8 +42,8 @@ class OnRoad(NamedTuple):
 
 
 class Surfaces(NamedTuple):
-    """What each wheel is on, each (W,): its two tables and the share of the second; lag: tan of a slip angle that lags
-    behind the motion of the wheel, not a number where none does."""
+    """Surfaces under the wheels, each (W,): two tyre tables and the share of the second; lag: tan of a slip angle that
+    lags behind the motion of the wheel, not a number where none does."""
 
     first: np.ndarray
     second: np.ndarray
@@ -58,7 +58,7 @@ def surfaces(wheels: int) -> Surfaces:
 
 @inlined
 def surfaces_of(rows):
-    """The same in rows (4, W) of a compiled function, and never of Python, which would let go of them twice."""
+    """``Surfaces`` as views of rows (4, W); for compiled functions only, as Python would free the rows twice."""
     rows[3, :] = math.nan
     return Surfaces(rows[0], rows[1], rows[2], rows[3])
 

@@ -52,7 +52,7 @@ class Grip(NamedTuple):
 
 
 class StepInput(NamedTuple):
-    """What is done to a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
+    """Drive of a wheel over a step (s): speed of its centre along it (m/s) and torque of its brake (N m, from 0
     on), both at the step's two ends and linear in time between."""
 
     speed0: float
@@ -160,7 +160,7 @@ def _way(decay, rate, way):
 
 @lean
 def wheel_step(given, wheel, grip):
-    """What becomes of a ``Wheel`` by a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
+    """Step a ``Wheel`` through a ``StepInput``, whose speeds count from 0 on, on a ``Grip``; a ``Rolled``."""
     torque0, torque1, step = given.torque0, given.torque1, given.step
     radius, inertia, w0 = wheel.radius, wheel.inertia, wheel.turning
     u0, u1 = max(given.speed0, SLOWEST), max(given.speed1, 0.0)

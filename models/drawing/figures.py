@@ -133,7 +133,7 @@ def legend_below(figure: Figure, *axes: Axes, columns: int = 4) -> None:
 
 
 def _lines_of_legends(figure: Figure) -> int:
-    """How many lines of a remark the legends take that lie below a figure's axes."""
+    """Number of lines that the legends below a figure's axes take, in units of a remark's line."""
     if figure.legends:
         figure.draw_without_rendering()
     tops = [legend.get_window_extent().y1 for legend in figure.legends]
@@ -204,7 +204,7 @@ class PlainLogScale(LogScale):
         super().__init__(**options)
 
     def set_default_locators_and_formatters(self, axis: Any) -> None:
-        """As matplotlib asks of a scale; called for every axis that takes it."""
+        """Set the axis' tick marks and labels, as matplotlib asks of a scale; called for every axis that takes it."""
         super().set_default_locators_and_formatters(axis)
         if self.base == 10:
             axis.set_major_formatter(_Powers())

@@ -26,8 +26,9 @@ HEADER, HELD = 2, 6
 
 
 class Held(NamedTuple):
-    """What the wheels hold over a step, each (W,): unit, place (m) in its axes and steer angle (rad) of the wheel, and
-    the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the units."""
+    """Wheel quantities that are constant over a step, each (W,): unit, place (m) in its axes and steer angle (rad)
+    of the wheel, and the mean forces on it in its own axes (N). The rows of a table's end, behind the reach of the
+    units."""
 
     unit: np.ndarray
     x: np.ndarray
@@ -105,8 +106,8 @@ class Carried:
     def advance(
         self, motion: Motion, torques: np.ndarray, step: float, steer: np.ndarray, vehicle: OnRoad, *lag: Any
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, or ``advance_lagging`` with its ``Lag``, a step at a time, each moved by
-        the engine."""
+        """Advance a braked vehicle as ``models.brake.advance.advance`` (with a ``Lag``, ``advance_lagging``) does, each
+        step moved by the engine."""
         time, report, go = 0.0, Report(*motion.report), advance
         if lag:
             from models.brake.relaxation import advance_lagging as go
@@ -122,7 +123,7 @@ class Carried:
         return FINE, time
 
     def moving(self, *given: Any) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``."""
+        """March a braked vehicle as ``models.brake.samples.samples`` does, each step moved by the engine."""
         return moved(self.advance)(*given)
 
     def _moved(self, before: np.ndarray, step: float) -> np.ndarray:

@@ -91,7 +91,7 @@ class OnSprings:
 
     @cached_property
     def _own(self) -> OnEngine:
-        """What steps need, of tyres that answer at once."""
+        """Data that steps need with tyres that answer at once."""
         engine, size, table = self._model.compiled(), self.size, self._model.numbers
         return OnEngine(
             table,
@@ -118,7 +118,8 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "ContactLag | None" = None,
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+        """Advance the vehicle as ``models.brake.advance.advance`` does, the state (2, n) having all coordinates and
+        their rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
@@ -138,8 +139,8 @@ class OnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
-        RunFailed as ``advance``."""
+        """March the vehicle as ``models.brake.samples.samples`` does, lag being of tyres that lag; Refused for a step
+        that is too long, RunFailed as ``advance``."""
         _, by_steps = self._go(lag is not None)
         step, on_engine = sample / (braking.torques.shape[0] - 1), self._own
         self.check_step(step)

@@ -48,7 +48,8 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "Lagging | None" = None,
     ) -> tuple[int, float]:
-        """As ``models.brake.advance.advance``, the state (2, n) having all coordinates and their rates.
+        """Advance the vehicle in plain code as ``models.brake.advance.advance`` does, the state (2, n) having all
+        coordinates and their rates.
 
         lag : of tyres that lag, moved in place. A run begins with accelerations of zero. Raises RunFailed where the
         vehicle turns over.
@@ -67,7 +68,7 @@ class PlainOnSprings:
         return FINE, time
 
     def _moving(self, motion: Motion, lag: "Lagging | None") -> Moving:
-        """The same arrays as plain code reads them: a row of the report for each wheel."""
+        """The compiled motion's arrays as plain code reads them: a row of the report for each wheel."""
         return Moving(motion.state, motion.turning, self._changes, motion.report.T, motion.accelerations[:3], lag)
 
     def moving(
@@ -80,8 +81,8 @@ class PlainOnSprings:
         vehicle: OnRoad,
         lag: "Lag | None" = None,
     ) -> Iterator[tuple[int, float, float, float]]:
-        """As ``models.brake.samples.samples``, lag being of tyres that lag; Refused for a step that is too long,
-        RunFailed as ``advance``."""
+        """March the vehicle in plain code as ``models.brake.samples.samples`` does, lag being of tyres that lag;
+        Refused for a step that is too long, RunFailed as ``advance``."""
         torques, time, status, lagging = braking.torques, 0.0, FINE, None
         if lag is not None:
             from models.brake.plain.relaxation import Lagging

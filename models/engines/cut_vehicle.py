@@ -169,7 +169,8 @@ class NativeShare:
 
 
 def native_share(engine: str, vehicle: CutVehicle) -> NativeShare:
-    """What "exudyn" or "mujoco" has as its own of a vehicle, counted in a model that is built without a callback."""
+    """Parts of a vehicle that "exudyn" or "mujoco" computes by native elements, counted in a model that is built
+    without a callback."""
     division = divide(vehicle, engine)
     driven = Driven(vehicle.tree, np.zeros(3), np.zeros(1), None, None, division.native)
     elements, joints = built_share(engine, driven)

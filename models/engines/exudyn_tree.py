@@ -74,7 +74,7 @@ class Build:
         return lambda: read(node, kind)[index]
 
     def size(self, node: Any) -> int:
-        """How many coordinates a node has."""
+        """Number of coordinates of a node."""
         return sum(node == each for each, _ in self.places.values())
 
     def own(self, body: str | None, vector: np.ndarray) -> np.ndarray:

@@ -94,7 +94,7 @@ def _suspension(spec: mujoco.MjSpec, vehicle: Vehicle, strut: Strut, joints: set
 
 @dataclass
 class Drive:
-    """How the input enters: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
+    """How a model's input acts: a table (rows, columns) of generalised forces per half step, controls (n, 2), arms.
 
     Where tyres only push, the table has the road, heights and rates, and ``tyres`` stiffness and damping of each.
     """
@@ -152,7 +152,8 @@ def _generalised(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
 
 
 def _guidance(assembly: Assembly, inputs: np.ndarray) -> np.ndarray:
-    """What prescribed coordinates add to the strut forces on the free heave coordinates, shape (rows, 2 or 3)."""
+    """Generalised forces that prescribed coordinates add to those of the struts on the free heave coordinates, shape
+    (rows, 2 or 3)."""
     count = len(assembly.guided)
     path, rate = (inputs[:, 2 + i * count : 2 + (i + 1) * count] for i in range(2))
     z, pitch, dz, turn = (

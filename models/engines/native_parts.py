@@ -1,4 +1,4 @@
-"""What an engine makes of the springs, mounts and bars of a cut vehicle: its own elements, and what is left of them.
+"""Split of a cut vehicle's springs, mounts and bars into an engine's native elements and the forces left to a callback.
 
 A travel d that is a sum of coordinates is one for every engine. So is d = a . (p2 - p1), where the axis a is fixed in
 the body of one end and that body carries the other end. What an engine lacks stays in the compiled forces that act for
@@ -104,7 +104,8 @@ def divide(vehicle: CutVehicle, engine: str) -> Division:
 
 
 def _divided(element: Element, engine: str) -> tuple[Element | None, Element | None, list[str]]:
-    """What the engine's element has, what is left, and why; a preload goes with what bears it."""
+    """The native part of an element, the part left to a callback, and the reasons; a preload goes with the part that
+    bears it."""
     curved, rough = bool(element.travel_force or element.rate_force), element.friction != 0.0
     left, why = replace(element, stiffness=0.0, damping=0.0, held=0.0), list[str]()
     if curved and engine not in CURVES:

@@ -104,7 +104,8 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
 
 
 def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
-    """What foreign code answers; RunFailed if it raises anything but the project's own errors."""
+    """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
+    errors."""
     try:
         return function(*arguments)
     except (InputError, RunFailed):
@@ -180,7 +181,7 @@ class Guarded:
     settings: Settings
 
     def run(self) -> Trajectory:
-        """What the engine's own run gives, checked."""
+        """The trajectory of the outside engine's run, checked."""
         answer = _asked(self.name, "run", self.model.run)
         if not (hasattr(answer, "times") and hasattr(answer, "states")):
             raise RunFailed(self.name, f"run gave {type(answer).__name__}, which has no times and states")
@@ -199,7 +200,7 @@ class Guarded:
         return _numbers(self.name, "acceleration", answer, (4,))
 
     def plan(self) -> dict[str, int]:
-        """What was built, as far as the engine says."""
+        """Counts of what an outside engine built, as far as it states them."""
         blank = {"degrees of freedom": 4 - len(self.assembly.guided), "native items": 0, "callbacks": 0}
         return blank | dict(getattr(self.model, "plan", dict)())
 

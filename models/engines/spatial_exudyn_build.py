@@ -30,7 +30,7 @@ from models.vehicles.spatial_linear import preloads
 
 @dataclass
 class RoadForces:
-    """What callbacks hand over: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
+    """Road forces for callbacks: lists of forces at every half step, ``by_road`` (2 w, k) of heights and rates."""
 
     by_road: np.ndarray
     rows: list[list[float]]

@@ -62,7 +62,7 @@ class Parts(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What MuJoCo knows of the state, pointers to its doubles: coordinates and rates of the joints; of each body its
+    """MuJoCo's kinematic state as pointers to its doubles: coordinates and rates of the joints; of each body its
     centre and rotation (rows); of each joint its anchor and axis in space."""
 
     positions: Any
@@ -179,7 +179,7 @@ def _on_curve(pairs, size, argument):
 
 @register_jitable
 def _more(law, travel, rate, q):
-    """What of a force is no line."""
+    """The nonlinear rest of a force law: its value less that of the law's straight line."""
     force = 0.0
     if law[FRICTION] != 0.0:
         force += law[FRICTION] * np.tanh(rate / law[FRICTION_RATE])
@@ -312,7 +312,7 @@ def _scaled(axis: Vector, factor: float) -> Vector:
 def packed(
     vehicle: SpatialVehicle, acting: list[Element], model: mujoco.MjModel, numbers: Numbers
 ) -> tuple[tuple[int, int, int], list[float]]:
-    """How many bodies, elements and points there are, and all numbers that the callback reads of them."""
+    """Counts of bodies, elements and points, and all their numbers for the callback."""
     carrying = {name for body in vehicle.bodies if vehicle.turns(body.name) for name in vehicle.chain(body.name)}
     moving = [body.name for body in vehicle.bodies if body.name in carrying]
     bodies, points = list[list[float]](), list[list[float]]()
@@ -366,7 +366,7 @@ def _element(element: Element, vehicle: SpatialVehicle, numbers: Numbers) -> lis
 
 
 def _rest_of_law(element: Element, numbers: Numbers) -> list[float]:
-    """What of a law is no line; nothing where there is nothing."""
+    """Numbers of the nonlinear rest of an element's law; none where the law is a straight line."""
     steered = [value for place, gain in element.steered for value in (numbers.joints.get(place, -1), gain)]
     curves = [element.on_travel, element.on_rate]
     if not (element.friction[0] or steered or any(curves)):

@@ -111,7 +111,7 @@ def _read_note(file: Path) -> dict[str, Any]:
 
 
 def fingerprint(facts: dict[str, Any]) -> dict[str, Any]:
-    """What names a job: its facts as dotted keys, arrays by their checksum, the code and the packages.
+    """The facts that identify a job: its settings as dotted keys, arrays by their checksum, the code and the packages.
 
     Bits depend on all of these (and on the processor's own rounding of sines, which is left out).
     """

@@ -82,8 +82,8 @@ class JointMotion(NamedTuple):
 
 
 class ForceReport(NamedTuple):
-    """What ``forces`` tells of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the declared
-    frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
+    """Forces that ``forces`` reports of a state: forces of the elements (e,), N or N m; wrenches (hubs, WRENCH) in the
+    declared frame; moments (2,) of the stabiliser on roll and pitch (N m)."""
 
     elements: np.ndarray
     wrenches: np.ndarray

@@ -1,4 +1,4 @@
-"""What is felt inside a cut vehicle along a run, compiled: springs, guides of bodies, hubs, points.
+"""Section forces and motion inside a cut vehicle along a run, compiled: springs, guides of bodies, hubs, points.
 
 A row of answers, in this order: force and travel of every element; position, heading, pitch, roll of the chassis and
 its angular velocity in its own axes; the stabiliser's moments; force and moment that each guide exerts on its body;

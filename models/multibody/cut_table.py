@@ -14,7 +14,7 @@ from models.vehicles.spatial import Vector
 
 @dataclass(frozen=True)
 class Drive:
-    """What drives and steadies a cut vehicle, at half steps: rows i at the time i step / 2.
+    """Drive of a cut vehicle and its stabiliser, at half steps: rows i at the time i step / 2.
 
     hubs : (m, 6 h), force (N) and moment (N m) of each hub in ``frame``, "hub", "body" or "inertial"; or, on a road,
         (m, 2 h), heights (m) under the hubs, then their rates (m/s), for a vehicle that travels at ``speed`` (m/s)

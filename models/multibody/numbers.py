@@ -21,7 +21,7 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Tyres:
-    """What the tyres and wheels have beside the vehicle file's stiffness, damping and cornering stiffness.
+    """Parameters of tyres and wheels beside the vehicle file's stiffness, damping and cornering stiffness.
 
     friction : mu; half_width : of the patch (m); inclination : of the wheels of the left side about their forward
     axis (rad), the right side's mirrored; cells : of the patch's net per strip; spin_inertia : of a wheel about its
@@ -103,7 +103,7 @@ class Handling:
         return self.numbers[first : first + at.PER_TYRE]
 
     def changed(self, **changes: object) -> "Handling":
-        """The same with other fields."""
+        """A copy of the car with other values in some fields."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def straight(self, speed: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ SLOW = 0.2
 
 
 def free(wheelset: Wheelset) -> Wheelset:
-    """The same wheelset without suspension."""
+    """A copy of the wheelset without suspension."""
     return wheelset.changed(**{f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"})
 
 

@@ -81,8 +81,8 @@ BLEND, ORDER = KINDS["blended"], MARCHES["second-order"]
 
 
 class Rails(NamedTuple):
-    """What wheels roll on, and by which law: WHEELS (1,); profiles, without a node for cones; tables of FASTSIM's net
-    (``Grid``); law : LINEAR or FASTSIM."""
+    """The rails under the wheels and their law of creep forces: WHEELS (1,); profiles, without a node for cones; tables
+    of FASTSIM's net (``Grid``); law : LINEAR or FASTSIM."""
 
     wheels: Array
     profile: LaidProfile

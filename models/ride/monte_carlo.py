@@ -53,7 +53,8 @@ class Estimate:
     copies: int
 
     def z(self, deviation: np.ndarray) -> np.ndarray:
-        """How many standard errors (N, p) the estimate lies above the variance of these standard deviations (N, p)."""
+        """Standard scores (N, p) of the estimate: its distance, in standard errors, above the variance of these
+        standard deviations (N, p)."""
         known = np.isfinite(self.variance)
         off = np.subtract(self.variance, deviation**2, out=np.zeros_like(self.variance), where=known)
         return np.divide(off, self.error, out=np.full_like(off, np.nan), where=known)

@@ -179,7 +179,7 @@ class _Search:
         return linearise(vehicle, self.speed, named)
 
     def _moved(self, gains: np.ndarray, position: np.ndarray) -> tuple[_Moments, np.ndarray]:
-        """How the springs of the replaced vehicle move, and its mean position (n,)."""
+        """Moments of the springs' motion in the linearised vehicle, and its mean position (n,)."""
         linear = self._replaced(gains, self.watched)
         deviation = stationary(excited(linear, self.excitation, self.speed)).deviation[len(self.vehicle.outputs) :]
         if not np.isfinite(deviation).all():
@@ -288,7 +288,7 @@ def _largest(wanted: np.ndarray, gains: np.ndarray) -> float:
 
 
 def _sentence(name: str, share: float, status: str) -> str:
-    """What the left-out share says of an output's standard deviation."""
+    """Sentence on how far the left-out share may change an output's standard deviation."""
     if status != "finite":
         return f"{name}: {status}, so that there is no deviation to judge"
     said = f"{name}: forces that the replaced springs leave out would add {100 * share:.2g} % to its variance: "

@@ -177,7 +177,7 @@ class _Met:
         self.made, self.block = np.zeros((0, 0, 0)), -1
 
     def within(self, step: int) -> slice:
-        """Which of the times lie in a step."""
+        """The slice of the times that lie in a step."""
         return slice(self.first[step], self.first[step + 1])
 
     def of(self, step: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a table of friction takes for granted where it is read."""
+"""Assumptions of a table of friction where its values are read."""
 
 import numpy as np
 

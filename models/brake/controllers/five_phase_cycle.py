@@ -80,7 +80,7 @@ class Frozen:
 
     @cached_property
     def driven(self) -> Driven:
-        """As compiled functions take it."""
+        """The frozen vehicle as compiled functions take it."""
         tables, (j, q) = stacked([self.tyre]), place(self.tyre.loads, self.load)
         grip = Grip(0, 0, 0.0, Cells(0, 0.0, int(j), float(q)), float(self.load), tables.slips, tables.mu_x)
         return Driven(float(self.speed), float(self.radius), float(self.inertia), of_wheels(self.brake), grip)

@@ -1,4 +1,5 @@
-"""What all controllers share: a logic per wheel or axle, the vehicle's speed, and an end of control when it is slow."""
+"""The part that all controllers of wheel slip share: a logic per wheel or axle, the vehicle's speed, and an end of
+control when it is slow."""
 
 import math
 from collections.abc import Callable, Sequence

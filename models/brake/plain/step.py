@@ -28,8 +28,8 @@ BLINK = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What a vehicle runs on: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below which
-    slip angles are those at it."""
+    """Course of a vehicle over a step: its wheels, tyres and road, steer angles (W,) in rad, and the speed (m/s) below
+    which slip angles are those at it."""
 
     on: OnRoad
     steer: np.ndarray

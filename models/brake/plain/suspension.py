@@ -38,8 +38,8 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What stays over a step, of each wheel: steer angles (rad), mean forces (W, 2) on the tyres along and across (N),
-    and the mean moments (N m) that speed up their turning."""
+    """Wheel quantities that are constant over a step: steer angles (rad), mean forces (W, 2) on the tyres along and
+    across (N), and the mean moments (N m) that speed up their turning."""
 
     steer: np.ndarray
     forces: np.ndarray
@@ -67,7 +67,7 @@ class Suspension:
 
     @property
     def size(self) -> int:
-        """How many coordinates there are."""
+        """Number of coordinates of the suspended vehicle."""
         return self.bodies.size
 
     def contacts(self, motion: Motion, steer: np.ndarray) -> list[Contact]:

@@ -37,7 +37,7 @@ class Force:
 
 @dataclass(frozen=True)
 class WheelStep:
-    """What moves a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
+    """Drive of a wheel over a step: speeds of its centre (m/s, both from 0 on) and torques of its brake (N m, from 0
     on, linear in time) at both ends, step (s), radius (m), inertia (kg m^2)."""
 
     speeds: tuple[float, float]
@@ -72,7 +72,7 @@ class WheelStep:
 
 @dataclass
 class Progress:
-    """How far a wheel has come within its step: time (s), slip, impulse of the road on the vehicle (N s), integral of
+    """Progress of a wheel within a time step: time (s), slip, impulse of the road on the vehicle (N s), integral of
     the slip (s), time locked (s), and whether it has just been freed."""
 
     time: float

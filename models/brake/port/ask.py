@@ -82,14 +82,15 @@ class Asked:
     states: frozenset[int] = STATES
 
     def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
+        """The controller's commands for a sample; raises ControllerFailed."""
         return ask(self.inner, given, self.states, given.supply)
 
 
 def checked(
     command: Command, given: Sample, states: frozenset[int] = STATES, most: float = LARGEST_PRESSURE
 ) -> Command:
-    """The same answer if each wheel has one state of its valve or one pressure; raises ControllerFailed."""
+    """The controller's answer, returned if each wheel has one state of its valve or one pressure; raises
+    ControllerFailed."""
     if not isinstance(command, Command) or (command.valves is None) == (command.pressures is None):
         raise ControllerFailed(given, "wrong frame", "needs either valves or pressures")
     valves = command.valves

@@ -59,7 +59,7 @@ class Faulty:
         self._past = deque(maxlen=1 + max((fault.samples or 0 for fault in self.faults), default=0))
 
     def sample(self, given: Sample) -> Command:
-        """Its answer to signals with faults, with faults."""
+        """The controller's commands for signals with faults, themselves with faults."""
         time = 1e-9 * given.time
         here = [fault for fault in self.faults if fault.holds(time)]
         command = self.inner.sample(given._replace(wheels=self._signals(given.wheels, here)))

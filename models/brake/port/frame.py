@@ -73,7 +73,7 @@ def answer(number: int, command: Command) -> bytes:
 
 
 def command(frame: bytes, number: int) -> Command:
-    """What an answer to the sample of this number commands; raises WrongFrame."""
+    """The commands in an answer frame to the sample of this number; raises WrongFrame."""
     magic, answered, mode, wheels, *values = ANSWER.unpack(frame)
     if magic != b"TRA1" or mode not in b"VP":
         raise WrongFrame("wrong frame", f"begins with {magic!r}, mode {mode}, not with b'TRA1' and 'V' or 'P'")

@@ -30,7 +30,7 @@ STARTUP = 30.0
 
 
 class Failed(Exception):
-    """What the process told; what : its table."""
+    """Failure that the controller's process reported; what : its table."""
 
     def __init__(self, what: dict[str, Any]) -> None:
         self.what = what
@@ -59,7 +59,7 @@ class Hosted:
             raise RunFailed("controller", f"crash: it ended as it was made{fate(self.process, self.timeout)}") from None
 
     def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
+        """The commands of a controller in another process for a sample; raises ControllerFailed."""
         try:
             return command(self._got(question(given), ANSWER.size, b"", self.timeout), given.number)
         except WrongFrame as error:
@@ -74,7 +74,8 @@ class Hosted:
             raise ControllerFailed(given, "crash", lost) from None
 
     def _got(self, said: bytes, size: int, begins: bytes, seconds: float) -> bytes:
-        """What comes back within so many seconds; raises Failed, TimeoutError, OSError, EOFError."""
+        """The bytes that the process sends back within so many seconds; raises Failed, TimeoutError, OSError,
+        EOFError."""
         end = time.perf_counter() + seconds
         self.link.settimeout(seconds)
         self.link.sendall(said)

@@ -32,7 +32,7 @@ class Logged:
     file: BinaryIO
 
     def sample(self, given: Sample) -> Command:
-        """Its answer, written down."""
+        """The controller's commands for a sample, which are also written to the log."""
         asked = question(given)  # before a controller can write into what it is given
         said = self.inner.sample(given)
         self.file.write(asked + answer(given.number, said))

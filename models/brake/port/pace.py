@@ -21,7 +21,7 @@ class WallClock:
     _start: float | None = None
 
     def sample(self, given: Sample) -> Command:
-        """Its answer, asked for no sooner than at its time."""
+        """The controller's commands for a sample, asked for no sooner than at the sample's time on the wall clock."""
         now = time.perf_counter()
         if self._start is None:
             self._start = now - 1e-9 * given.time

@@ -37,7 +37,7 @@ class SocketPort:
     process: subprocess.Popen[bytes] | None = None
 
     def sample(self, given: Sample) -> Command:
-        """Its answer; raises ControllerFailed."""
+        """The commands of a controller behind a socket for a sample; raises ControllerFailed."""
         end = time.perf_counter() + self.timeout
         try:
             self.link.settimeout(self.timeout)
@@ -75,7 +75,7 @@ class SocketPort:
 
 
 def fate(process: subprocess.Popen[bytes] | None, patience: float) -> str:
-    """How a process ended whose connection is closed, "" if it did not within some seconds."""
+    """How a process with a closed connection ended, as a phrase; "" if it did not end within some seconds."""
     if process is None:
         return ""
     with suppress(subprocess.TimeoutExpired):

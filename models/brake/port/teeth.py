@@ -66,7 +66,7 @@ class Counted:
 
 
 class _Wheel:
-    """What its electronics and its angle remember: in teeth since the start, s, m/s."""
+    """State of a toothed wheel's sensor: in teeth since the start, s, m/s."""
 
     def __init__(self, speed: float) -> None:
         self.turned, self.speed, self.shown = 0.5, speed, speed

@@ -98,7 +98,7 @@ class Bodies:
         return arm
 
     def index(self, body: str, freedom: str) -> int:
-        """Which coordinate it is; -1 if the body does not have it."""
+        """Index of a body's coordinate; -1 if the body does not have it."""
         place = (body, freedom)
         return self.places.index(place) if place in self.places else -1
 

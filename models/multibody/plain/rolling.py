@@ -172,7 +172,7 @@ class PlainRolling:
         return force, report, ledger
 
     def _touch(self, motion: Motion, points: np.ndarray, steer: np.ndarray) -> Contact:
-        """How tyres press, and where they touch; steer (w,), rad."""
+        """Loads of the tyres on the road and their contact points; steer (w,), rad."""
         place, speed = points[:, PLACE], points[:, RATE]
         height, slope_x, slope_y = surface(self.handling.waves, place[:, 0], place[:, 1])
         upwards = np.column_stack([-slope_x, -slope_y, np.ones(len(height))])

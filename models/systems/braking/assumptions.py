@@ -1,4 +1,4 @@
-"""What a braked vehicle on its road takes for granted.
+"""Assumptions of a braked vehicle on its road.
 
 Limits without a source are chosen: where what is left out would change a stopping distance by some per cent.
 """
@@ -48,7 +48,7 @@ CORNERING = 1e-3
 
 
 def assumptions(scene: BrakingScene, procedure: str, vehicle: Braked) -> list[Assumption]:
-    """What a procedure takes for granted, of the vehicle that is ready for it."""
+    """Assumptions of a braking procedure, with the vehicle that drives it."""
     parts = (_of_loads(scene), _of_bodies(scene, vehicle), _of_tyres(scene, vehicle), _of_brakes(scene, procedure))
     return [*chain.from_iterable(parts), *_of_drive(scene, vehicle)]
 

@@ -1,4 +1,4 @@
-"""How far its steps leave a stop from that of steps without length, where that can be told.
+"""Errors that the step length leaves in a stop's results, where they can be told.
 
 The sample of the controller belongs to the scene: only the steps within it become fewer. While two runs switch alike,
 the error falls with the step (Richardson). A controller of valves may switch at other samples in other steps; from
@@ -192,7 +192,7 @@ def _at(times: np.ndarray, path: Path, values: np.ndarray) -> np.ndarray:
 
 
 def _size(name: str, values: np.ndarray, part: float = 1.0) -> float:
-    """What errors are shares of; what a part of a run moves by is small in proportion."""
+    """Size of a channel that its error is stated as a share of; over a part of a run in proportion to that part."""
     return max(size_of(values), part * LEAST.get(name, 0.0))
 
 

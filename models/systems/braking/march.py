@@ -26,7 +26,7 @@ MOST = 1024
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """What a run recorded at every sample, the start included.
+    """Record of a braking run at every sample, the start included.
 
     times (n,) : s; states (n, 2, 2 + U) : positions and rates; turning, pressures, torques (n, W) : rad/s, bar, N m;
     reports : of the last step of every sample, each (n - 1, W); stands : whether it ended at rest;
@@ -46,7 +46,8 @@ class Path:
 
 
 class Start(NamedTuple):
-    """What a run goes on from: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in rad/s."""
+    """State from which a run continues: positions and rates (2, 2 + U), and speeds of the wheels' turning (W,) in
+    rad/s."""
 
     state: np.ndarray
     turning: np.ndarray
@@ -167,7 +168,7 @@ def on_tyres(
 
 
 def _tell(told: Told, command: Command, braked: bool) -> None:
-    """What a command means for the next sample."""
+    """Write a command into the arrays for the next sample."""
     if command.pressures is not None:
         told.pressures[:] = command.pressures
     else:

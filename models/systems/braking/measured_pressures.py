@@ -74,7 +74,8 @@ def read_pressures(path: str | Path, wheels: int, period: float = SAMPLE) -> Mea
 
 
 def write_pressures(path: str | Path, times: np.ndarray, pressures: np.ndarray, rims: np.ndarray) -> None:
-    """What ``read_pressures`` reads, of a run: times (n,) in s, pressures and speeds of rims (n, W) in bar, m/s."""
+    """Write a run's pressures to a file for ``read_pressures``: times (n,) in s, pressures and speeds of rims (n, W) in
+    bar, m/s."""
     names, later = wheel_names(pressures.shape[1]), np.diff(times, prepend=-1.0) > 0.0
     columns = {"time": ("s", times[later])}
     for head, unit, values in (("pressure", "bar", pressures), ("speed", "m/s", rims)):

@@ -1,4 +1,4 @@
-"""What the equations of a steered car take for granted."""
+"""Assumptions of the equations of a steered car."""
 
 from functools import partial
 
@@ -27,7 +27,7 @@ LARGEST_STEER = 0.7
 
 
 def assumptions(handling: Handling) -> list[Assumption]:
-    """What the equations of a manoeuvre take for granted."""
+    """Assumptions of the equations of a manoeuvre."""
     return [
         Assumption(
             "wheel loads",

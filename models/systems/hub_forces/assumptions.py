@@ -1,4 +1,4 @@
-"""What a vehicle on hub forces, and the virtual measurement of these, take for granted."""
+"""Assumptions of a vehicle on hub forces, and of the virtual measurement of these."""
 
 from collections.abc import Callable
 
@@ -33,7 +33,7 @@ vertical speed (m/s) that a rough road may leave between the ends of a run."""
 
 
 def assumptions(scene: HubScene, vehicle: CutVehicle, method: str, angles: Angles | None = None) -> list[Assumption]:
-    """What a run takes for granted that is held by a method, or goes over the road (ON_TYRES).
+    """Assumptions of a run that is held by a method, or goes over the road (ON_TYRES).
 
     angles : as measured, beside which a run is judged; None to list only.
     """

@@ -26,7 +26,7 @@ class HubForces:
     frame: str
 
     def drive(self, step: float, steps: int, interpolation: Interpolation = "linear") -> Drive:
-        """What drives the cut vehicle at half steps."""
+        """The arrays that drive the cut vehicle at half steps."""
         signal = sampled(self.samples, self.period, interpolation)
         return Drive(signal.sample(0.0, step / 2, 2 * steps + 1), self.frame)
 
@@ -77,7 +77,7 @@ def travels(vehicle: CutVehicle, run: HubRun) -> dict[str, np.ndarray]:
 
 
 def recorded(run: HubRun, frame: str, every: int) -> tuple[HubForces, Angles]:
-    """What is recorded of a run at every so many of its steps, without noise."""
+    """Hub forces and angles of a run at every so many of its steps, without noise."""
     n, period = run.states.shape[1] // 2, float(run.times[1]) * every
     angles = run.states[::every, [ROLL, PITCH, n + ROLL, n + PITCH]]
     wrenches = run.wrenches[::every]

@@ -171,7 +171,7 @@ def build(table: Mapping[str, Any], file: str = "", folder: Path = Path()) -> Hu
 
 
 def _check_file_only(file: str, scene: HubScene) -> None:
-    """What a virtual measurement can choose, and files have as they are."""
+    """Refuse a file together with keys that only a virtual measurement can choose."""
     for table, name in (("forces", "sampling_rate"), ("forces", "noise"), ("angles", "noise")):
         entries = getattr(scene, table)
         if name in entries.model_fields_set:

@@ -1,4 +1,4 @@
-"""What a recording, and a vehicle in space on its forces, take for granted."""
+"""Assumptions of a recording, and of a vehicle in space on its forces."""
 
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ PULL = 0.2
 def assumptions(
     scene: MeasuredScene, vehicle: CutVehicle | None, exam: "Examination | None" = None
 ) -> list[Assumption]:
-    """What the run that is handed on takes for granted; exam : of it, None to list only.
+    """Assumptions of the run whose forces are handed on; exam : of it, None to list only.
 
     Of the pitch plane (vehicle None) its own system says the rest.
     """

@@ -1,4 +1,5 @@
-"""What the findings of a recording do to the section forces: run once as recorded and once with each finding put right.
+"""Changes of the section forces by the faults found in a recording: run once as recorded and once with each finding put
+right.
 
 A finding that names its size says how to put it right: a late channel is shifted, a wrong factor taken out, a spike
 left out. Of a gap nobody knows what was lost: there the deviation that its bridge is known to is planted instead. The

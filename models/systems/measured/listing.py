@@ -1,4 +1,4 @@
-"""What is in a measurement file: its channels, and a scene to begin with, for an engineer to correct.
+"""Listing of a measurement file: its channels, and a draft scene for an engineer to correct.
 
 What a channel probably measures is read from its name and unit, in English and German, as FL_Fx, WFT_RR_MZ, Radkraft
 vorne links, ax_dash or Nickrate are written.

@@ -146,8 +146,8 @@ def scene_of(job: PlaneJob, folder: Path) -> tuple[Scene, tuple[Finding, ...]]:
 
 
 def trusted(scene: Scene, deviation: float) -> Trust | None:
-    """What limits the run of a scene whose forces have noise of this standard deviation (N) already; None where it is
-    held to a measured pitch."""
+    """How long a scene's run can be trusted when its forces have noise of this standard deviation (N); None where the
+    pitch is held to a measured pitch."""
     assembly = assemble(scene)
     bounds = drift_trust.trust(assembly)
     if bounds is None or deviation <= 0:

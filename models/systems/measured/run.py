@@ -59,7 +59,7 @@ NOISE: dict[str, Quantity] = {"force": "force", "moment": "moment", "angle": "an
 
 @dataclass
 class Examination:
-    """What there is of a recording, in the order in which it is made; what was not reached is empty.
+    """Everything made of a recording, in the order of its making; what was not reached is empty.
 
     scene : that reads the files, those of a virtual measurement, too. holds : how each run is held, by its name.
     seconds : of each part. plane : the run of the pitch plane that is handed on. counted : what is handed on.
@@ -88,7 +88,7 @@ class Examination:
 
     @cached_property
     def evidence(self) -> Evidence:
-        """What the checks look at."""
+        """The evidence that the checks look at."""
         stated = {quantity: getattr(self.scene.noise, key) for key, quantity in NOISE.items()}
         claimed = {s.name: stated[s.quantity] for s in self.recording.signals if stated.get(s.quantity) is not None}
         return Evidence(self.recording, self.rig.vehicle, self.scene.places, claimed, self.scene.plane())
@@ -105,7 +105,7 @@ class Examination:
 
     @property
     def outcome(self) -> Outcome | None:
-        """The same; None where none was made."""
+        """The outcome of the run that is handed on; None where no run was made."""
         return self.runs.get(self.chosen)
 
     def put_in(self, signal: Signal) -> bool:
@@ -236,7 +236,7 @@ def read(scene: MeasuredScene, folder: Path, progress: Progress = silent) -> Rec
 
 
 def holds_of(scene: MeasuredScene, recording: Recording) -> dict[str, Hold]:
-    """How each run is held: free, and by the stabiliser that the scene names."""
+    """How roll and pitch are held in each run: free, and by the stabiliser that the scene names."""
     stabilised, deviations = scene.stabilise, noise_of(scene.noise, recording)
     held = {
         stabilised.method: Hold(
@@ -371,7 +371,7 @@ def _judged(exam: Examination) -> None:
 
 
 def _weighed(exam: Examination, work: Path) -> None:
-    """What the findings do to the section forces that are handed on, and the verdicts that follow from it: by the run
+    """Compute the changes of the section forces by each finding, and the verdicts that follow: by the run
     with the stabiliser, or by the free one where that failed."""
     name = exam.chosen if exam.chosen in exam.runs and exam.chosen not in exam.failed else FREE
     if name in exam.runs:

@@ -108,7 +108,8 @@ class Checkpoint:
     of: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> dict[str, np.ndarray] | None:
-        """What was saved, None if nothing; InputError, which names the input that differs, if it is of others."""
+        """The saved arrays, None without a checkpoint; InputError, which names the input that differs, for other
+        inputs' checkpoint."""
         if not self.path.is_file():
             return None
         try:
@@ -196,7 +197,7 @@ class _March:
         self.columns = Columns(folder / "run.f64", tuple(answer.name for answer in job.sections.answers), job.count)
 
     def outcome(self) -> Outcome:
-        """What there is until now."""
+        """The outcome of the march up to now."""
         steps = (self.done - 1) * self.grid.every
         return Outcome(
             self.columns,
@@ -259,7 +260,7 @@ class _March:
         return states
 
     def _drive(self, first: int, steps: int) -> Drive:
-        """What drives the vehicle from a sample on."""
+        """The arrays that drive the vehicle from a sample on."""
         grid, rows = self.grid, 2 * steps + 1
         used = math.floor((rows - 1) * grid.part) + 1
         wrenches = self.inputs.around(first, used + 1)
@@ -298,7 +299,7 @@ class _March:
 
 
 def _inputs_of(job: SectionRun, inputs: Inputs) -> dict[str, str]:
-    """What decides the bits of a run, by names that a user understands."""
+    """Checksums of all inputs that decide a run's values, by names that a user understands."""
     library = {"reference": "numpy"}.get(job.engine, job.engine)
     sources = [checksum(Path(__file__).parents[2] / folder) for folder in ("multibody", "systems/measured", "measured")]
     idle = Drive(np.zeros((1, 6 * len(inputs.hubs))))

@@ -66,7 +66,8 @@ class Point:
 
 @dataclass(frozen=True)
 class Sections:
-    """What is read of a run of a vehicle; answers in the order of their columns, ``columns`` those of the kernel's row.
+    """Section forces and other answers that are read of a vehicle's run; answers in the order of their columns,
+    ``columns`` those of the kernel's row.
 
     frame : axes of guides and hubs, "body" for the chassis', "hub" for those of what they carry.
     """

@@ -32,7 +32,7 @@ POINTS = 2000
 
 @dataclass(frozen=True)
 class Level:
-    """How wrong a measurement is.
+    """Error level of a measurement: deviations of forces and moments, bias, initial tilt and rate.
 
     force, moment : standard deviation of the white noise of each sample, N and N m. bias (6 h,) : N and N m hub by
     hub, None for none. tilt, rate (2,) : error of roll and pitch at the start (rad) and of their rates (rad/s).
@@ -51,7 +51,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Drift:
-    """What the errors of a measurement make of a free run.
+    """Drift of a free run by the errors of its measurement.
 
     means : source -> errors (n, 3) of roll, pitch, heading (rad) at ``times`` (n,) s; deviations (n, 3) : standard
     deviations that noise adds (rad); rates (2,) : growth of roll and pitch, 1/s.

@@ -1,4 +1,4 @@
-"""What a run of a recording is worth: accepted, rejected, or to be stabilised first, with the threshold that says so.
+"""Verdict on a recording's run: accepted, rejected, or to be stabilised first, with the threshold that says so.
 
 A measured channel that was not put in is held beside what the run says of it: error by frequency, damage, trust.
 
@@ -258,7 +258,8 @@ def uncertainty(vehicle: CutVehicle, hold: Hold, period: float) -> float:
 
 
 def errors(run: Outcome, true: VirtualMeasurement, slope: float = SLOPE) -> Errors:
-    """What a run is beside the true one, at the answers' times: section forces of springs, mounts and bars, angles."""
+    """Errors of a run against the true run, at the answers' times: section forces of springs, mounts and bars,
+    angles."""
     every, chassis = round(run.period / true.step), true.vehicle.chassis
     loads, states = true.run.elements[::every][: run.done], true.run.states[::every][: run.done]
     damage, force = dict[str, float](), dict[str, float]()

@@ -68,7 +68,7 @@ class VirtualTable(Strict):
 
 @dataclass(frozen=True)
 class VirtualMeasurement:
-    """What would be recorded if nothing were wrong with any transducer.
+    """Signals that faultless transducers would record.
 
     signals : of the channels; values (n, signals) : SI, ``step`` (s) apart, the steps of the run. run : the true one.
     every : steps of a sampling period. errors : of the steps of the true run, where they were asked for.

@@ -134,7 +134,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the filter, or the smoother, found at times i ``period`` (s), n of them.
+    """Estimates of the pitch filter or smoother at times i ``period`` (s), n of them.
 
     states : (n, 7), see above
     covariances : (n, 7, 7), without what the force sample of that very instant has done already
@@ -268,7 +268,7 @@ def _march(filtered: PitchFilter) -> tuple[Estimate, _Steps]:
 
 
 def _smoothed(filtered: Estimate, steps: _Steps) -> Estimate:
-    """The same by filterpy's Rauch-Tung-Striebel smoother.
+    """The estimate smoothed by filterpy's Rauch-Tung-Striebel smoother.
 
     It knows linear steps alone, x -> F x. An eighth state that is always 1 carries the rest of the nonlinear one.
     """

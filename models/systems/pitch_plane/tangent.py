@@ -36,7 +36,7 @@ or a stiffness that is wrong together with the inertia would leave a moment that
 
 
 class StageForces(NamedTuple):
-    """What pushes the path and its error columns at the start, the middle and the end of each step.
+    """Forces on the path and on its error columns at the start, the middle and the end of each step.
 
     step : s. forces : (rows, 2) in N, of the wheels. errors : (rows, m, 2) in N, their errors by column. to_middle,
     to_end, to_next : rows of ``forces`` from a step's start to its middle, its end and the next step.
@@ -217,7 +217,7 @@ def tilted(assembly: Assembly) -> np.ndarray:
 
 
 def tilt_map(path: Path) -> np.ndarray:
-    """How the tilt and its rate at the end of a path follow from those at its start, shape (2, 2).
+    """Matrix that maps tilt and tilt rate at the start of a path to those at its end, shape (2, 2).
 
     The slow error has no damping, so the determinant of the exact map is 1; how far it is from 1 says how much of the
     fast motion is in the four numbers.

@@ -35,7 +35,7 @@ SMALL = 0.2
 
 
 def small_errors(angle: float) -> Assumption:
-    """That the error up to which a run is trusted is one for which the laws hold."""
+    """Assumption that the pitch error up to which a run is trusted is small enough for the growth laws."""
     says, remedy = "the laws of growth are of small errors", "take a smaller options.angle"
     return Assumption("small errors", says, remedy, partial(_allowed, angle), "rad", most=SMALL)
 
@@ -46,7 +46,7 @@ def _allowed(angle: float, run: Result) -> Watched:
 
 @dataclass(frozen=True)
 class Growth:
-    """What the wheel forces alone say, before any run.
+    """Growth of a pitch error by the wheel forces alone, before any run.
 
     times (n,) in s, those of the samples; rate : mean growth rate, 1/s; until (n,) : the rate in the sinh law at each
     time, 1/s. All rates are 0 where the forces turn with the chassis or the geometry is linear.
@@ -171,7 +171,8 @@ class Trust:
 
 
 def trust(assembly: Assembly, angle: float = ANGLE) -> Trust | None:
-    """What limits a scene's run; None for a run that is guided, held, or on a road, where no error grows."""
+    """How long a scene's run can be trusted, and why; None for a run that is guided, held, or on a road, where no error
+    grows."""
     forces = assembly.input
     try:
         path_of(assembly)
@@ -216,7 +217,7 @@ def _axles(assembly: Assembly) -> "AxleForces":
 
 
 def _unchecked(assembly: Assembly) -> str:
-    """What was not looked at of wheel forces from a file."""
+    """Sentence on the properties of wheel forces from a file that were not checked."""
     from models.measured.axle_forces import unchecked
 
     return unchecked(_axles(assembly)) if "wheel_forces" in assembly.scene.effects else ""

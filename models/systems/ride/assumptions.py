@@ -1,4 +1,4 @@
-"""What a ride takes for granted. Where no values over time are known they are Gaussian, and judged by three deviations.
+"""Assumptions of a ride. Where no values over time are known they are Gaussian, and judged by three deviations.
 
 Linear vehicles have tyres that would pull, springs without stops, angles without an end; spectra of roads are known for
 waves of some lengths; curves are known as far as their tables go.
@@ -37,7 +37,7 @@ UPRIGHT = 0.7
 def assumptions(
     scene: RideScene, vehicle: SpatialVehicle, motion: Motion | None = None, replaced: bool = False
 ) -> list[Assumption]:
-    """What is taken for granted of a vehicle in a scene; ``motion`` of a run, which is judged by it.
+    """Assumptions of a vehicle in a scene of ride; ``motion`` of a run, which is judged by it.
 
     replaced : whether gains stand for bent springs.
     """

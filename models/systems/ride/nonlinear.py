@@ -39,7 +39,7 @@ Progress = Callable[[str, float], None]
 
 
 class Sampling(Strict):
-    """What is run in time, and at which speeds."""
+    """Settings of the runs in time: copies, lengths, steps and speeds."""
 
     beside: list[float] = Field(default_factory=list, description="speeds in m/s for Monte Carlo; the middle if none")
     copies: int = Field(default=200, ge=2, le=100_000, description="of the vehicle, each on a road of its own")
@@ -144,7 +144,7 @@ def _replaced_at(
 def _moved(
     vehicle: SpatialVehicle, road: Excitation, speeds: np.ndarray, replaced: list[StatisticallyLinear]
 ) -> Spectral:
-    """How the parts of replaced vehicles move, springs about means of their own."""
+    """Motions of the parts of statistically linearised vehicles, springs about their own means."""
     known = dict(zip(speeds.tolist(), replaced, strict=True))
     chosen = few(speeds)
     means = {

@@ -1,4 +1,4 @@
-"""What a linear stationary scene holds, and effects that may be left out of it."""
+"""A linear stationary scene without some of its effects, and the effects that may be left out."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -30,7 +30,7 @@ class ReducedScene:
 
     @property
     def limits(self) -> Limits:
-        """What the vehicle has not any more."""
+        """The limits that the reduced vehicle is of: massless, rigid and locked parts."""
         return Limits(self.massless, self.rigid, self.locked)
 
     def less(self, **names: Iterable[object]) -> "ReducedScene":

@@ -1,4 +1,4 @@
-"""What is computed of a scene of a wheelset: paths, its linearisation over the speeds, the branch of limit cycles."""
+"""Runs of a wheelset's scene: paths, its linearisation over the speeds, the branch of limit cycles."""
 
 import math
 import time
@@ -167,7 +167,7 @@ def branch(scene: WheelsetScene, told: Callable[[int], Any] = lambda count: None
 
 
 def _on_half_the_cells(scene: WheelsetScene, orbit: Orbit, unknown: Unknown) -> Orbit | None:
-    """The same cycle on half the cells, in twice the step; None where none is found."""
+    """The limit cycle on half the cells, in twice the step; None where none is found."""
     if scene.contact.cells < FEWEST:
         return None
     coarse = replace(orbit, steps=orbit.steps // 2)

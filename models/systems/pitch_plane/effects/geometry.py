@@ -18,5 +18,5 @@ def leave_out(table: dict[str, Any], scene: Any) -> None:
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
-    """As it is where a scene says nothing."""
+    """Leave the scene as it is: the default geometry needs no edit."""
     table.setdefault("vehicle", {})["geometry"] = "exact"
