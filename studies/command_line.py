@@ -157,7 +157,7 @@ def _say_user_code(scene: Any) -> None:
 
 
 def _search(scene: Any) -> list[str]:
-    """What the search for a choice may take, where a scene asks for one."""
+    """Lines on the number of runs that a search for a choice may take, where a scene asks for a choice."""
     from studies.choice import search
 
     return [] if scene.tolerance is None else [search(scene)]
@@ -418,7 +418,7 @@ def _print(summary: dict[str, Any], doubts: tuple[Finding, ...]) -> None:
 
 
 def study(scene: str) -> None:
-    """What ``python studies/NAME.py`` does: ``twinrig run`` on that study's scene, with the same options."""
+    """Run a study's scene as ``python studies/NAME.py`` does: as ``twinrig run``, with the same options."""
     sys.argv = [sys.argv[0], "run", scene, *sys.argv[1:]]
     main()
 

@@ -272,7 +272,7 @@ def _verdict(quality: Quality) -> str:
 
 
 def _closing(options: Options) -> list[str]:
-    """What the filters take, and what a tilt costs."""
+    """Closing lines: time that the filters take, and the damage error by a tilt."""
     far = float(tilt_displacement(TILT, np.array([10.0]))[0])
     return [
         f"  High-pass: rates and angles {options.turning_cut_off:g} Hz, velocity and position "

@@ -49,7 +49,8 @@ def run(scene: MeasuredScene, engines: tuple[str, ...], folder: Path, progress: 
 
 
 def _failed(exam: Examination) -> dict[str, str]:
-    """What makes the command end with 1: errors in the recording, or a failed run of what was to be handed on."""
+    """Reasons why the command ends with code 1: errors in the recording, or a failed run of what was to be handed
+    on."""
     if exam.stopped:
         count = sum(finding.weight == "error" for finding in exam.findings)
         return {"checks": f"{count} error(s) in the recording: nothing was run"}

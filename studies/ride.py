@@ -166,7 +166,7 @@ def _answer(sweep: Sweep) -> dict[str, Any]:
 def _table(
     scene: RideScene, vehicle: SpatialVehicle, sweeps: dict[str, Sweep], speed: float, options: Options
 ) -> list[str]:
-    """What each output does at one speed, and how wrong simpler roads are."""
+    """Table of each output's standard deviation at one speed, and the errors of simpler roads."""
     (name, first), *others = sweeps.items()
     width = max(map(len, first.outputs))
     heads = "".join(f"{case:>20}" for case in (*first.cases[1:], ISOTROPIC))
@@ -209,7 +209,8 @@ def _change(other: float, value: float) -> str:
 
 
 def _travels(vehicle: SpatialVehicle, deviations: Mapping[str, float], free: float | None) -> list[str]:
-    """How often each travel passes the free travel (m); how fast it moves where the vehicle file asks for its rate."""
+    """Lines on how often each travel passes the free travel (m), and on its rate where the vehicle file asks for its
+    rate."""
     parts = [output for output in vehicle.outputs if isinstance(output, PartOutput)]
     rates = {output.part: deviations[output.name] for output in parts if output.kind == "travel rate"}
     lines = []

@@ -105,7 +105,7 @@ def _alone(chooser: Chooser, effect: Effect) -> Alone:
 
 
 def _answer(scene: RideScene, choice: Choice, further: dict[Effect, float]) -> dict[str, Any]:
-    """What was chosen, and how right and how cheap that is."""
+    """Saved answer of a ride's choice: its effects, their changes and the saving."""
     columns = {
         "predicted": choice.predicted,
         "confirmed": choice.confirmed,
@@ -138,8 +138,8 @@ def _save(
     results: dict[str, Result],
     folder: Path,
 ) -> None:
-    """What leaving out each effect alone changes, predicted and confirmed, and whether it was left out; a CSV of these
-    and one of the energy activity of every element beside."""
+    """Save the changes by leaving out each effect alone, predicted and confirmed, and whether it was left out; a CSV of
+    these and one of the energy activity of every element beside."""
     import pandas as pd
 
     told: dict[str, Any] = {"left out": [each.effect in choice.left_out for each in alone]}

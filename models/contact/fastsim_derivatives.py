@@ -1,4 +1,4 @@
-"""How FASTSIM's forces change with creepages, spin and load: the march differentiated along with itself.
+"""Derivatives of FASTSIM's forces by creepages, spin and load: the march differentiated along with itself.
 
 A sticking traction changes as the sum that it is. A slipping one keeps its size and only turns, so its derivative is
 that of its angle: with phi the angle of -w, psi from there to the traction, and z = |w| step / g,
@@ -171,7 +171,7 @@ def _strip(contact, strips, s, cells, slip, sums, moved):
 
 @compiled
 def _turning(px, py, u, v, before, rate):
-    """What ``advance`` does to a slipping traction: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
+    """Turning of a slipping traction by ``advance``: sin psi' / sin psi, the part of psi' per |w|, and |w|."""
     size = math.sqrt(u * u + v * v)
     h = min(size * rate, LONGEST)
     base = 1.0 + h * (1.0 + h * (0.5 + h * (1.0 / 6.0)))

@@ -68,7 +68,7 @@ def touches(contact):
 
 @lean
 def rigid_slip(contact, cells, kind):
-    """What the march needs of the creepages (x, y, spin).
+    """Rigid slip of every cell by the creepages (x, y, spin), for the march.
 
     The traction by the bound in the ellipse's middle that each creepage builds up over one cell of the middle strip,
     were there no slip; the third one is that of spin per metre.

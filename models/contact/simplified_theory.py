@@ -70,7 +70,7 @@ FITS = {"displacement": DISPLACEMENT, "gradient": GRADIENT}
 
 @dataclass(frozen=True)
 class Options:
-    """How the theory is used.
+    """Options of the simplified theory: net, shape, fit, patches together or apart.
 
     net : meshes of the crude net along each axis. shape : of the pressure over the depth: "parabolic", proportional to
     d - h as the paper has it, or "elliptic", proportional to its root as in Hertz's contact. The latter is nearer to

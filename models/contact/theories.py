@@ -95,7 +95,7 @@ class Linear(OnEllipse):
 
 
 def beyond_friction(used: np.ndarray) -> str:
-    """What is said against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
+    """Sentence against the linear theory's forces ``used`` (n,) by mu N; "" where friction can carry them all."""
     beyond = used[used > 1.0]
     if not beyond.size:
         return ""

@@ -219,7 +219,7 @@ def with_own(scene: Any) -> Any:
 
 
 def extended(built: Any, scene: Any) -> Any:
-    """What a system built of a scene, with the scene's tables [effects.NAME] in it."""
+    """The object that a system built of a scene, extended by the scene's tables [effects.NAME]."""
     for name, table in tables_of(scene).items():
         built = _extend(name, module_of(scene.system, name), built, table)
     return built
@@ -256,7 +256,7 @@ def check(scene: Any) -> None:
 
 
 def legal(there: Iterable[str], scene: Any) -> None:
-    """The same of effects that are known to be there."""
+    """Check that effects of a scene may stand together, of names that are known to exist."""
     there = tuple(there)
     for name in there:
         module = module_of(scene.system, name)
@@ -280,7 +280,7 @@ def legal(there: Iterable[str], scene: Any) -> None:
 
 
 def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
-    """What must be dropped for an effect's sake."""
+    """Phrase on what must be dropped for an effect's sake."""
     clash = [other for other in module_of(scene.system, name).EXCLUDES if other in there]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
@@ -297,7 +297,7 @@ def _at(scene: Any, name: str) -> str:
 
 
 def own_table(scene: Any) -> Table:
-    """What the scene's file says, as nested tables that may be edited; no defaults."""
+    """The scene's file as nested tables that may be edited, without defaults."""
     table: Table = deepcopy(scene.model_dump(exclude_unset=True))
     return {key: value for key, value in table.items() if key not in ("file", "folder")}
 
@@ -325,7 +325,7 @@ def without(scene: Any, *left_out: str) -> Any:
 
 
 def _depth(name: str, system: str) -> int:
-    """How long the longest chain of needs is; who needs another one leaves before it."""
+    """Length of the longest chain of effects that need each other; an effect leaves before those that it needs."""
     return 1 + max((_depth(other, system) for other in module_of(system, name).NEEDS), default=0)
 
 
@@ -367,7 +367,7 @@ def rebuilt(table: Table, scene: Any) -> Any:
 
 
 def lines(scene: Any, width: int = 10) -> list[str]:
-    """What ``twinrig show`` says: a line per effect of the scene with what it takes, and one of all that are absent."""
+    """Lines of ``twinrig show``: a line per effect of the scene with what it takes, and one of all that are absent."""
     said = {name: module_of(scene.system, name).COST for name in named(scene)}
     there = [f"  {'effect':<{width}} {name}: {cost}" for name, cost in said.items()]
     return [*there, f"  {'absent':<{width}} {', '.join(absent(scene)) or 'nothing'} (not computed)"]

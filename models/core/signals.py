@@ -21,7 +21,7 @@ SNAP = 1e-6
 
 
 class Signal(Protocol):
-    """What an engine may ask of an input."""
+    """Protocol of an engine's input signal."""
 
     @property
     def channels(self) -> int:

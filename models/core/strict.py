@@ -89,7 +89,7 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
 
 
 def _phrase(first: Any, keys: tuple[str, ...], owner: type[BaseModel] | None) -> str:
-    """What would have been accepted, in plain words."""
+    """Phrase that says which keys or values would have been accepted."""
     fields = {} if owner is None else owner.model_fields
     key = keys[-1] if keys else ""
     kind, facts = first["type"], _facts(fields.get(key))

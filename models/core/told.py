@@ -1,4 +1,4 @@
-"""What readers are told of results: the error of each, and every assumption that was broken."""
+"""Texts for readers of results: the error of each, and every assumption that was broken."""
 
 import json
 from collections.abc import Mapping
@@ -88,7 +88,7 @@ def gathered(whole: Result, parts: Results) -> Result:
 
 
 def inherited(derived: Result, results: Results, how: str) -> Result:
-    """What was computed of results with their errors, ``how``, the worst of each channel, and what they broke.
+    """A derived result with the errors of its source results, ``how`` they add, and the assumptions that they broke.
 
     Without estimates in the results it has none.
     """
@@ -129,7 +129,7 @@ SAID = ("engine", "error", "assumptions")
 
 
 def attributes(results: Results) -> dict[str, dict[str, str]]:
-    """What results say, without their channels, as JSON keeps it; ``speaking`` reads it."""
+    """Attributes of results without their channels, for JSON; ``speaking`` reads them."""
     return {name: {key: run.data.attrs[key] for key in SAID} for name, run in results.items()}
 
 

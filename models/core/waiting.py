@@ -1,4 +1,4 @@
-"""What a run that takes its time is at, for a bar that someone may watch; nothing is computed unless one does."""
+"""Progress of a long run for a bar that someone may watch; nothing is computed unless someone does."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

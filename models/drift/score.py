@@ -1,4 +1,4 @@
-"""What a stabilised run is worth: what it costs by itself, how wrong it is beside the true one, and a verdict.
+"""Score of a stabilised run: the cost of the stabilisation, its error beside the true run, and a verdict.
 
 Two kinds of figures are kept apart, because an engineer has only one of them.
 
@@ -62,7 +62,7 @@ class Limits(Strict):
 
 @dataclass(frozen=True)
 class Own:
-    """What a run says of itself.
+    """Figures of a stabilised run that need no true run: moments and forces of the stabiliser, pitch, cost.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Own:
 
 @dataclass(frozen=True)
 class Errors:
-    """What a run is beside the true one.
+    """Errors of a stabilised run against the true run.
 
     Attributes
     ----------
@@ -191,7 +191,8 @@ def consistent(run: Result) -> bool | None:
 
 
 def uncertainty(run: Result) -> float:
-    """What a Kalman filter itself says of its pitch: twice the largest standard deviation (rad); 0 without one."""
+    """Uncertainty of a Kalman filter's pitch by its own statement: twice the largest standard deviation (rad); 0
+    without a filter."""
     return 2.0 * float(run["pitch_deviation"].max()) if "pitch_deviation" in run.data else 0.0
 
 
@@ -241,7 +242,7 @@ def _free(duration: float, trusted: float | None) -> Verdict:
 
 
 def _beyond(deviations: Errors, limits: Limits) -> list[str]:
-    """What the true run shows to be wrong."""
+    """Sentences on errors against the true run that are above their limits."""
     damage = [
         f"damage of {name} x {ratio:.3g}"
         for name, ratio in deviations.damage.items()
@@ -253,7 +254,7 @@ def _beyond(deviations: Errors, limits: Limits) -> list[str]:
 
 
 def _burden(figures: Own, limits: Limits) -> list[str]:
-    """What the run itself shows to be wrong."""
+    """Sentences on figures of the run itself that are above their limits."""
     shares = {"moment": (figures.moment_share_band, "I pitch''"), "force": (figures.force_share_band, "m3 z3''")}
     return [
         f"artificial {name} {share:.0%} of {whole}"

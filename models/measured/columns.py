@@ -80,7 +80,7 @@ class Columns(Readable):
 
 
 class MemoryColumns(Readable):
-    """The same of samples (count, signals) that are in memory, to be read only."""
+    """Columns of samples (count, signals) in memory, read only."""
 
     def __init__(self, names: tuple[str, ...], samples: np.ndarray) -> None:
         self.names, self.count, self._samples = names, len(samples), samples

@@ -65,7 +65,7 @@ class Element:
 
 @dataclass(frozen=True)
 class CutVehicle:
-    """What is above the cut.
+    """A vehicle cut at its hubs: the bodies above the cut.
 
     tree : bodies and joints, carriers first, then the chassis; without springs and tyres
     whole : the vehicle that was cut, all its bodies on the chassis, loaded; tyres are listed there

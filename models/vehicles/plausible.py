@@ -1,4 +1,4 @@
-"""What no usual vehicle has: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
+"""Queries on implausible vehicles: a mass in tonnes, springs in N/mm, a strut far from its wheel, a corner without one.
 
 Nothing here refuses: each finding names the entry, its value and what is usual, as the units of a file are named. Only
 what is far from every vehicle on wheels is queried, from a quarter of a small car to a loaded truck; a vehicle that is
@@ -304,7 +304,7 @@ def _frequencies(whole: Whole) -> Iterator[Finding]:
 
 
 def _sunk(whole: Whole) -> float:
-    """How far (m) the carried body sinks under the weights, springs and tyres together."""
+    """Distance (m) by which the carried body sinks under the weights, springs and tyres together."""
     vehicle, motion = whole.vehicle, Kinematics(whole.vehicle)
     stiffness = static_stiffness(replace(vehicle, bars=()), motion)  # bars carry no weight
     weights = sum(body.mass * GRAVITY * motion.shift(body.name, body.position)[2] for body in vehicle.bodies)

@@ -241,7 +241,7 @@ class TyreOutput:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a reduced vehicle is the limit of, for small motion only.
+    """Limits that make up a reduced vehicle, for small motion only.
 
     Names of ``massless`` bodies and ``rigid`` springs, and ``locked`` freedoms as (body, freedom). Rigid springs and
     locked freedoms leave q = N r with fewer coordinates r; bodies without mass leave a mass matrix that may be singular

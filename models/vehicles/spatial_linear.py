@@ -184,7 +184,7 @@ class Preloads(NamedTuple):
 
 
 def preloads(vehicle: SpatialVehicle) -> Preloads:
-    """What holds the design position against gravity; a tyre's is its static wheel load.
+    """Preloads that hold the design position against gravity; a tyre's is its static wheel load.
 
     Shares that several could bear are those of the linear statics: what each would carry had the unloaded vehicle
     sunk by K^-1 times the weights. InputError where no spring can carry a weight, and for a tyre that only pushes

@@ -1,4 +1,4 @@
-"""What a vehicle must be as a whole, before any number is computed from it."""
+"""Checks of a vehicle as a whole, before any number is computed from it."""
 
 from collections import defaultdict
 

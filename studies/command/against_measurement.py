@@ -54,7 +54,7 @@ class Match:
 
     @property
     def relative(self) -> float:
-        """The same by the standard deviation of the measurement; infinite where that does not move."""
+        """Error divided by the standard deviation of the measurement; infinite where the measurement is constant."""
         size = float(np.std(self.measured))
         return self.rms / size if size > 0.0 else (0.0 if self.rms == 0.0 else np.inf)
 

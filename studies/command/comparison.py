@@ -93,7 +93,7 @@ class Difference:
 
     @property
     def where(self) -> str:
-        """The same in words."""
+        """Place of the largest difference, in words."""
         return f"{self.over.partition(' [')[0]} = {self.labels[self.row] if self.labels else f'{self.at:.9g}'}"
 
     @property
@@ -119,7 +119,7 @@ def compare(first: Path, two: Path) -> tuple[list[Difference], list[str]]:
 
 
 def compare_runs(first: Result, two: Result, names: tuple[str, str]) -> tuple[list[Difference], list[str]]:
-    """The same of two results in memory, which messages and notes call by ``names``."""
+    """Differences between two results in memory, which messages and notes call by ``names``."""
     a, b = (dict(_with_errors(run, channels_of(run.data))) for run in (first, two))
     differences = [_difference(key, a[key], b[key], names[1]) for key in a if key in b]
     return _sorted(differences, *names), _alone("", (names[0], a), (names[1], b))

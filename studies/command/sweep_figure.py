@@ -45,7 +45,7 @@ Columns = dict[str, list[Any]]
 
 @dataclass(frozen=True)
 class Swept:
-    """What the points of a sweep of ``scene`` over ``key`` gave.
+    """Results at the points of a sweep of ``scene`` over ``key``.
 
     failures : what failed at each point, by engine; results : of each point, without channels, by their names; unit :
     of the key's values.

@@ -69,7 +69,7 @@ class Kernels:
 
 @dataclass
 class Waiting:
-    """What a bar shows: text and share as told, the march that runs, what numba does.
+    """State of a progress bar: text and share of the work, the march that runs, numba's compiling.
 
     system : of the scene, for the time that its kernels take.
     """
@@ -82,7 +82,7 @@ class Waiting:
     _march: tuple[Any, float] = (None, 0.0)
 
     def tell(self, text: str, share: float) -> None:
-        """Another work, and which part of all is done."""
+        """Set the bar's text to the work that begins, and its share to the part that is done."""
         self.text, self.share = text, min(max(share, 0.0), 1.0)
 
     def state(self) -> tuple[str, float | None, str]:

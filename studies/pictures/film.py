@@ -1,4 +1,4 @@
-"""What can be drawn: the motion that an engine reports, as it computes poses itself, and the stage of it.
+"""Films of a motion that an engine reports, as it computes poses itself, and their stage.
 
 Axes are those of the run, whatever they are; the camera's ``up`` says where up is. Lengths in m, forces in N.
 """
@@ -52,7 +52,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Curve:
-    """What is plotted below the pictures: forces of one kind along a direction, and how that is called."""
+    """A curve plotted below the pictures: forces of one kind along a direction, and their name."""
 
     kind: str
     direction: tuple[float, float, float]

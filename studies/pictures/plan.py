@@ -1,4 +1,4 @@
-"""What a scene of pictures will draw: printed by ``twinrig show``, checked before any run."""
+"""The plan of a scene of pictures: printed by ``twinrig show``, checked before any run."""
 
 from studies.pictures.scene import PictureScene
 from studies.pictures.video import missing

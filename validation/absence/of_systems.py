@@ -90,13 +90,14 @@ def pair(system: str, effect: str) -> tuple[Any, Any]:
 
 
 def declared(system: str, effect: str, engines: Iterable[str]) -> Counts:
-    """What the effect's file says that it adds, engine by engine."""
+    """Counts that the effect's file declares, engine by engine."""
     counts = module_of(system, effect).COUNTS
     return {engine: {**counts.get("all", {}), **counts.get(engine, {})} for engine in engines}
 
 
 def added(system: str, effect: str, quick: bool = False) -> Counts:
-    """What it does add to a bare scene, or to that with what it needs, in each engine that takes both."""
+    """Counts that an effect adds to a bare scene, or to that with the effects that it needs, in each engine that takes
+    both."""
     before, after = _before(system, effect, quick), seen(system, pair(system, effect)[1], quick)
     return {engine: _more(before[engine], counts) for engine, (counts, _) in after.items() if engine in before}
 
@@ -158,7 +159,7 @@ def _probed(system: str, first: dict[str, tuple[dict[str, int], bytes]], importe
 
 @contextmanager
 def _removed(system: str, modules: list[str]) -> Iterator[None]:
-    """As if the files of a system's effects, and what only they import, had been removed."""
+    """Context in which the files of a system's effects, and modules that only they import, cannot be imported."""
     assert not _loaded(modules), "the process is not fresh"
     blocked: dict[str, Any] = dict.fromkeys(modules)
     sys.modules.update(blocked)

@@ -52,7 +52,7 @@ def under_wheels(road: Road, state: np.ndarray, step: float, kinds: np.ndarray) 
 def lag_on(
     state: np.ndarray, time: float, steer: np.ndarray, slope: float, length: np.ndarray, lag: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As ``validation.braking.plain_relaxation.lag_on``, of the truck's wheels."""
+    """Lags of the truck's tyres after a step, as by ``validation.braking.plain_relaxation.lag_on``."""
     after, lagging = lag.copy(), np.zeros(4)
     truck_on_road = OnRoad(PLANE, np.zeros(4, dtype=np.int64), slope, DRY, EVEN)
     compiled_lag_on(state, time, steer, truck_on_road, Lag(length, after), lagging)
@@ -68,6 +68,6 @@ def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
 
 
 def held_in(numbers: np.ndarray) -> Held:
-    """What four wheels hold by a table of numbers: views, to read and to write."""
+    """Constant quantities of four wheels in a table of numbers: views, to read and to write."""
     rows = numbers[-4 * HELD :].reshape(HELD, 4)
     return Held(rows[0], rows[1:3].T, rows[3])

@@ -70,7 +70,7 @@ def random_stop(seed: int, number: int) -> dict[str, Any]:
 
 
 def procedure(draw: Draw, kind: str) -> dict[str, Any]:
-    """What the driver does."""
+    """A random procedure of the driver, as a table of a scene."""
     options: dict[str, Any] = {"kind": kind, "speed": draw.within(2.0, 25.0)}
     if kind == "split":
         options["right"] = draw.one(*SURFACES)

@@ -243,7 +243,7 @@ def _slave(kind: str, folder: Path) -> dict[str, Any]:
 
 
 def _failed(kind: str, name: str, table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """How a run with a controller that fails ended, and how long after its last good sample."""
+    """Ending of a run whose controller fails, and the time from its last good sample."""
     watched, timeout = _Watch(), TIMEOUT if name == "silence" else PATIENT
     told = {"kind": kind, "expected": name, "name": "no error", "number": -1, "kept": 0, "message": ""}
     try:

@@ -135,7 +135,7 @@ def _further_row(name: str, on: str, slip: float, speed: float, mass: float, spi
 
 
 def faults_of(stopped: Stop, radius: float, brakes: bool) -> list[str]:
-    """What is wrong with a stop: names of rules it breaks."""
+    """Names of the rules that a stop breaks."""
     path, speed = stopped.path, stopped.path.speed
     rim = radius * path.turning
     broken = {

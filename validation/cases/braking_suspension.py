@@ -186,7 +186,7 @@ class _Timed:
         self.own, self.answered, self.seconds = controller, math.nan, list[float]()
 
     def sample(self, given: Sample) -> Command:
-        """As the controller answers."""
+        """The controller's commands for a sample, timed."""
         self.seconds.append(perf_counter() - self.answered)
         command = self.own.sample(given)
         self.answered = perf_counter()

@@ -1,4 +1,4 @@
-"""What a contact kernel costs inside an engine: the kernel itself, the bridge to it, and the engine around both."""
+"""Cost of a contact kernel inside an engine: the kernel itself, the bridge to it, and the engine around both."""
 
 import time
 from collections.abc import Callable
@@ -73,11 +73,11 @@ class Setup:
 
     @property
     def without(self) -> "Setup":
-        """The same without contact."""
+        """A copy of the set-up without contact."""
         return replace(self, bridge="none", law=None)
 
     def wheels(self) -> Wheels:
-        """What is marched."""
+        """The wheels that are marched."""
         theory, cells = self.law or ("none", 21)
         return Wheels(self.count, cast(Theory, theory), cells or 21)
 
@@ -210,7 +210,7 @@ def _exudyn_job(setup: Setup, wheels: Wheels, law: Any) -> Callable[[int], Any]:
 
 
 def plain(wheels: Wheels) -> Callable[[Array, Array, Array, Array], None]:
-    """The same law by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
+    """The law of the contact by the functions that a user calls from Python: FASTSIM, or the theory of 1983."""
     bodies = separate(wheels.bodies) if wheels.theory == "simplified" else None
 
     def add(numbers: Array, q: Array, v: Array, f: Array) -> None:

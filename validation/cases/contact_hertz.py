@@ -112,7 +112,7 @@ def _errors(ratios: tuple[float, ...]) -> dict[str, list[float]]:
 
 
 def _turned(touching: Hertz) -> Hertz:
-    """The same contact with x and y exchanged."""
+    """The contact with x and y exchanged."""
     return Hertz(touching.b, touching.a, touching.p0, touching.approach, touching.load, touching.B, touching.A)
 
 

@@ -1,4 +1,4 @@
-"""What a scene without effects costs beside a model built by hand, and what each effect of the vehicle adds to it."""
+"""Cost of a scene without effects beside a model built by hand, and the cost that each effect of the vehicle adds."""
 
 import tempfile
 import time

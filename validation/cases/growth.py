@@ -261,7 +261,7 @@ def _twin_row(folder: Path) -> Row:
 
 
 def _engine_rows(folder: Path) -> list[Row]:
-    """The same noise file in all implementations, compared before the pitch is 0.05 rad off."""
+    """Rows: paths of all implementations under one noise file, compared before the pitch error is 0.05 rad."""
     true = drive(folder, LENGTH)
     runs = {engine: simulate(_noisy(folder, LENGTH), engine) for engine in ("reference", "exudyn", "mujoco")}
     base = runs["reference"]

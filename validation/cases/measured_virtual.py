@@ -199,7 +199,7 @@ def _rows(proof: Proof, form: str, off: float, means: dict[str, float]) -> list[
 
 
 def _beside(proof: Proof, first: Recording, true: VirtualMeasurement, folder: Path) -> list[Row]:
-    """The same recording free, and held by both engines; what the verdicts say."""
+    """Rows: the recording run free and held by both engines; the verdicts."""
     free = held(first, true.vehicle, Hold("none"))
     jobs = {engine: held(first, true.vehicle, proof.hold, engine) for engine in ENGINES[1:]}
     runs = {engine: march(job, folder / engine) for engine, job in jobs.items()}

@@ -64,7 +64,7 @@ def measure(quick: bool, folder: Path) -> CaseAnswer:
 
 
 def _exact(name: str) -> list[Row]:
-    """What needs no integration, on a motion whose derivatives are closed forms."""
+    """Rows: errors of quantities that need no integration, on a motion whose derivatives are closed forms."""
     array = sensor_array(ARRAYS[name])
     clean = readings_on_path(array.positions)
     spins, key = spin(array, clean), f"motion.exact.{name.replace(',', '').replace(' ', '-')}"
@@ -342,7 +342,7 @@ def _held(curves: Saved, quick: bool) -> list[Row]:
 
 
 def tables(data: Saved) -> list[Table]:
-    """What a flat arrangement costs."""
+    """Table of the errors of a flat arrangement of sensors."""
     rows = tuple(
         (f"{height:g}", *(("half and a bias", "") if len(gains) == 2 else ()), *(f"{value:.3g}" for value in gains))
         for height, *gains in data["gains"]

@@ -93,5 +93,5 @@ def tables(data: Saved) -> list[Table]:
 
 
 def draw(data: Saved) -> Drawn:
-    """How far above its tolerance each check of the pitch plane stands, fault by fault."""
+    """Draw how far above its tolerance each check of the pitch plane stands, fault by fault."""
     return pitch_plane.draw(data["pitch-plane"])

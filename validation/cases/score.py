@@ -99,7 +99,7 @@ def _closed(load: np.ndarray) -> float:
 
 
 def _heave(engines: tuple[str, ...], duration: float) -> list[Row]:
-    """The same run at rest and sinking as a whole: its heave runs away, and no section force knows."""
+    """Rows: a run at rest and one sinking as a whole: heave runs away, section forces stay the same."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         drive(folder, duration)

@@ -1,4 +1,5 @@
-"""What a run in time samples of a linear scene, by a covariance of its steps: no sum over frequencies and no chance.
+"""Statistics that a run in time samples of a linear scene, by a covariance of its steps: no sum over frequencies, no
+chance.
 
 Axle i meets the road D_i seconds late and moves the vehicle by x_i, so that x = sum x_i. A step of the classical
 Runge-Kutta method reads the filters f of the road at its begin, middle and end:

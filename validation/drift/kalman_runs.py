@@ -229,7 +229,8 @@ def _scored(true: Result, run: Result) -> dict[str, float]:
 
 
 def gyro_alone(folder: Path, duration: float, seed: int) -> dict[str, float]:
-    """What a gyro alone leaves unknown of the pitch (rad) after a long run, and what the averaged instability says.
+    """Standard deviation of the pitch (rad) by a gyro alone after a long run, and the value by the averaged
+    instability.
 
     The law: the stationary Riccati equation of pitch'' = lambda^2 pitch + noise with the rate measured. About a
     vehicle that stands level, A(0), the same gyro leaves a random walk.

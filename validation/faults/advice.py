@@ -90,7 +90,7 @@ class Swing:
         return Answer(times, values[:, None], {"force calls": calls})
 
     def lines(self, setting: Setting) -> list[str]:
-        """Its name."""
+        """Lines for a scene file: the setting's name."""
         return [setting.label()]
 
 

@@ -163,7 +163,7 @@ def _momentum(bench: Bench, engine: str, make: Make) -> float:
 
 
 def _enforced(situation: str) -> Callable[[Bench, str, Make], float]:
-    """How far enforced moment and force are from the eliminated form."""
+    """Error of enforced moment and force against the eliminated form."""
     return lambda bench, engine, make: enforced_gap(
         make, getattr(bench, situation), replace(bench.settings(engine), integrator=CONSTRAINED[engine], step=STEP / 2)
     )

@@ -228,7 +228,7 @@ def _longer(real: Any) -> Any:
 
 
 def _relaxed(change: Callable[..., tuple[Any, ...]]) -> Patch:
-    """What tyres on the suspension lag by, changed."""
+    """Patch that changes the lag of tyres on the suspension."""
     return attribute("models.brake.sprung_relaxation:relax", lambda real: lambda *given: real(*change(*given)))
 
 

@@ -27,7 +27,7 @@ class Check:
     measure: Callable[[], float]
 
     def size(self) -> float:
-        """What is measured; infinite where the fault lets a run fail."""
+        """The measured error; infinite where the fault lets a run fail."""
         try:
             return self.measure()
         except RunFailed:

@@ -1,4 +1,4 @@
-"""What a hard case is, and how an implementation's answer to it is judged."""
+"""Definition of a hard case, and how an implementation's answer to it is judged."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -145,7 +145,8 @@ class AsItComes(exudyn_engine.ExudynModel):
 
 
 class Inconsistent(AsItComes):
-    """The same with its own start: the constraint's acceleration is not among the initial values."""
+    """The prescribed pitch with an inconsistent start: the constraint's acceleration is not among the initial
+    values."""
 
     def _consistent_start(self, options: object) -> None:
         self._first = np.zeros(1)
@@ -170,12 +171,12 @@ def undamped_multiplier_naive(folder: Path) -> str:
 
 
 def noisy(engine: str, folder: Path) -> float:
-    """What noise of 1e-6 rad on the samples adds to the moment, in units of its finite-difference value."""
+    """Moment by noise of 1e-6 rad on the samples, in units of its finite-difference value."""
     return _noisy(engine, 1e-3)
 
 
 def noisy_fine(engine: str, folder: Path) -> float:
-    """The same at 0.125 ms."""
+    """Moment by noise of 1e-6 rad on samples at 0.125 ms, in units of its finite-difference value."""
     return _noisy(engine, 1.25e-4)
 
 
@@ -219,7 +220,7 @@ class Straight:
         return np.column_stack([self.angles[index] + (place - index) * slope, slope / self.period, 0 * slope])
 
     def at(self, time: float) -> np.ndarray:
-        """The same at one time."""
+        """The straight line's values at one time."""
         return self.sample(time, 1.0, 1)[0]
 
     def knots(self, duration: float) -> np.ndarray:

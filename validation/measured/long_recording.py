@@ -66,8 +66,7 @@ def blocks(seconds: float, repeated: float = 20.0) -> Iterator[np.ndarray]:
 
 
 def recorded(seconds: float, path: Path, repeated: float = 20.0) -> Recording:
-    """The same as a recording, past all files and maps, which is made unless it is there; ``path`` is where its samples
-    lie."""
+    """The long run as a recording, without files and maps, made unless it exists; ``path`` is where its samples lie."""
     signals, _ = pattern(repeated)
     columns = Columns(path, tuple(signal.name for signal in signals), round(seconds / PERIOD) + 1)
     for values in blocks(seconds, repeated) if columns.done == 0 else ():

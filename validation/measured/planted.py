@@ -154,7 +154,7 @@ def findings(virtual: VirtualMeasurement, samples: np.ndarray, folder: Path) -> 
 def planted(
     virtual: VirtualMeasurement, folder: Path, *spoil: Spoil | None, seed: int = SEED, **faults: Any
 ) -> tuple[Finding, ...]:
-    """What is found in a recording with faults of its transducers, and spoilt samples."""
+    """Findings on a recording with planted faults of its transducers, and spoilt samples."""
     samples = virtual.samples(Faults(**faults | {"noise": NOISE | faults.get("noise", {})}), seed)
     for change in spoil:
         if change is not None:

@@ -182,7 +182,7 @@ def judge(drawn: Drawn, engines: tuple[str, ...] = ENGINES) -> list[Verdict]:
 def verdicts(
     drawn: Drawn, engines: tuple[str, ...], true: Callable[[Recommendation, list[Setting]], dict[Setting, float]]
 ) -> list[Verdict]:
-    """The same by what a function makes of the recommendation and its settings: the true error of each."""
+    """Verdicts on drawn recommendations, by a function that gives the true error of each recommended setting."""
     recommendation = recommend(priced(drawn.scene, drawn.quantity, engines), drawn.tolerance)
     errors = true(
         recommendation, list(dict.fromkeys(choice.tried.setting for choice in recommendation.winners.values()))

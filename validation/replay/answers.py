@@ -1,4 +1,4 @@
-"""What the commands of a job answer: exit codes, messages, every array that they save or print; kept, and compared."""
+"""Answers of a job's commands: exit codes, messages, every array that they save or print; kept, and compared."""
 
 import csv
 import json
@@ -181,7 +181,8 @@ def load(folder: Path, name: str) -> Answer | None:
 
 @dataclass
 class Difference:
-    """What differs, a sentence each: ``wrong`` fails a replay, ``other`` (messages, new channels) is told."""
+    """Differences between two answers, a sentence each: ``wrong`` fails a replay, ``other`` (messages, new channels) is
+    told."""
 
     wrong: list[str] = field(default_factory=list)
     other: list[str] = field(default_factory=list)
@@ -222,7 +223,7 @@ def _later(name: str, arrays: Mapping[str, np.ndarray], renamed: Mapping[str, st
 
 
 def _changed(before: np.ndarray, now: np.ndarray, bound: float) -> str:
-    """What changed of an array, "" if nothing beyond the bound."""
+    """Text on the changes of an array, "" if none is beyond the bound."""
     if before.dtype.kind == now.dtype.kind == "U" and before.size == now.size == 1:
         return "" if before == now else f"{before} is {now}"
     if before.shape != now.shape or before.dtype != now.dtype:

@@ -1,4 +1,4 @@
-"""What is recorded: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
+"""Jobs to record: shipped scenes, jobs written out, base scenes, and scenes drawn from these by a seed."""
 
 import copy
 import subprocess

@@ -45,7 +45,7 @@ class Bent:
     tolerance: float
 
     def opened(self, copies: int = COPIES, seed: int = 1) -> InTime:
-        """As it is run, with so many copies."""
+        """The drawn ride as run in time, with so many copies."""
         options = {"copies": copies, "lasting": LASTING, "seed": seed}
         return in_time(replace(self.scene, ride=self.scene.ride.model_copy(update={"options": options})))
 

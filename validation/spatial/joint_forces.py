@@ -1,4 +1,4 @@
-"""What guides transmit, by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
+"""Forces in guides by the engines' own joint forces: MuJoCo's force sensors, Exudyn's constraints.
 
 Here springs, mounts, bars and hubs are loads at their points, worked out from where MuJoCo says that these are; the
 chassis takes what they leave, so that they are forces inside. In Exudyn the bodies are free and their guides are
@@ -31,7 +31,8 @@ def mujoco_guides(vehicle: CutVehicle, q: np.ndarray, v: np.ndarray, wrenches: n
 
 
 def exudyn_guides(vehicle: CutVehicle, q: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """The same (guides, 6) in the axes of what carries each body, at rest; exact where at most one angle is free."""
+    """Forces and moments of guides (guides, 6) from Exudyn's constraints in the axes of what carries each body, at
+    rest; exact where at most one angle is free."""
     import exudyn as exu
     from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
 

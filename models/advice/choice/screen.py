@@ -1,4 +1,4 @@
-"""What leaving effects out changes, predicted from runs without one and without two of them.
+"""Changes by leaving effects out, predicted from runs without each and without each two of them.
 
 With y(S) the quantities' paths without the effects S, to the second order
 
@@ -64,7 +64,7 @@ class Screen:
         return self._judged(change)[0]
 
     def chance(self, change: Changes | None) -> np.ndarray:
-        """What chance may add to these (quantities,): nothing where a quantity is no mean of samples."""
+        """Chance error of predicted changes (quantities,): zero where a quantity is no mean of samples."""
         return self._judged(change)[1]
 
     def _judged(self, change: Changes | None) -> np.ndarray:
@@ -106,7 +106,8 @@ class Screen:
         return self.shares(self.change(chosen)) if chosen else np.zeros(len(self.quantities))
 
     def remainder(self, chosen: Set) -> np.ndarray:
-        """What third and higher orders may add (quantities,): the second, by as much as it lies below the first."""
+        """Bound on changes of third and higher orders (quantities,): the second, by as much as it lies below the
+        first."""
         none = np.zeros(len(self.quantities))
         if len(chosen) <= 2:
             return none

@@ -79,7 +79,7 @@ class Variants:
         return self.scene.beside(name) if self._opened else beside(self.scene, name)
 
     def says(self, name: str) -> str:
-        """What an effect is, or what leaving it out means."""
+        """Sentence on what an effect is, or what leaving it out means."""
         told = self.scene.said if self._opened else {}
         return str(told.get(name) or module_of(self.scene.system, name).__doc__ or "").partition("\n")[0]
 
@@ -146,7 +146,7 @@ class Variants:
         return self._costs[left_out]
 
     def lengths(self) -> list[int]:
-        """How many times as long a step may be, as far as whole numbers of them make up the run."""
+        """Factors by which a step may be longer, such that whole numbers of steps make up the run."""
         count = self.system.parts(self.scene)
         return [times for times in range(1, min(count, LONGEST) + 1) if count % times == 0]
 

@@ -16,7 +16,7 @@ NOTHING = 1e-12
 
 
 def lines(prices: PriceList, quantities: list[str]) -> list[str]:
-    """What the scene costs, then every effect with what it costs and changes."""
+    """Lines of text: the cost of the scene, then every effect with its cost and its changes."""
     counts = ", ".join(f"{value:,} {name}" for name, value in prices.counts.items())
     part = "" if prices.each >= prices.whole else f", {prices.each:,} of {prices.whole:,} steps priced"
     return [

@@ -1,4 +1,4 @@
-"""What scenes have in common whose contacts are cut into cells: settings are steps and cells of any engine's RK4."""
+"""Common part of scenes whose contacts are cut into cells: settings are steps and cells of any engine's RK4."""
 
 import math
 from abc import ABC, abstractmethod
@@ -131,7 +131,7 @@ def chosen(quantity: str, known: dict[str, Any]) -> str:
 
 
 def part_of(quantity: str | None, usual: str, runs: dict[str, Any], kind: str) -> tuple[str, str]:
-    """Which of a scene's runs is asked about, and for what: RUN.QUANTITY, of the first run where none is named."""
+    """The run and the quantity of a scene that a user names: RUN.QUANTITY, of the first run where none is named."""
     name, _, asked = (quantity or usual).rpartition(".")
     name = name or next(iter(runs))
     if name not in runs:

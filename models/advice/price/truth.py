@@ -1,4 +1,4 @@
-"""What a scene's quantity really is: a reference refined until it no longer matters, and how well it is known."""
+"""The true value of a scene's quantity: a reference refined until it no longer matters, and how well it is known."""
 
 import time
 from collections.abc import Mapping

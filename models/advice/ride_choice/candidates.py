@@ -1,4 +1,4 @@
-"""What any set of effects changes and costs that a scene's quantities may do without: predicted, confirmed, looked at
+"""Changes and savings by leaving out any set of effects of a ride: predicted, confirmed, examined
 nearby, and run."""
 
 from collections.abc import Callable, Sequence
@@ -65,7 +65,7 @@ class Candidates:
 
     @classmethod
     def of(cls, ride: RideScene) -> Self:
-        """Those of a scene that asks for a choice."""
+        """The candidate effects of a scene that asks for a choice."""
         assert ride.speeds is not None and ride.tolerance is not None
         return cls(ReducedScene.whole(ride), ride.speeds.all(), ride.quantities, ride.tolerance)
 
@@ -107,11 +107,11 @@ class Candidates:
         return self._worst(self.screened, chosen, self._predict)
 
     def confirm(self, chosen: Set) -> np.ndarray:
-        """The same by the exact solve, of all listed speeds."""
+        """Relative changes by leaving effects out, from the exact solve at all listed speeds."""
         return self._worst(self.wholes, chosen, lambda whole, chosen, reduced: confirmed(reduced, self.rows))
 
     def certified(self, chosen: Set) -> np.ndarray:
-        """What ``confirm`` finds; inf where it holds the tolerance, but the identity of covariance and adjoint, which
+        """Changes by ``confirm``; inf where it holds the tolerance, but the identity of covariance and adjoint, which
         certifies it, is not exact at a screened speed."""
         changes = self.confirm(chosen)
         exact = not self.holds(changes) or all(self._exact(whole, chosen) for whole in self.screened)
@@ -150,7 +150,7 @@ class Candidates:
 
     @remembered
     def off(self, chosen: Set) -> np.ndarray:
-        """The same with parameters off, in the corner that is worst for each quantity."""
+        """Relative changes with parameters varied to the corner that is worst for each quantity."""
         rest = self.rest(chosen)
         return largest(np.concatenate([self.near.changes(rest, corner) for corner in self.near.corners(rest)]))
 

@@ -94,7 +94,8 @@ class Chooser(Candidates):
         return not why
 
     def _cancels(self, chosen: Set) -> str:
-        """Which effect alone, or which one's coming back, breaks the tolerance that all together keep; or empty.
+        """Name of an effect whose removal or return alone breaks the tolerance that the whole choice keeps; "" if there
+        is none.
 
         Changes without end do not count: white noise that passes is nothing that another change could make up for.
         """
@@ -209,7 +210,8 @@ class Chooser(Candidates):
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _steps(self) -> list[Set]:
-        """These, and where white noise would pass, the same with damping of the tyres, by which it comes."""
+        """The smallest sets that can be left out; those that let white noise pass, also with the tyres' damping, through
+        which it enters."""
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
         return self.singles + [step | damping for step in white]

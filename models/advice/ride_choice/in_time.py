@@ -35,7 +35,7 @@ ROOM = 3e8
 
 
 class Samples(Strict):
-    """What a scene's [options] say of its copies."""
+    """Number and length of the copies by a scene's [options]."""
 
     copies: int = Field(default=48, ge=FEWEST, le=100_000, description="of the vehicle, each on a road of its own")
     lasting: float = quantity("s", "length of each copy after it has forgotten its beginning", default=10.0)
@@ -83,7 +83,7 @@ class InTime:
 
     @property
     def said(self) -> dict[str, str]:
-        """What leaving each of all effects out means."""
+        """Sentences on what leaving out each effect means."""
         return {effect.name: effect.says for effect in self.effects}
 
     @property
@@ -126,7 +126,7 @@ class InTime:
         return self.scene.excitation()
 
     def vehicle(self, pace: Pace) -> SpatialVehicle:
-        """What is left of the vehicle at a speed; InputError where a run in time cannot do without it."""
+        """The vehicle without the effects at a speed; InputError where a run in time needs an effect."""
         return left(self.scene, pace.springs)
 
     def roads(self, pace: Pace) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What leaving effects out changes near a scene: between its speeds, and with parameters a few per cent off.
+"""Changes by leaving effects out, near a scene: between its speeds, and with parameters a few per cent off.
 
 A change e of a deviation is told by sums over frequencies, J = sum of |H(w) u(w)|^2, H the outputs by the heights u of
 the road, for the whole scene and for what is left. With Z q = B u the dynamic stiffness and y = C q, a parameter moves

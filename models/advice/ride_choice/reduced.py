@@ -49,7 +49,7 @@ class Whole:
         self.full = self.reduced(scene)
 
     def reduced(self, scene: ReducedScene) -> Reduced:
-        """What is left of the scene; raises InputError where it is no system."""
+        """The scene without the effects; raises InputError where what remains has no equations of motion."""
         key = (scene.vehicle, *_road(scene), scene.massless, scene.rigid, scene.locked)
         if key not in self._made:
             self._made[key] = self._make(scene)
@@ -86,7 +86,7 @@ class Whole:
 
 
 def _road(scene: ReducedScene) -> tuple[Hashable, ...]:
-    """What tells one road of a scene less some effects from another."""
+    """Key that is equal for reduced scenes with the same road."""
     return scene.ride.road, tuple(tables_of(scene.ride))
 
 

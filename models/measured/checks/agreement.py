@@ -122,7 +122,7 @@ class Agreement:
 
     @property
     def rms(self) -> float:
-        """The same, root of the mean square."""
+        """Root mean square of the unexplained motion."""
         return float(np.sqrt(np.mean(self.unexplained**2)))
 
     @property
@@ -261,7 +261,7 @@ class Agreement:
                 yield fault
 
     def _levers(self, hubs: tuple[str, ...]) -> np.ndarray:
-        """What the response (f, k, c) gains, per m by which the moments of hubs are about a point above them.
+        """Change of the response (f, k, c) per m of height of the point about which hub moments are given.
 
         About a point r above the hub a force adds (r Fy, -r Fx) to the moments about it, which the response undoes.
         """
@@ -312,7 +312,7 @@ class Agreement:
         return fall if fall > CERTAIN and self._worth(other, weights) else 0.0
 
     def _crossed(self, pair: tuple[Signal, ...]) -> "Agreement":
-        """This with two channels exchanged, both of the forces or both of the readings."""
+        """The agreement with two channels exchanged, both of the forces or both of the readings."""
         response = self.response.copy()
         response[self._picked(pair)[1]] = self.response[self._picked(pair[::-1])[1]]
         return replace(self, response=response)

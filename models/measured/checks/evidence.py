@@ -1,4 +1,4 @@
-"""What every check looks at: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
+"""Data that every check uses: the recording, the vehicle, where sensors sit, and what is worked out once for all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -63,7 +63,7 @@ class Evidence:
 
     @cached_property
     def lacking(self) -> str:
-        """What would be needed to set forces and motion against each other; empty if nothing."""
+        """Data that are missing for a comparison of forces and motion; empty if none."""
         if self.vehicle is None:
             return "a vehicle in space"
         bare = [hub for hub in self.vehicle.hubs if hub not in self.vertical()]
@@ -136,7 +136,7 @@ class Evidence:
 
     @cached_property
     def searched(self) -> tuple[Agreement, tuple[Fault, ...]] | None:
-        """What is left of the agreement without its faults, and the faults, the worst first."""
+        """The agreement after its faults are taken out, and the faults, the worst first."""
         return self.agreement.search() if self.agreement else None
 
     @property

@@ -33,7 +33,7 @@ CERTAIN = 25.0
 
 @dataclass(frozen=True)
 class Balance:
-    """What is left of equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
+    """Residual of the equilibrium, (e,): force, moments about x and y, and what elasticity alone decides (N, N m).
 
     columns (e, h) : of an excess that is a whole load at one hub. inverse (e, e) : of the covariance.
     """

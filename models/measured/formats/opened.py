@@ -1,4 +1,5 @@
-"""What the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of error."""
+"""Functions that the readers of all formats share: channels chosen by name, blocks cut and checked, one kind of
+error."""
 
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
@@ -91,7 +92,7 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def notice(path: Path, weight: Weight, text: str, place: str = "") -> Finding:
-    """What a reader has to say of a file that it read all the same."""
+    """Finding of a reader on a file that it could read all the same."""
     return Finding("file", weight, place or path.name, text)
 
 

@@ -138,7 +138,7 @@ class BrakingStop:
         return Solver(partial(run, substeps))
 
     def errors(self, solution: Result) -> dict[str, float]:
-        """That of the stopping distance."""
+        """Errors of a solution's stopping distance."""
         return {"stopping distance": abs(solution.distance - self.true)}
 
     def _taped(self) -> np.ndarray:

@@ -26,7 +26,7 @@ def steps(scene: ContactScene) -> int:
 
 
 def parts(scene: ContactScene) -> int:
-    """One: there is no step."""
+    """Number of parts into which a step can be cut: 1, as a contact has no time steps."""
     return 1
 
 

@@ -48,7 +48,7 @@ class OwnHandling(Meshed):
         return driven(engine, _with_cells(self.handling, cells), self.speed, duration, step)
 
     def exact(self, cells: int, step: float, duration: float) -> Drive:
-        """The same by DOP853 about the engine's accelerations."""
+        """The drive by DOP853 with the engine's accelerations, an accurate reference."""
         handling = _with_cells(self.handling, cells)
         model, start = build(self.own, handling), np.concatenate(handling.straight(self.speed))
         n, times = start.size // 2, step * np.arange(round(duration / step) + 1)

@@ -86,7 +86,7 @@ class OwnPitchPlane:
 
     @property
     def note(self) -> str:
-        """What is left out."""
+        """Text on what the price leaves out."""
         return "adaptive methods are left out: they restart at every sample" if self.sampled else ""
 
     @property
@@ -124,7 +124,7 @@ class OwnPitchPlane:
         return self.run(setting.engine, self._settings(setting, duration))
 
     def run(self, engine: str, settings: Settings) -> Result:
-        """The same with any settings."""
+        """The result of the scene with any settings."""
         scene: Scene = self.assembly.scene
         every_step = scene.model_copy(update={"run": scene.run.model_copy(update={"output_step": None})})
         return run(every_step, engine, settings, self.assembly)

@@ -38,7 +38,7 @@ class OwnWheelset(Meshed):
         return [path(self._scene(cells, step, duration), engine, speed) for speed in self.speeds]
 
     def exact(self, cells: int, step: float, duration: float) -> list[Path]:
-        """The same by DOP853."""
+        """The paths of the wheelset by DOP853, an accurate reference."""
         scene = self._scene(cells, step, duration)
         return [_exact(*started(scene, "reference", speed), step, duration) for speed in self.speeds]
 

@@ -18,5 +18,5 @@ def leave_out(table: dict[str, Any], scene: Any) -> None:
 
 
 def put_in(table: dict[str, Any], scene: Any) -> None:
-    """Leave the scene as it is: the default geometry needs no edit."""
+    """Write the default geometry, "exact", into the scene's table."""
     table.setdefault("vehicle", {})["geometry"] = "exact"
