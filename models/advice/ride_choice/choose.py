@@ -210,8 +210,8 @@ class Chooser(Candidates):
         return log(now.work / then.work) if then.calls <= now.calls * (1 + EVEN) else 0.0
 
     def _steps(self) -> list[Set]:
-        """The smallest sets that can be left out; those that let white noise pass, also with the tyres' damping, through
-        which it enters."""
+        """The smallest sets that can be left out; those that let white noise pass, also with the tyres' damping,
+        through which it enters."""
         damping = frozenset(effect for effect in self.effects if effect.name == TYRE_DAMPING)
         white = [step for step in self.singles if damping and not np.isfinite(self.predicted(step)).all()]
         return self.singles + [step | damping for step in white]
