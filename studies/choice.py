@@ -114,9 +114,9 @@ def _results(choices: list[SceneChoice]) -> dict[str, Result]:
     }
 
 
-def _spent(progress: Progress, title: str, done: int, of: int, share: float) -> None:
+def _spent(progress: Progress, title: str, completed: int, of: int, share: float) -> None:
     """Pass on what is spent of a scene's search, after some of so many scenes."""
-    progress(title, (done + share) / of)
+    progress(title, (completed + share) / of)
 
 
 def has_closed_form(scene: Any) -> bool:

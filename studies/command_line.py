@@ -246,7 +246,7 @@ def price(
 @app.command()
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of results, or one file of it.")],
-    two: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
+    second: Annotated[Path, typer.Argument(help="Another one of the same study, or a measurement (.csv, .mf4, ...).")],
     out: Out = None,
     shift: Annotated[
         float | None,
@@ -264,16 +264,16 @@ def compare(
     from studies.command.comparison import compare as differences
     from studies.command.comparison import report
 
-    if measured.against(first, two):
+    if measured.against(first, second):
         for run in measured.runs_of(first).values():
-            measured.overlay(run, two, shift)  # before a folder is made
+            measured.overlay(run, second, shift)  # before a folder is made
         folder = _folder("compare", None, "", out, None)
-        return _finish(lambda progress: measured.report(first, two, folder, shift), folder, as_json)
+        return _finish(lambda progress: measured.report(first, second, folder, shift), folder, as_json)
     if shift is not None:
         raise InputError("--shift", "", shift, "belongs to a comparison of a run with a measurement")
-    differences(first, two)  # before a folder is made
+    differences(first, second)  # before a folder is made
     folder = _folder("compare", None, "", out, None)
-    _finish(lambda progress: report(first, two, folder), folder, as_json)
+    _finish(lambda progress: report(first, second, folder), folder, as_json)
 
 
 @app.command()

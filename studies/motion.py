@@ -236,7 +236,7 @@ def _numbers(source: Source) -> dict[str, Any]:
 
 
 def _lines(source: Source, p: Parameters) -> list[str]:
-    """Verdict on the readings, then a line per way."""
+    """Lines: the verdict on the readings, then one for each method."""
     assert source.quality is not None
     numbers, kind = _numbers(source), "error" if source.truth else "size"
     head = f"largest {kind} (rms)"

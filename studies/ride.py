@@ -112,7 +112,8 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
 
 
 def _correlations(scene: RideScene, vehicle: SpatialVehicle) -> dict[str, tuple[str, str] | None]:
-    """The scene's own, then simpler ones; a wheel in the middle is on neither of two tracks that are independent."""
+    """Cases of correlation: the scene's, then simpler ones; a wheel in the middle is on neither of two tracks that are
+    independent."""
     sided = {wheel.y != 0.0 for wheel in placed_wheels(scene, wheels(vehicle))}
     return {AS_WRITTEN: None} | {
         name: (left_right or scene.road.left_right, front_rear or scene.road.front_rear)

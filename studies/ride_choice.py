@@ -90,12 +90,12 @@ def run(scene: RideScene, engines: tuple[str, ...], folder: Path, progress: Prog
     }
 
 
-def _runs(scene: RideScene, rest: ReducedScene) -> dict[str, Result]:
+def _runs(scene: RideScene, reduced: ReducedScene) -> dict[str, Result]:
     """Deviations of the scene and of what a choice leaves of it, with their errors and what they take for granted."""
     results = {"whole scene": run_scene(scene, "reference", error=scene.error)}
-    vehicle = replace(rest.vehicle, limits=rest.limits)
-    if rest != ReducedScene.whole(scene):
-        results["what is left"] = run_scene(rest.ride, "reference", vehicle=vehicle, error=scene.error)
+    vehicle = replace(reduced.vehicle, limits=reduced.limits)
+    if reduced != ReducedScene.complete(scene):
+        results["what is left"] = run_scene(reduced.ride, "reference", vehicle=vehicle, error=scene.error)
     return results
 
 
@@ -207,7 +207,7 @@ def choice_figure(
 
 
 def _activity(axis: Any, watts: dict[str, float]) -> None:
-    """Shares of the finite ones; an inertia under white noise has none."""
+    """Plot the shares of the elements' finite watts; an inertia under white noise has none."""
     from models.drawing.figures import BLUE
 
     finite = {name: value for name, value in watts.items() if np.isfinite(value)}

@@ -40,14 +40,14 @@ class Command(NamedTuple):
 
 
 class Controller(Protocol):
-    """A controller, whatever it runs in.
+    """Protocol of a brake controller, whatever program or process it runs in.
 
     A class that has ``steady = True`` beside its ``sample`` answers alike to every sample in which the switch is
     closed, and is asked once.
     """
 
-    def sample(self, given: Sample) -> Command:
-        """Answer to one sample."""
+    def sample(self, sample: Sample) -> Command:
+        """The controller's commands for a sample."""
         ...
 
 
@@ -66,8 +66,8 @@ class Pressures:
     pressures: np.ndarray
     steady: ClassVar[bool] = True
 
-    def sample(self, given: Sample) -> Command:
-        """Always the same."""
+    def sample(self, sample: Sample) -> Command:
+        """The same pressures at every sample."""
         return Command(pressures=self.pressures)
 
 
@@ -78,6 +78,6 @@ class AllApplied:
     wheels: int
     steady: ClassVar[bool] = True
 
-    def sample(self, given: Sample) -> Command:
-        """Apply."""
-        return Command(valves=np.full(self.wheels, APPLY if given.brake else RELEASE))
+    def sample(self, sample: Sample) -> Command:
+        """Commands that open all valves."""
+        return Command(valves=np.full(self.wheels, APPLY if sample.brake else RELEASE))

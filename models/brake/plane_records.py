@@ -41,7 +41,7 @@ def report_of(rows):
 
 
 class Motion(NamedTuple):
-    """A vehicle that moves, all of it moved in place.
+    """State of a vehicle in the plane, stepped in place.
 
     state (2, n) : positions and rates; turning (W,) : rad/s; accelerations (2 + U,) : those of the last step, from
     which the next one searches on; report (7, W) : the rows of the last step's ``Report``.

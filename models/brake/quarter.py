@@ -35,7 +35,7 @@ class Path(NamedTuple):
 
 
 class Quarter(Strict):
-    """One wheel and the mass upon it."""
+    """A quarter vehicle: one wheel and the mass that it carries."""
 
     mass: float = quantity("kg", "of vehicle and wheel together")
     radius: float = quantity("m", "of the wheel")

@@ -5,9 +5,8 @@ step, to which half a step by the accelerations leads; the engine then marches t
 method around the compiled forces, the tyres' mean ones held at their contacts and turned with their wheels.
 
 Springs and loads are as they are, tyres' forces as held. The table of numbers is that of ``models.multibody.forces``,
-then what the wheels hold, see ``Held``. What the road has beside the moment that speeds up a wheel's turning is on the
-chassis: brakes hold on to it, and locked wheels do.
-"""
+then what the wheels hold, see ``WheelForces``. What the road has beside the moment that speeds up a wheel's turning is
+on the chassis: brakes hold on to it, and locked wheels do."""
 
 from collections.abc import Callable
 from types import FunctionType
@@ -53,7 +52,7 @@ HELD = 4
 """Numbers that each wheel holds."""
 
 
-class Held(NamedTuple):
+class WheelForces(NamedTuple):
     """Wheel quantities that are constant over a step, each (W,): steer angle (rad), mean forces on the tyre along and
     across it (N), and the mean moment that speeds up the wheel's turning (N m)."""
 
@@ -79,17 +78,17 @@ class AtWheels(NamedTuple):
     The wheels' rates are the changes of the speeds along them, kept from step to step.
     """
 
-    held: Held
+    held: WheelForces
     wheels: Wheels
     surfaces: Surfaces
 
 
 @lean
-def held_of(numbers):
+def wheel_forces_of(numbers):
     """Views of the constant wheel quantities, which are the last numbers of a table for compiled forces."""
     wheels = int(numbers[TYRES])
     rows = array(beyond(start(numbers), int(numbers[COUNT])), (HELD, wheels))
-    return Held(rows[0], rows[1], rows[2], rows[3])
+    return WheelForces(rows[0], rows[1], rows[2], rows[3])
 
 
 @lean
@@ -103,7 +102,7 @@ def held_forces(numbers, q, v, f, contacts):
     )
     way, ledger, creeping = wheel.way, array(doubles(LEDGER), (LEDGER,)), array(doubles(3), (3,))
     vehicle = enter(numbers, q, v, f, doubles(room(numbers)), ledger)
-    waves, held = numbers[int(numbers[OF_WAVES]) :], held_of(numbers)
+    waves, held = numbers[int(numbers[OF_WAVES]) :], wheel_forces_of(numbers)
     creeping[2], tyres = 0.0, beyond(start(numbers), int(numbers[OF_TYRES]))
     for i in range(int(numbers[TYRES])):
         tyre_row = row(tyres, PER_TYRE, i)

@@ -52,7 +52,7 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(wheels: int) -> Surfaces:
-    """Of so many wheels, the first table under all of them, whose tyres do not lag as long as nobody says so."""
+    """``Surfaces`` of so many wheels: the first table under all of them, without lag of the tyres."""
     return Surfaces(np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.full(wheels, math.nan))
 
 
@@ -65,7 +65,7 @@ def surfaces_of(rows):
 
 @dataclass(frozen=True)
 class Stretch:
-    """From x (m) on, the numbers of the surfaces left and right of the line."""
+    """A stretch of road that begins at x (m): numbers of the surfaces left and right of the line."""
 
     x: float
     left: int
@@ -91,15 +91,15 @@ EVEN = road([Stretch(0.0, 0, 0)])
 """The same surface everywhere."""
 
 
-def check_way(road: Road, way: float) -> None:
+def check_way(road: Road, distance: float) -> None:
     """Refuse steps on which a wheel may go a way (m) longer than the shortest stretch between two others."""
     shortest = float(np.diff(road.starts[1:]).min()) if road.starts.size > 2 else np.inf
-    if way > shortest:
+    if distance > shortest:
         raise InputError(
             "",
             "stretches",
             shortest,
-            f"must be at least as long as the way in a step, {way:.3g} m: take longer stretches or more substeps",
+            f"must be at least as long as the way in a step, {distance:.3g} m: take longer stretches or more substeps",
         )
 
 

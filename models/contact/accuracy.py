@@ -72,12 +72,12 @@ class Error:
 
     @property
     def total(self) -> float:
-        """Of the force, both together (N)."""
+        """Error of the force by cells and theory together (N)."""
         return self.cells + self.theory
 
     @property
     def moment(self) -> float:
-        """Of the moment, both together (N m)."""
+        """Error of the moment by cells and theory together (N m)."""
         return self.moment_cells + self.moment_theory
 
 

@@ -17,7 +17,15 @@ import numpy as np
 from models.contact.fastsim import KINDS, Flexibilities, RollingEllipse, check_choices, contacts_of
 from models.contact.fastsim_grid import Bound, nets
 from models.contact.fastsim_kernels import LONGEST, STILL, advance, cut, lateness
-from models.contact.fastsim_many import ONE, add_strip, blend, mean_flexibility, rigid_slip, stiffness, touches
+from models.contact.fastsim_many import (
+    ONE_FLEXIBILITY,
+    add_strip,
+    blend,
+    mean_flexibility,
+    rigid_slip,
+    stiffness,
+    touches,
+)
 from models.contact.fastsim_records import FORCES
 from models.contact.inputs import Array
 from models.contact.material import Pair
@@ -109,7 +117,7 @@ def _scale_slopes(contact, cells, kind, scale):
         unit = c if j == 2 else 1.0
         if blended[0] > 0.0 and size > 0.0:
             sign = 1.0 if creep[j] > 0.0 else -1.0 if creep[j] < 0.0 else 0.0
-            if kind == ONE:
+            if kind == ONE_FLEXIBILITY:
                 d_mean = (sign * flexible[j] - mean * creep[j] / size) / size
             else:
                 d_mean = 2.0 * creep[j] * (flexible[j] - mean) / (size * size)

@@ -272,16 +272,16 @@ def summed(first: Estimate, other: Estimate) -> Estimate:
     return Estimate(first.error + other.error, first.unit, first.share + other.share, order, step, larger.of)
 
 
-def stated(run: Result, told: Mapping[str, Estimate], how: str, of: str = "s") -> Result:
+def stated(run: Result, estimates: Mapping[str, Estimate], method: str, of: str = "s") -> Result:
     """The result that says its error, channel by channel, and how that was told; ``of``: the unit of steps or cells.
 
     Raises RunFailed, whose ``partial`` is the result, where a channel is no answer.
     """
-    channels = {name: asdict(estimate) for name, estimate in told.items()}
-    run.data.attrs["error"] = json.dumps({"how": how, "of": of, "channels": channels})
-    worst = max(told, key=lambda name: told[name].share, default=None)
-    if worst is not None and told[worst].refused:
-        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], told[worst]
+    channels = {name: asdict(estimate) for name, estimate in estimates.items()}
+    run.data.attrs["error"] = json.dumps({"how": method, "of": of, "channels": channels})
+    worst = max(estimates, key=lambda name: estimates[name].share, default=None)
+    if worst is not None and estimates[worst].refused:
+        engine, estimate = run.data.attrs["engine"] or run.data.attrs["system"], estimates[worst]
         why = f"{worst} errs by {100.0 * estimate.share:.3g} % of its deviation; {estimate.advice(of)}"
         fault = "cells are too few" if estimate.of else "steps are too long" if estimate.step else "error is too large"
         failure = RunFailed(engine, f"the {fault}, this is no answer: {why}")
@@ -302,24 +302,25 @@ def not_estimated(run: Result, why: str) -> Result:
     return run
 
 
-def of_theory(run: Result, told: Mapping[str, Estimate], how: str) -> Result:
-    """The result with what a theory itself leaves, beside what was said of its cells; ``how``: words that say whence.
+def of_theory(run: Result, estimates: Mapping[str, Estimate], method: str) -> Result:
+    """The result with what a theory itself leaves, beside what was said of its cells; ``method``: words that say
+    whence.
 
     No grid lessens it, so that it is neither warned of nor refused.
     """
     said = json.loads(run.data.attrs["error"])
-    said["theory"] = {"how": how, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
+    said["theory"] = {"how": method, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 
 
-def of_chance(run: Result, told: Mapping[str, Estimate], samples: int) -> Result:
+def of_chance(run: Result, estimates: Mapping[str, Estimate], samples: int) -> Result:
     """The result of an ensemble with the standard errors of its channels, of ``samples`` paths.
 
     Beside it stands what was said of the steps before.
     """
     said = json.loads(run.data.attrs["error"])
-    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in told.items()}}
+    said["chance"] = {"samples": samples, "channels": {name: asdict(estimate) for name, estimate in estimates.items()}}
     run.data.attrs["error"] = json.dumps(said)
     return run
 

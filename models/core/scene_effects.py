@@ -255,22 +255,22 @@ def check(scene: Any) -> None:
     legal(named(scene), scene)
 
 
-def legal(there: Iterable[str], scene: Any) -> None:
+def legal(present: Iterable[str], scene: Any) -> None:
     """Check that effects of a scene may stand together, of names that are known to exist."""
-    there = tuple(there)
-    for name in there:
+    present = tuple(present)
+    for name in present:
         module = module_of(scene.system, name)
         why = f", {module.WHY}" if module.WHY else ""
         for other in module.NEEDS:
-            if other not in there:
+            if other not in present:
                 raise InputError(
                     scene.file,
                     _place(module, name),
                     None,
-                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, there)}{_at(scene, other)}",
+                    f"needs the effect {other!r}{why}: name it too{_instead(scene, other, present)}{_at(scene, other)}",
                 )
         for other in module.EXCLUDES:
-            if other in there:
+            if other in present:
                 raise InputError(
                     scene.file,
                     _place(module, name),
@@ -279,9 +279,9 @@ def legal(there: Iterable[str], scene: Any) -> None:
                 )
 
 
-def _instead(scene: Any, name: str, there: tuple[str, ...]) -> str:
+def _instead(scene: Any, name: str, present: tuple[str, ...]) -> str:
     """Phrase on what must be dropped for an effect's sake."""
-    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in there]
+    clash = [other for other in module_of(scene.system, name).EXCLUDES if other in present]
     return f" in place of {' and '.join(map(repr, clash))}, beside which it cannot stand" if clash else ""
 
 

@@ -51,7 +51,7 @@ def read(model: type[Model], values: Mapping[str, Any], file: object, place: str
 
 
 def message(error: ValidationError, model: type[BaseModel], file: object, place: str) -> InputError:
-    """One message for all that was found."""
+    """One error with all faults that pydantic listed."""
     first, *others = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     keys = _keys(first)
     value = None if first["type"] == "missing" else first["input"]

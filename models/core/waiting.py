@@ -9,7 +9,8 @@ MARCHES: list[Callable[[], float]] = []
 
 @contextmanager
 def marching(share: Callable[[], float]) -> Iterator[None]:
-    """For the block a march is under way; share : what is done of it, 0 to 1, asked from another thread at any time."""
+    """Context in which a march is under way; share : the part that is done, 0 to 1, asked from another thread at any
+    time."""
     MARCHES.append(share)
     try:
         yield

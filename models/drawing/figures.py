@@ -154,12 +154,12 @@ SHARP = 0.05
 """Ratios are drawn as asinh(ln(ratio) / SHARP): linear about 1, where a tenth is told, logarithmic far from it."""
 
 
-def about_one(axis: Axes, which: str, ticks: Sequence[float]) -> None:
+def about_one(axis: Axes, axis_name: str, ticks: Sequence[float]) -> None:
     """Make an axis (x or y) show ratios, so that both 5 % and many decades are seen; ticks : the marked ratios."""
     scale = (lambda x: np.arcsinh(np.log(np.maximum(x, 1e-12)) / SHARP), lambda u: np.exp(SHARP * np.sinh(u)))
-    getattr(axis, f"set_{which}scale")("function", functions=scale)
-    getattr(axis, f"set_{which}ticks")(ticks, [f"{tick:g}" for tick in ticks])
-    getattr(axis, f"{which}axis").set_minor_locator(NullLocator())
+    getattr(axis, f"set_{axis_name}scale")("function", functions=scale)
+    getattr(axis, f"set_{axis_name}ticks")(ticks, [f"{tick:g}" for tick in ticks])
+    getattr(axis, f"{axis_name}axis").set_minor_locator(NullLocator())
 
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

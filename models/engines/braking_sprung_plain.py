@@ -15,7 +15,7 @@ from models.brake.plain.pressure import Pressures
 from models.brake.plain.step import BLINK, OVER, UPRIGHT, Course, Moving, Steps
 from models.brake.plain.suspension import Suspension
 from models.brake.plane_records import Motion
-from models.brake.samples import Braking, Kept, Told
+from models.brake.samples import Braking, Commands, Record
 from models.brake.sprung import Sprung
 from models.brake.surfaces import OnRoad
 from models.core.errors import RunFailed
@@ -73,8 +73,8 @@ class PlainOnSprings:
 
     def moving(
         self,
-        told: Told,
-        kept: Kept,
+        commands: Commands,
+        record: Record,
         sample: float,
         braking: Braking,
         motion: Motion,
@@ -93,17 +93,17 @@ class PlainOnSprings:
         pressures = Pressures(braking.chambers, braking.brakes, sample, braking.air)
         while True:
             yield status, time, float(np.hypot(*motion.state[1, :2])), float(braking.air.supply[0])
-            for _ in range(int(told.samples[0])):
-                if math.isnan(told.pressures[0]):
-                    pressures.by_valves(told.valves, torques)
+            for _ in range(int(commands.samples[0])):
+                if math.isnan(commands.pressures[0]):
+                    pressures.by_valves(commands.valves, torques)
                 else:
-                    pressures.by_pressures(told.pressures, torques)
-                status, used = self.advance(motion, torques, step, told.steer, vehicle, lagging)
+                    pressures.by_pressures(commands.pressures, torques)
+                status, used = self.advance(motion, torques, step, commands.steer, vehicle, lagging)
                 time += used
-                kept.now[0] = time
-                kept.rows[kept.left[0]] = kept.now
-                kept.left[0] += 1
-                if status == AT_REST or time >= kept.until:
+                record.now[0] = time
+                record.rows[record.left[0]] = record.now
+                record.left[0] += 1
+                if status == AT_REST or time >= record.until:
                     break
 
     def check_step(self, step: float) -> None:

@@ -161,7 +161,8 @@ def _plain(vehicle: CutVehicle, drive: Drive, step: float) -> "PlainHubs":
 
 @dataclass(frozen=True)
 class NativeShare:
-    """Of a built model: names of the elements that are the engine's own, count of its joints; why others are not."""
+    """Native elements of a built model: names of the elements that are the engine's own, count of its joints; why
+    others are not."""
 
     elements: tuple[str, ...]
     joints: int

@@ -84,15 +84,15 @@ def _marker(mbs: Any, node: Any, coordinate: int) -> Any:
     return mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
 
 
-def _to_ground(built: Build, place: tuple[str, str], part: Strut | PitchSpring, law: Any = None) -> None:
+def _to_ground(built: Build, place: tuple[str, str], element: Strut | PitchSpring, law: Any = None) -> None:
     """A spring and damper between a coordinate and the ground, or a law in the place of their force."""
     keywords = {} if law is None else {"springForceUserFunction": law}
     built.callbacks += len(keywords)
     built.mbs.AddObject(
         items.CoordinateSpringDamper(
             markerNumbers=[ground_marker(built.mbs), built.places[place]],
-            stiffness=part.stiffness,
-            damping=part.damping,
+            stiffness=element.stiffness,
+            damping=element.damping,
             **keywords,
         )
     )

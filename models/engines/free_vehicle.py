@@ -68,7 +68,7 @@ class FreeModel(ABC):
 
     @contextmanager
     def at_step(self, step: float) -> Iterator[None]:
-        """For the block only the engine is ready to be marched from outside by steps (s)."""
+        """Context in which the engine is ready to be marched from outside by steps (s)."""
         self.step = step
         yield
 

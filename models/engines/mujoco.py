@@ -252,7 +252,7 @@ class MujocoModel:
         return out
 
     def _free_acceleration(self, time: float, q: np.ndarray, v: np.ndarray, step: int) -> np.ndarray:
-        """Of the coordinates that are not prescribed, within a step of the run."""
+        """Accelerations of the coordinates that are not prescribed, within a step of the run."""
         self.data.time, self.data.qpos[:], self.data.qvel[:] = time, q[self.free], v[self.free]
         if self.drive.controls is not None:
             self.data.ctrl[self.model.nu - 2 :] = self.drive.controls[min(step, len(self.drive.controls) - 1)]

@@ -48,7 +48,7 @@ def march(model: mujoco.MjModel, data: mujoco.MjData, start: np.ndarray, control
 
 
 def _chunks(steps: int) -> Iterator[tuple[int, int]]:
-    """First and last row of each part of a run."""
+    """First and last row of each part into which a run is cut."""
     for first in range(0, steps, CHUNK):
         yield first, min(first + CHUNK, steps)
 

@@ -56,7 +56,7 @@ def built_elements(mbs: Any, elements: Sequence[str]) -> tuple[str, ...]:
 
 
 def _name(*elements: Element) -> str:
-    """Name of the object that is these elements."""
+    """Name of the Exudyn object that stands for these elements."""
     return LAW + NEXT.join(_plain(element.name) for element in elements)
 
 

@@ -124,18 +124,22 @@ def _divided(element: Element, engine: str) -> tuple[Element | None, Element | N
 
 def travel_of(tree: SpatialVehicle, element: Element) -> CoordinateTravel | AxialTravel | None:
     """The travel of an element as an engine may have it; None where it is neither."""
-    first, two = (_behind(tree, end, element.frame) for end in (element.one, element.two))
+    first, two = (_behind(tree, end, element.frame) for end in (element.first_body, element.second_body))
     if first is not None and two is not None and not any(_turns(tree, body) for body in (*first, *two)):
         return _along_coordinates(tree, element, first, two)
-    if element.frame == element.two and first is not None:
-        return AxialTravel(element.two, element.point_two, element.one, element.point_one, -element.axis)
-    if element.frame == element.one and two is not None:
-        return AxialTravel(element.one, element.point_one, element.two, element.point_two, element.axis)
+    if element.frame == element.second_body and first is not None:
+        return AxialTravel(
+            element.second_body, element.second_point, element.first_body, element.first_point, -element.axis
+        )
+    if element.frame == element.first_body and two is not None:
+        return AxialTravel(
+            element.first_body, element.first_point, element.second_body, element.second_point, element.axis
+        )
     return None
 
 
 def _turns(tree: SpatialVehicle, body: str) -> bool:
-    """Whether a body turns beside what it rides on."""
+    """Whether a body turns against the body that carries it."""
     return any(freedom.startswith("r") for freedom in tree.body(body).freedoms)
 
 
@@ -146,12 +150,12 @@ def _behind(tree: SpatialVehicle, body: str, frame: str) -> tuple[str, ...] | No
 
 
 def _along_coordinates(
-    tree: SpatialVehicle, element: Element, first: tuple[str, ...], two: tuple[str, ...]
+    tree: SpatialVehicle, element: Element, first: tuple[str, ...], second: tuple[str, ...]
 ) -> CoordinateTravel:
     """Slides of the bodies behind the frame to either end, along its axes; those that move both ends drop out."""
     factors = dict[int, float]()
     for number, (body, freedom) in enumerate(tree.coordinates()):
-        ends = int(body in two) - int(body in first)
+        ends = int(body in second) - int(body in first)
         if factor := ends * float(element.axis[FREEDOMS.index(freedom) % 3]):
             factors[number] = factor
     return CoordinateTravel(tuple(factors), tuple(factors.values()))

@@ -103,7 +103,7 @@ def build(name: str, assembly: Assembly, settings: Settings) -> Model:
     return Guarded(name, _asked(name, "building it", outside_class, assembly, settings), assembly, settings)
 
 
-def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
+def _asked(name: str, question: str, function: Callable, *arguments: Any) -> Any:
     """The value that an outside engine's function returns; RunFailed if it raises anything but the project's own
     errors."""
     try:
@@ -111,17 +111,17 @@ def _asked(name: str, what: str, function: Callable, *arguments: Any) -> Any:
     except (InputError, RunFailed):
         raise
     except Exception as error:
-        raise RunFailed(name, f"{what} raised {_said(error)}") from error
+        raise RunFailed(name, f"{question} raised {_said(error)}") from error
 
 
-def _numbers(name: str, what: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _numbers(name: str, question: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An answer as an array of this shape; RunFailed if it is none."""
     try:
         numbers = np.asarray(value if value is not None else "nothing", dtype=float)
     except (TypeError, ValueError):
-        raise RunFailed(name, f"{what} gave {type(value).__name__} instead of numbers") from None
+        raise RunFailed(name, f"{question} gave {type(value).__name__} instead of numbers") from None
     if numbers.shape != shape:
-        raise RunFailed(name, f"{what} gave the shape {numbers.shape} instead of {shape}")
+        raise RunFailed(name, f"{question} gave the shape {numbers.shape} instead of {shape}")
     return numbers
 
 

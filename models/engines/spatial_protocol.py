@@ -227,6 +227,6 @@ def at_speeds(engine: str, vehicle: SpatialVehicle) -> Callable[[float], LinearV
 def sound(
     engine: str, settings: Settings, times: np.ndarray, states: np.ndarray, note: str, counts: dict[str, int]
 ) -> Trajectory:
-    """The run, where it passes the guard of all runs."""
+    """The trajectory, checked by the guard of all runs; raises RunFailed."""
     guard(engine, times, states, settings.duration, note)
     return Trajectory(times, states, counts=counts)

@@ -210,7 +210,7 @@ def _full(reason: str, store: Store | _Memory) -> RunFailed:
 
 
 def _submitted(executor: Executor, job: Job, paths: range) -> Future:
-    """A block on its way; on a pool that has lost its workers, a future that says so."""
+    """Future of a block of paths; of a pool that has lost its workers, a failed future."""
     try:
         return executor.submit(_attempt, job, paths)
     except BrokenExecutor as error:

@@ -47,7 +47,8 @@ class Store:
             yield
 
     def _claim(self, described: dict[str, Any]) -> None:
-        """Note down whose blocks these are; raises InputError if the folder belongs to another job."""
+        """Write into the folder which job its blocks belong to; raises InputError if the folder belongs to another
+        job."""
         file = self.folder / JOB
         if not file.exists():
             write_whole(file, json.dumps(described, indent=1).encode())

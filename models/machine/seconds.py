@@ -6,7 +6,7 @@ import numpy as np
 
 
 def duration(seconds: float) -> str:
-    """A time (s) in the unit that fits it."""
+    """Text of a time (s) in a fitting unit."""
     for factor, unit in ((1.0, "s"), (1e3, "ms")):
         if factor * seconds >= 1.0:
             return f"{factor * seconds:.3g} {unit}"

@@ -88,7 +88,7 @@ class AxleForces:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all signals."""
+        """Names of all signals."""
         return tuple(s.name for axle in self.signals for s in axle)
 
     @cached_property
@@ -169,7 +169,7 @@ class Steady:
 
     @property
     def shares(self) -> np.ndarray:
-        """Accelerations (2,) by those of a whole load."""
+        """Accelerations (2,) divided by those of a whole load."""
         return self.accelerations / self.units
 
     @property

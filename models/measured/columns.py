@@ -47,10 +47,10 @@ class Columns(Readable):
                 file.truncate(len(names) * count * ITEM.itemsize)
             self.close(0)
 
-    def close(self, done: int) -> None:
-        """Say that the first ``done`` samples of every signal are complete."""
-        self.done = done
-        text = json.dumps({"names": list(self.names), "count": self.count, "done": done})
+    def close(self, completed: int) -> None:
+        """Say that the first ``completed`` samples of every signal are complete."""
+        self.done = completed
+        text = json.dumps({"names": list(self.names), "count": self.count, "done": completed})
         write_whole(self._journal, text)
 
     def put(self, names: tuple[str, ...], first: int, values: np.ndarray) -> None:

@@ -93,9 +93,12 @@ def _put_curves(vehicle: CutVehicle, rows: np.ndarray, first: int) -> np.ndarray
 
 
 def _element(e: Element, joined: Joints) -> list[float]:
-    first, two = np.subtract(e.point_one, joined.origin[e.one]), np.subtract(e.point_two, joined.origin[e.two])
+    first, two = (
+        np.subtract(e.first_point, joined.origin[e.first_body]),
+        np.subtract(e.second_point, joined.origin[e.second_body]),
+    )
     law = (e.held, e.stiffness, e.damping, joined.last[e.frame], e.friction, e.friction_rate, 0.0, 0.0)
-    return [joined.last[e.one], *first, joined.last[e.two], *two, *e.axis, e.design, *law]
+    return [joined.last[e.first_body], *first, joined.last[e.second_body], *two, *e.axis, e.design, *law]
 
 
 def _hub(vehicle: CutVehicle, joined: Joints, i: int) -> list[float]:

@@ -271,7 +271,7 @@ class Contact:
         return self.side.wheelset.radius + float(self.side.wheel.curve(touch.wheel_y))
 
     def _arm(self, pose: Pose, touch: Touch) -> Array:
-        """From the wheelset's centre to a place of first touch, in the track (m)."""
+        """Vector from the wheelset's centre to a place of first touch, in the track (m)."""
         down = math.sqrt(self._radius(touch) ** 2 - touch.x**2)
         return pose.turn @ np.array([touch.x, self.side.wheelset.arm + touch.wheel_y, down])
 

@@ -333,7 +333,7 @@ class Equations:
         return path
 
     def _marched(self, state: Array, count: int, step: float, every: int) -> tuple[Array, Array]:
-        """States and contacts of a path that are kept; ``state`` (10,) is moved."""
+        """States and contacts of a path at every ``every``-th step; ``state`` (10,) is moved."""
         kept = count // every + 1
         states, contacts = np.empty((kept, STATES)), self.blank(kept)
         done = march(state, self.parameters, (step, count, every), states, contacts)

@@ -178,9 +178,9 @@ def followed(vehicle: SpatialVehicle, speed: float) -> float:
     return STEEPEST / float(abs(poles(steepest)).max())
 
 
-def _first(settling: int, done: int, every: int = EVERY) -> int:
+def _first(settling: int, completed: int, every: int = EVERY) -> int:
     """Steps from those that are done to the first one before which outputs are read."""
-    return settling - done if done <= settling else (settling - done) % every
+    return settling - completed if completed <= settling else (settling - completed) % every
 
 
 def _standing(plain: LinearVehicle, road: np.ndarray) -> np.ndarray:

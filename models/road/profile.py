@@ -91,7 +91,7 @@ class SineProfile:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Without end on both sides."""
+        """First and last arc length: without end on both sides."""
         return -math.inf, math.inf
 
     @property

@@ -72,7 +72,7 @@ class Start:
 
     @staticmethod
     def pitched(pitch: float, rate: float = 0.0, heave: float = 0.0, heave_rate: float = 0.0) -> "Start":
-        """Of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
+        """Start of a body that pitches (rad, rad/s, nose up) and heaves (m, m/s, down) alone."""
         level = tuple(from_cardan(0.0, pitch, 0.0).tolist())
         return Start((0.0, rate, 0.0), level, (0.0, 0.0, heave_rate), (0.0, 0.0, heave))
 

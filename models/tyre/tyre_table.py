@@ -72,7 +72,8 @@ class TyreTable:
         self._check_resultant()
 
     def _check_resultant(self) -> None:
-        """Both together not above the largest mu_x or mu_y: linear in slip and load, so only angles lie between."""
+        """Check that the resultant friction is not above the largest mu_x or mu_y: linear in slip and load, so only
+        angles lie between."""
         peak = max(self.mu_x.max(), (self.g[:, None, :] * self.h[:, :, None]).max())
         for share in (0.0, 0.25, 0.5, 0.75) if self.angles.size > 1 else (0.0,):
             x, g, h = (

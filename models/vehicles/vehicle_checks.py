@@ -57,7 +57,7 @@ def _connected(vehicle: SpatialVehicle, file: str) -> None:
 
 
 def _links(vehicle: SpatialVehicle) -> list[tuple[str, str]]:
-    springs = [(spring.one, spring.two or GROUND) for spring in vehicle.springs]
+    springs = [(spring.first_body, spring.second_body or GROUND) for spring in vehicle.springs]
     tyres = [(tyre.body, GROUND) for tyre in vehicle.tyres]
     bars = [(bar.body, end) for bar in vehicle.bars for end in (bar.left, bar.right)]
     return springs + tyres + bars

@@ -63,7 +63,7 @@ class Kernels:
         return self.total + (time.monotonic() - self.since if self.depth else 0.0)
 
     def busy(self) -> bool:
-        """Whether one is under way that is told."""
+        """Whether a kernel is being compiled that the bar shows."""
         return self.depth > 0 and time.monotonic() - self.since > SLOW
 
 
@@ -138,7 +138,7 @@ def waiting(text: str, system: str = "") -> Iterator[Tell]:
 
 
 def _draw(now: Waiting, over: threading.Event) -> None:
-    """Draw until it is over, from DELAY on."""
+    """Draw the bar until the work is over, from DELAY on."""
     while not over.wait(EVERY):
         now.kernels.attach()
         now.state()  # which sees when a march begins

@@ -5,7 +5,7 @@ from studies.pictures.video import missing
 
 
 def check(scene: PictureScene, engines: tuple[str, ...]) -> None:
-    """Nothing is left to refuse: the scene's tables say it all."""
+    """Refuse nothing: the scene's tables say it all."""
 
 
 def describe(scene: PictureScene) -> str:

@@ -354,7 +354,7 @@ def stops(speed: float) -> tuple[Job, Job]:
 
 
 def forces(path: Path) -> np.ndarray:
-    """Of the tyres along and across them (2, n - 1, W) in N."""
+    """Forces of the tyres along and across them (2, n - 1, W) in N."""
     return np.stack((path.reports.force_x, path.reports.force_y))
 
 

@@ -121,7 +121,8 @@ def _more(before: dict[str, int], after: dict[str, int]) -> dict[str, int]:
 
 
 def probed(systems: tuple[str, ...] = tuple(FILES)) -> dict[str, Any]:
-    """To be run in a fresh process: what a bare scene imports, what effects import and add, whether the path stays."""
+    """Facts for the case, to be gathered in a fresh process: what a bare scene imports, what effects import and add,
+    whether the path stays."""
     modules_of = {
         system: sorted({module for some in _modules(system).values() for module in some}) for system in systems
     }
@@ -177,8 +178,8 @@ def _loaded(modules: list[str]) -> list[str]:
 
 
 @cache
-def found() -> dict[str, Any]:
-    """``probed`` from a process of its own."""
+def measured_counts() -> dict[str, Any]:
+    """The facts of ``probed``, gathered in a process of its own."""
     code = "import json; from validation.absence.of_systems import probed; print(json.dumps(probed()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
@@ -192,7 +193,7 @@ def rows(quick: bool) -> list[Row]:
             for system in FILES
             for row in _present(system, {name: added(system, name, quick) for name in controlled(system)[::3]})
         ]
-    seen_there = found()
+    seen_there = measured_counts()
     present = [row for system, probe in seen_there["systems"].items() for row in _present(system, probe["adds"])]
     engines = Observed(
         "absent.references.engines",
@@ -245,7 +246,7 @@ def _absent(system: str, seen_there: dict[str, Any]) -> list[Row]:
 
 
 def _present(system: str, more: dict[str, Counts]) -> list[Row]:
-    """A row per effect of what it adds."""
+    """A row for each effect on the counts that it adds."""
     return [
         behaves(
             f"absent.{system}.adds.{name}",

@@ -46,12 +46,12 @@ class Moving:
 
     @property
     def report(self) -> Report:
-        """Of the last step."""
+        """Report of the wheels in the last step."""
         return Report(*self.motion.report)
 
     @property
     def speed(self) -> float:
-        """Of the first unit's centre of mass (m/s)."""
+        """Speed of the first unit's centre of mass (m/s)."""
         return float(np.hypot(*self.state[1, :2]))
 
     def on(self, torques: np.ndarray, step: float) -> tuple[int, float]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.brake.plain.suspension import Held
+from models.brake.plain.suspension import WheelForces
 from models.brake.plain.tyre import Braked, Motion, Surface
 from models.brake.plane_records import KNOWN, REPORTED, Report, Wheels
 from models.brake.plane_step import slide
@@ -60,14 +60,14 @@ def lag_on(
 
 
 def in_engine(vehicle: Sprung, engine: str) -> FreeModel:
-    """A vehicle on its suspension in an engine, around the compiled forces; ``held_in`` its table is what its wheels
-    hold."""
+    """A vehicle on its suspension in an engine, around the compiled forces; ``wheel_forces_in`` its table is what its
+    wheels hold."""
     handling = vehicle.handling
     table = np.concatenate((handling.numbers, np.zeros(HELD * len(handling.vehicle.tyres))))
     return free_model(engine, Driven(handling.vehicle, handling.gravity, table, held, set_held))
 
 
-def held_in(numbers: np.ndarray) -> Held:
+def wheel_forces_in(numbers: np.ndarray) -> WheelForces:
     """Constant quantities of four wheels in a table of numbers: views, to read and to write."""
     rows = numbers[-4 * HELD :].reshape(HELD, 4)
-    return Held(rows[0], rows[1:3].T, rows[3])
+    return WheelForces(rows[0], rows[1:3].T, rows[3])

@@ -268,9 +268,9 @@ class _Watch:
     def __exit__(self, *_: object) -> None:
         self._march.ask = self._ask
 
-    def _noted(self, controller: Controller, given: Sample, *more: Any) -> Any:
+    def _noted(self, controller: Controller, sample: Sample, *more: Any) -> Any:
         self.last = time.perf_counter()
-        return self._ask(controller, given, *more)
+        return self._ask(controller, sample, *more)
 
 
 def _fault_rows(fault: dict[str, Any]) -> list[Row]:

@@ -49,9 +49,8 @@ WHY = "median of the ratios within interleaved rounds, seconds of the processor;
 
 @dataclass(frozen=True)
 class Setup:
-    """One way of marching. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory and cells,
-    None where nothing is computed.
-    """
+    """Set-up of a march with contact. bridge : none, empty, native, jitted, plain, or a route of Exudyn's; law : theory
+    and cells, None where nothing is computed."""
 
     engine: str
     method: str
@@ -100,7 +99,7 @@ def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
 
 
 def every() -> list[Setup]:
-    """All of them."""
+    """All set-ups."""
     setups = []
     for engine, (usual, fine) in ENGINES.items():
         best, *others = ("native", "jitted", "plain") if engine == "mujoco" else (*ROUTES, "plain")
@@ -270,7 +269,7 @@ def _threads_row() -> Row:
 
 
 def _agreement_row() -> Row:
-    """Both engines by Runge-Kutta's method over 0.1 s."""
+    """Row: agreement of both engines by Runge-Kutta's method over 0.1 s."""
     wheels, steps = Wheels(), 1000
     q, v = wheels.state()
     with installed(kernel_law(forces)):

@@ -88,7 +88,7 @@ def _quick(forces: Path, scene: Scene, job: NoisePaths, times: np.ndarray) -> li
 
 
 def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
-    """Path 7 is the scene that names it."""
+    """Row: path 7 of the ensemble equals the run of a scene that names path 7."""
     alone = simulate(_scene(forces, duration, path=7), "reference")
     worst = float(np.abs(alone.states[:: round(1.0 / STEP)] - paths["states"][7]).max())
     return Observed(
@@ -100,14 +100,14 @@ def _path_row(forces: Path, duration: float, paths: Arrays) -> Row:
     ).within(0.0, 0.0, "the same samples through the same march: the same bits", "shared kernel")
 
 
-def _same_row(id: str, what: str, first: Arrays, other: Arrays) -> Row:
+def _same_row(id: str, title: str, first: Arrays, other: Arrays) -> Row:
     """Whether two ensembles are equal to the last bit."""
     count = len(other["drift_off"])
     equal = all(np.array_equal(first[name][:count], other[name], equal_nan=True) for name in first)
     return behaves(
         f"ensemble.{id}",
         SYSTEM,
-        what,
+        title,
         SAME if equal else "different bits",
         SAME,
         "a sample belongs to seed, path and place alone",

@@ -64,7 +64,7 @@ PROOFS = (
 
 
 def measure(quick: bool, folder: Path) -> tuple[list[Row], dict[str, Any]]:
-    """In full every proof with ten samples of noise, the engines and the predicted time of trust."""
+    """Rows: in full every proof with ten samples of noise, the engines and the predicted time of trust."""
     if quick:
         return _quick(folder), {}
     rows, data = list[Row](), dict[str, Any]()

@@ -98,7 +98,7 @@ def _beside(quick: bool) -> CaseAnswer:
 
 
 def _priced(quick: bool, make: Make) -> CaseAnswer:
-    """One problem: its rows, and what is saved of it."""
+    """The rows and the saved data of a problem."""
     problem = make(quick)
     measured = runner.measure(problem, quick, ROUNDS[quick], LEAST[quick])
     return rows_of(problem, measured, quick), asdict(measured)

@@ -63,12 +63,12 @@ class Sampled:
 
     @cached_property
     def _rate(self) -> np.ndarray:
-        """Of the filters in time (m, m), 1/s."""
+        """Rate matrix of the road filters in time (m, m), 1/s."""
         return self.march.speed * self.march.reduced.excitation.F
 
     @cached_property
     def _variance(self) -> np.ndarray:
-        """Of the filters (m, m)."""
+        """Covariance of the road filters (m, m)."""
         G = self.march.reduced.excitation.G
         return solve_continuous_lyapunov(self._rate, -self.march.speed * G @ G.T)
 

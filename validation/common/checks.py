@@ -27,7 +27,7 @@ SPREAD = np.array([0.5, 0.5, 0.5, 0.6, 3.0, 3.0, 3.0, 3.0])
 
 
 def engine(name: str) -> Make:
-    """The engine as it is."""
+    """The unchanged engine by its name."""
     return partial(build, name)
 
 

@@ -154,7 +154,8 @@ def relative(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
 
 
 def first_order_hold(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Over COARSE: transition, and what the input's samples at the start and at the end of the step add."""
+    """First-order hold over COARSE: transition, and what the input's samples at the start and at the end of the step
+    add."""
     n, m = b.shape
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = a, b

@@ -8,7 +8,7 @@ import numpy as np
 
 from models.core.result import Result
 from models.drift.growth import drift_off_time
-from models.drift.score import Errors, Limits, Own, blind_verdict, errors, own_figures, verdict
+from models.drift.score import Errors, Limits, RunFigures, blind_verdict, errors, figures_of_run, verdict
 from models.engines.assembly import Settings
 from models.fatigue.damage import damage_ratio, pseudo_damage
 from models.systems.pitch_plane.run import run as simulate
@@ -43,13 +43,13 @@ def follow(folder: Path, truth: Result, effects: dict[str, Any] | None = None, t
     return scene.model_copy(update={"start": {"pitch_rate": tilt}} if tilt else {})
 
 
-def figures(run: Result, truth: Result, scene: Scene) -> tuple[Own, Errors]:
+def figures(run: Result, truth: Result, scene: Scene) -> tuple[RunFigures, Errors]:
     """Figures of a run without the truth, and its errors against the truth."""
-    return own_figures(run, scene.vehicle_parameters()), errors(run, truth)
+    return figures_of_run(run, scene.vehicle_parameters()), errors(run, truth)
 
 
 def words(engine: str, scene: Scene, truth: Result) -> tuple[str, str]:
-    """The verdicts with the truth and without it."""
+    """The words of the verdicts with and without the true run."""
     scores, wrong = figures(simulate(scene, engine), truth, scene)
     known = blind_verdict(scores, scene.effects, DURATION, Limits())
     return verdict(scores, wrong, scene.effects, Limits()).word, known.word

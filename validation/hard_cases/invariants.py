@@ -20,7 +20,7 @@ G = 9.81
 
 
 def rest(engine: str, folder: Path) -> float:
-    """Both vehicles, exact and linear geometry, 2 s from their static equilibrium."""
+    """Largest motion of both vehicles, exact and linear geometry, in 2 s from their static equilibrium."""
     worst = 0.0
     for parameters in VEHICLES:
         for geometry in ("exact", "linear"):
@@ -132,7 +132,7 @@ def _tumbled() -> np.ndarray:
 
 
 def tumbling(engine: str, folder: Path) -> float:
-    """Over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
+    """Error of a vehicle that turns over its roof: 6 rad/s under its own weight, 1 s at 0.25 ms, against order 8."""
     states = run(engine, _spun("exact"), 2.5e-4, 1.0).states
     truth = _tumbled()
     if truth[:, 3].max() < np.pi / 2:

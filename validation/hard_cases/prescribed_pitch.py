@@ -132,16 +132,16 @@ def undamped_multiplier(engine: str, folder: Path) -> float:
 class AsItComes(exudyn_engine.ExudynModel):
     """Exudyn without our checks of its multiplier."""
 
-    _found: np.ndarray | None = None
+    _forces: np.ndarray | None = None
 
     def _balance(self, time: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if self._found is None:  # the start needs the balance; the check after the run gets what was found
+        if self._forces is None:  # the start needs the balance; the check after the run gets what was found
             return super()._balance(time, state)
-        return self._found[round(time / self.settings.step)], np.zeros(1)
+        return self._forces[round(time / self.settings.step)], np.zeros(1)
 
     def _enforced(self) -> np.ndarray | None:
-        self._found = super()._enforced()
-        return self._found
+        self._forces = super()._enforced()
+        return self._forces
 
 
 class Inconsistent(AsItComes):

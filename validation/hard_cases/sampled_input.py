@@ -149,7 +149,7 @@ def noise_adaptive(engine: str, folder: Path) -> float:
 
 
 def noise_adaptive_naive(folder: Path) -> str:
-    """scipy's RK45 straight across the jumps."""
+    """Error of noisy forces by scipy's RK45 straight across the jumps."""
     base = vehicle(geometry="linear")
     forces = static_forces(base, 200, 1e-3, noise=500.0)
     driven = setups.driven(base, forces)
@@ -220,7 +220,7 @@ def bump(engine: str, folder: Path) -> float:
 
 
 def bump_naive(folder: Path) -> str:
-    """scipy's LSODA as it comes."""
+    """The bump by scipy's LSODA with its default settings."""
     assembly = vehicle().with_input("road", _bump())
     model = build("reference", assembly, settings("reference", 5e-4, 10.5))
     solution = solve_ivp(

@@ -39,7 +39,7 @@ NOISE = 1e-6
 
 
 def sprung(band: float) -> Assembly:
-    """Under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
+    """The vehicle under its weight, turning at 0.4 rad/s, on a spring with a dead band (rad)."""
     base = vehicle("asymmetric_twin")
     start = base.initial.copy()
     start[7] = 0.4
@@ -60,7 +60,7 @@ def _kink_truth() -> Trajectory:
 
 
 def kink_naive(folder: Path) -> str:
-    """Exudyn's own limit stops in place of the law."""
+    """Error at the kink with Exudyn's limit stops in place of the force law."""
     with mock.patch.object(exudyn_engine, "_pitch_spring", _limit_stop):
         pitch_error = kink("exudyn", folder)
     return f"Exudyn's limit stops, asked once per step: pitch off by {pitch_error:.1e} rad"
@@ -207,7 +207,7 @@ def beyond_nyquist(engine: str, folder: Path) -> float:
 
 
 def _refusing(effects: dict[str, Any]) -> Callable[[str, Path], float]:
-    """A scene under wheel forces with these effects."""
+    """Check that a scene under wheel forces with these effects is refused."""
 
     def error(engine: str, folder: Path) -> float:
         measured_pitch(folder)  # writes the files

@@ -181,7 +181,7 @@ ORDERS = {"reference": 4.0, "exudyn": 2.0, "mujoco": 4.0}
 
 
 def keeps_order(engine: str, folder: Path) -> float:
-    """By how much the observed order falls short while the step is halved four times, from 2 ms on."""
+    """Amount by which the observed order falls short while the step is halved four times, from 2 ms on."""
     base = vehicle("asymmetric_twin", "linear")
     base = replace(base, initial=base.initial - np.array([0, 0, 0.01, 0.02, 0, 0, 0, 0]))
     truth, errors = exact(base, 0.1, 2)[-1], []

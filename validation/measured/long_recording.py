@@ -128,8 +128,8 @@ def killed(folder: Path, seconds: float, repeated: float, block: float, times: i
 def _main(folder: str, seconds: str, repeated: str, block: str, step: str = "") -> None:
     """Run or go on; a line per block has seconds done, the largest memory (bytes) and seconds of processor."""
 
-    def told(done: float, of: float) -> None:
-        print(done, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
+    def told(completed: float, of: float) -> None:
+        print(completed, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, time.process_time(), flush=True)
 
     job = run_of(Path(folder), float(seconds), float(repeated), step=float(step) if step else None)
     run(job, Path(folder) / "run", told, float(block))

@@ -80,10 +80,10 @@ def spiked(virtual: VirtualMeasurement, samples: np.ndarray, name: str, time: fl
 
 
 @spoiling
-def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, part: float) -> None:
+def clipped(virtual: VirtualMeasurement, samples: np.ndarray, name: str, share: float) -> None:
     """The largest samples of a channel cut off."""
     (column,) = columns(virtual, name)
-    samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - part))
+    samples[:, column] = np.minimum(samples[:, column], np.quantile(samples[:, column], 1 - share))
 
 
 @spoiling

@@ -190,7 +190,7 @@ def _drawn(ax: Axes) -> np.ndarray:
 
 
 def _emptiest(taken: np.ndarray, places: np.ndarray, names: list[np.ndarray]) -> np.ndarray:
-    """Of CORNERS, one whose name keeps off what is taken, near its own place where several do.
+    """The corner of CORNERS at which a name covers nothing, near its own place where several do.
 
     names : middles of names that stand already, through which no line to this one shall lead.
     """

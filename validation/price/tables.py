@@ -196,7 +196,7 @@ def outcomes(measured: Measured) -> Table:
 
 
 def failures(measured: Measured) -> Table:
-    """Everything that gave no answer to rely on, with what was said."""
+    """Table of the settings without a reliable answer, with their messages."""
     labels_of = defaultdict(list)
     for p in measured.points:
         if p.status != "ok":

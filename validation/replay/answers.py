@@ -113,7 +113,7 @@ def _masked(text: str) -> str:
 
 
 def _saved(folder: Path, given: set[str]) -> Iterator[tuple[str, np.ndarray]]:
-    """Of all files but those that were given."""
+    """Arrays of all files in the folder but those that were given."""
     for path in sorted(folder.rglob("*")):
         read = {".nc": _netcdf, ".csv": _csv}.get(path.suffix)
         if read is not None and path.name not in given:
@@ -189,7 +189,7 @@ class Difference:
 
 
 def difference(before: Answer, now: Answer, bound: float, renamed: Mapping[str, str]) -> Difference:
-    """Of an answer from a recorded one.
+    """Difference of an answer from a recorded one.
 
     bound : largest change of a number by the largest one of its channel; 0 asks for the same bits. renamed : earlier
     names of channels to later ones; a channel that is in another file now is looked for by its name.

@@ -123,7 +123,7 @@ def _verdict(resolved: bool, residual: float) -> str:
 
 
 def fits_table(roads: list[dict[str, Any]]) -> Table:
-    """Both processes of every road, with what is not known."""
+    """Table of both fitted processes of every road, with their uncertainty."""
     rows = []
     for road in roads:
         for process, unit, values in zip(("mean", "roll"), ("m", "1/m"), road["fits"], strict=True):

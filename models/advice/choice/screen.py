@@ -68,7 +68,7 @@ class Screen:
         return self._judged(change)[1]
 
     def _judged(self, change: Changes | None) -> np.ndarray:
-        """Both (2, quantities)."""
+        """Relative change and its chance error (2, quantities)."""
         if change is None:
             return np.outer((np.inf, 0.0), np.ones(len(self.quantities)))
         pairs = [
@@ -83,9 +83,9 @@ class Screen:
         """d of an effect."""
         return self.change(frozenset([effect]))
 
-    def second(self, first: str, two: str) -> Changes | None:
+    def second(self, first: str, second_effect: str) -> Changes | None:
         """e of a pair."""
-        sets = map(frozenset, ((first, two), (first,), (two,)))
+        sets = map(frozenset, ((first, second_effect), (first,), (second_effect,)))
         both, *singles = (self.change(effects) for effects in sets)
         known = [part for part in singles if part is not None]
         if both is None or len(known) < 2:

@@ -71,7 +71,7 @@ class Variants:
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Effects that it does not name."""
+        """Effects that the scene does not name."""
         return tuple(self.scene.absent) if self._opened else absent(self.scene)
 
     def beside(self, name: str) -> Any:
@@ -126,8 +126,8 @@ class Variants:
         return rebuilt(table, scene)
 
     def work(self, left_out: Set, times: int = 1) -> float:
-        """Of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through, and
-        one for each effect that is left; infinite where there is no run."""
+        """Work of a run, by counts alone, so that it repeats: calls, times the states and terms that each goes through,
+        and one for each effect that is left; infinite where there is no run."""
         run = self.of(left_out, times)
         if run is None:
             return math.inf

@@ -61,7 +61,7 @@ class OwnScene(Protocol):
 
     @property
     def title(self) -> str:
-        """Of the scene."""
+        """Title of the scene."""
         ...
 
     @property
@@ -71,7 +71,7 @@ class OwnScene(Protocol):
 
     @property
     def unit(self) -> str:
-        """Of the quantity."""
+        """Unit of the quantity."""
         ...
 
     @property
@@ -81,7 +81,7 @@ class OwnScene(Protocol):
 
     @property
     def first(self) -> float:
-        """Length of the part that is searched, s."""
+        """Length (s) of the first part of the run, in which settings are searched."""
         ...
 
     @property

@@ -101,7 +101,7 @@ def priced(scene: Any, quantity: str | None, engines: tuple[str, ...]) -> OwnSce
     """A scene as its system's file gives it to the search; InputError where there is none."""
     files = modules_of("models.advice.price.systems")
     if scene.system in files:
-        priceable: OwnScene = import_module(files[scene.system]).own(scene, quantity, engines)
+        priceable: OwnScene = import_module(files[scene.system]).priced_scene(scene, quantity, engines)
         return priceable
     package = import_module(SYSTEMS[scene.system].package) if scene.system in SYSTEMS else None
     why = getattr(package, "NO_PRICE", "has no steps to choose")

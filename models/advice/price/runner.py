@@ -100,7 +100,7 @@ class Measured:
 
     @property
     def unit(self) -> str:
-        """Of that quantity."""
+        """Unit of the quantity that tolerances are set on."""
         return self.units[self.quantity]
 
     @property
@@ -119,7 +119,7 @@ class Measured:
         return {p.setting.default: p for p in self.points if p.setting.default}
 
     def error(self, p: Point) -> float:
-        """Of the quantity that tolerances are set on."""
+        """Error of a point in the quantity that tolerances are set on."""
         return p.errors[self.quantity]
 
     def floor(self, quantity: str = "") -> float:

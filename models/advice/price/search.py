@@ -69,7 +69,7 @@ class Search:
         return self
 
     def attempt(self, setting: Setting) -> Tried:
-        """Try one setting, and keep what became of it."""
+        """Try a setting, and keep its result."""
         begun = time.process_time()
         try:
             with breaches() as broken:

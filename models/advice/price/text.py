@@ -144,7 +144,7 @@ def _into_the_scene(recommendation: Recommendation) -> list[str]:
 
 
 def as_dict(recommendation: Recommendation) -> dict[str, Any]:
-    """All of it as JSON keeps it."""
+    """The recommendation as plain values for JSON."""
     scene = recommendation.scene
     return {
         "scene": scene.title,

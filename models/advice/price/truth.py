@@ -34,7 +34,7 @@ class Truth:
     broken: tuple[Broken, ...] = ()
 
     def beside(self, broken: Mapping[str, Broken]) -> list[Broken]:
-        """Of assumptions by name, those that the reference keeps."""
+        """The broken assumptions that the reference keeps."""
         known = {assumption.name for assumption in self.broken}
         return [assumption for name, assumption in broken.items() if name not in known]
 

@@ -75,7 +75,7 @@ class Chooser(Candidates):
 
     @cached_property
     def singles(self) -> list[Set]:
-        """Every effect with those that it needs."""
+        """Sets of an effect with all effects that it needs."""
         named = {effect.name: effect for effect in self.effects}
         return [frozenset([effect, *(named[name] for name in effect.needs)]) for effect in self.effects]
 
@@ -139,7 +139,7 @@ class Chooser(Candidates):
         )
 
     def _reasons(self, chosen: Set) -> tuple[str, ...]:
-        """Of the larger sets that kept the tolerance as they stood, and were refused all the same."""
+        """Reasons why larger sets that kept the tolerance were refused."""
         larger = {refused - chosen: why for refused, why in self.refused.items() if refused - chosen}
         return tuple(
             f"{' and '.join(sorted(effect.name for effect in more))} stays: without it, the choice {why}"
@@ -167,9 +167,9 @@ class Chooser(Candidates):
         return kept[-1], rounds
 
     def _worthwhile(self, chosen: Set) -> Set:
-        """Less every effect that may come back for hardly more calls at equal accuracy, or without a shorter stable
-        step: calls that are fewer then are so because errors of what is left out and of steps make up for each other.
-        """
+        """The choice without every effect that may come back for hardly more calls at equal accuracy, or without a
+        shorter stable step: calls that are fewer then are so because errors of what is left out and of steps make up
+        for each other."""
         fewer = [chosen - {effect} for effect in chosen if not illegal(chosen - {effect})]
         for less in sorted(fewer, key=lambda candidate: float(abs(self.between(candidate)).max())):
             if self.cost(less).step < self.accurate(chosen).step * (1 - WORTH):

@@ -102,7 +102,7 @@ class March:
         return max(ALIKE, int(np.ceil(BEYOND * corner * step / (2 * np.pi))))
 
     def _frequencies(self, step: float) -> tuple[np.ndarray, ...]:
-        """Up to those of which a step sees but two values."""
+        """Frequencies up to those with two steps per period."""
         highest = np.pi / step
         delay = max(self.reduced.excitation.lengths) / self.speed
         return frequencies(self.motions[0], delay, (LOWEST * highest, highest))

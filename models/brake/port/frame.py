@@ -47,11 +47,18 @@ class WrongFrame(ValueError):
         super().__init__(reason)
 
 
-def question(given: Sample) -> bytes:
+def question(sample: Sample) -> bytes:
     """Frame of one sample."""
-    flags = SWITCH * given.brake | GIVEN * (given.speed == given.speed)
+    flags = SWITCH * sample.brake | GIVEN * (sample.speed == sample.speed)
     return QUESTION.pack(
-        b"TRQ1", given.number, given.time, given.wheels.size, flags, given.supply, given.speed, *_eight(given.wheels)
+        b"TRQ1",
+        sample.number,
+        sample.time,
+        sample.wheels.size,
+        flags,
+        sample.supply,
+        sample.speed,
+        *_eight(sample.wheels),
     )
 
 

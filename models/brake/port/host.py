@@ -55,7 +55,7 @@ def made(guest: Guest) -> Iterator[Controller]:
 
 
 def told(**what: Any) -> bytes:
-    """Frame of what went wrong."""
+    """Frame that reports a failure."""
     text = json.dumps(what, default=str).encode()
     return HEAD.pack(TOLD, len(text)) + text
 

@@ -74,14 +74,14 @@ class Sensed:
     pressures: Channels
     teeth: Counted | None = None
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """The controller's commands for measured signals, delayed on their way to the valves; negative pressures become
         zero."""
-        seen = given.wheels if self.teeth is None else self.teeth(given)
-        command = self.inner.sample(given._replace(wheels=self.wheels(given.number, seen)))
+        seen = sample.wheels if self.teeth is None else self.teeth(sample)
+        command = self.inner.sample(sample._replace(wheels=self.wheels(sample.number, seen)))
         if command.pressures is None:
             return command
-        return Command(pressures=np.maximum(self.pressures(given.number, np.asarray(command.pressures)), 0.0))
+        return Command(pressures=np.maximum(self.pressures(sample.number, np.asarray(command.pressures)), 0.0))
 
 
 def sensed(inner: Controller, wheels: int, signals: Conversion, pressures: Conversion, **more: Any) -> Sensed:

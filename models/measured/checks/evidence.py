@@ -94,7 +94,7 @@ class Evidence:
         return {s: ratio for s, ratio in ratios.items() if wrong(ratio, s)[0] in ("sign", "unit") and abs(ratio) > FELT}
 
     def mean(self, signal: Signal) -> float:
-        """Of all samples, under a window."""
+        """Mean of all samples, under a window."""
         return float(mean([partial(self.recording.samples, signal)])[0][0])
 
     def empty(self, signal: Signal) -> bool:
@@ -131,7 +131,7 @@ class Evidence:
 
     @property
     def frame(self) -> str:
-        """Of the hub forces."""
+        """Frame of the hub forces."""
         return self.forces[0].frame if self.forces else "hub"
 
     @cached_property

@@ -113,9 +113,9 @@ class LeftOut:
         return [notice(path, "note", f"left out, {why}: {text}") for why, text in texts.items()]
 
 
-def without_numbers(path: Path, said: Sequence[Finding]) -> InputError:
+def without_numbers(path: Path, findings: Sequence[Finding]) -> InputError:
     """Error for a file that has no channel to read, with what was said of it."""
-    reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in said)]
+    reasons = ["no channel of numbers over time is in the file", *(finding.text for finding in findings)]
     return InputError(path, "channels", None, "; ".join(reasons))
 
 

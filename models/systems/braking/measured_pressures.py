@@ -38,9 +38,9 @@ class MeasuredPressures:
     speeds: np.ndarray | None = None
     period: float = SAMPLE
 
-    def sample(self, given: Sample) -> Command:
+    def sample(self, sample: Sample) -> Command:
         """Pressures (W,) whose impulse over the sample is the measured one."""
-        start, end = given.time * 1e-9, given.time * 1e-9 + self.period
+        start, end = sample.time * 1e-9, sample.time * 1e-9 + self.period
         inside = self.times[(self.times > start) & (self.times < end)]
         at = np.concatenate(([start], inside, [end]))
         rows = np.column_stack([np.interp(at, self.times, column) for column in self.pressures.T])

@@ -46,7 +46,7 @@ def _check_parts(scene: BrakingScene, engines: tuple[str, ...]) -> None:
 
 
 def _check_log(scene: BrakingScene, log: str, engines: int) -> None:
-    """Each drive writes a log of its own."""
+    """Refuse several drives that would write into one log."""
     drives = {"procedure": len(scene.procedures), "engine": engines}
     for key, several in drives.items():
         if several > 1 and f"{{{key}}}" not in log:

@@ -67,14 +67,18 @@ def step_steer(scene: BrakingScene, name: str) -> Response | None:
     return response(path.times, path.states[:, 1, 2], steering.half)
 
 
-def engines_of(scene: BrakingScene, asked: tuple[str, ...]) -> tuple[str, ...]:
+def engines_of(scene: BrakingScene, requested: tuple[str, ...]) -> tuple[str, ...]:
     """Engines that were asked for; where none were, the usual one.
 
     On a suspension the reference, which takes minutes for a stop, is used only where nothing else was asked for.
     """
     if scene.vehicle.file is None:
-        return asked or ("reference",)
-    return tuple(name for name in asked if name != "reference") if len(asked) > 1 else asked or (SPRUNG_ENGINE,)
+        return requested or ("reference",)
+    return (
+        tuple(name for name in requested if name != "reference")
+        if len(requested) > 1
+        else requested or (SPRUNG_ENGINE,)
+    )
 
 
 def looped(scene: BrakingScene, name: str, vehicle: Braked, start: Start, engine: str = "") -> Path:

@@ -38,12 +38,12 @@ class Stop:
 
     @property
     def times(self) -> np.ndarray:
-        """Of the samples (n,) in s."""
+        """Times of the samples (n,) in s."""
         return self.path.times
 
     @property
     def lengths(self) -> np.ndarray:
-        """Of the samples (n - 1,) in s."""
+        """Lengths of the samples (n - 1,) in s."""
         return np.diff(self.path.times)
 
     @property

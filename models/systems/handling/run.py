@@ -180,7 +180,7 @@ class Again:
 
     @cached_property
     def twice(self) -> Series:
-        """In twice the step; raises RunFailed."""
+        """The manoeuvre in twice the step; raises RunFailed."""
         return self._with_net(self.drive.handling.tyres.cells, 2.0)
 
     def _with_net(self, cells: int, factor: float) -> Series:

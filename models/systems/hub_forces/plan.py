@@ -101,7 +101,7 @@ def doubts(scene: HubScene) -> tuple[str, ...]:
 
 
 def _frames(vehicle: CutVehicle) -> str:
-    """In whose axes those of elements are fixed."""
+    """Text on the bodies in whose axes the elements' axes are fixed."""
     others = [f"{each.name} in those of {each.frame}" for each in vehicle.elements if each.frame != vehicle.chassis]
     return "; ".join(["in the chassis' axes", *others])
 

@@ -79,7 +79,7 @@ class Measurement:
         return free
 
     def start(self, drive: Drive) -> np.ndarray:
-        """At rest in the design position (2 n,); an enforced tilt begins where its file does."""
+        """Initial state (2 n,): at rest in the design position; an enforced tilt begins where its file does."""
         n = self.vehicle.size
         start = np.zeros(2 * n)
         if drive.guide is not None and drive.pull is None:

@@ -69,7 +69,7 @@ class Grid:
 
     @property
     def times(self) -> np.ndarray:
-        """All of them (n,)."""
+        """Times (s) of all samples (n,)."""
         return self.start + self.period * np.arange(self.count)
 
     def places(self, times: np.ndarray) -> np.ndarray:

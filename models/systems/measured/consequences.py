@@ -61,7 +61,7 @@ class Consequence:
         )
 
     def __str__(self) -> str:
-        """With figures, for an engineer."""
+        """The consequence with its figures, as a sentence for an engineer."""
         where = f"'{self.finding.check}' at {self.finding.place or 'the recording'}"
         if not self.section:
             return f"{where}: what it does to the section forces is not known"
@@ -204,7 +204,7 @@ def _exchanged(finding: Finding, signals: Sequence[Signal], samples: Samples, pe
 
 
 def _smooth(finding: Finding, signals: Sequence[Signal], samples: Samples, period: float) -> Samples:
-    """Without spikes of one or two samples."""
+    """Samples without spikes of one or two samples."""
     out = dict[Signal, np.ndarray]()
     for s in signals:
         at, values = spikes(samples[s])[0], samples[s].copy()

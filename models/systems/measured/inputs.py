@@ -108,7 +108,7 @@ class Inputs:
 
     @property
     def frame(self) -> str:
-        """Of the hub forces."""
+        """Frame of the hub forces."""
         return next(signal.frame for signal in self.hubs if signal is not None)
 
     @property

@@ -77,7 +77,7 @@ class SectionRun:
 
     @property
     def count(self) -> int:
-        """Answers of the whole run."""
+        """Number of answers in the whole run."""
         return (self.recording.count - 1) // self.grid.skip + 1
 
 
@@ -125,7 +125,7 @@ class Checkpoint:
         return arrays
 
     def save(self, **arrays: np.ndarray) -> None:
-        """Replace what was saved by these arrays."""
+        """Save these arrays in place of the earlier ones."""
         buffer = BytesIO()
         np.savez(buffer, of=np.array(json.dumps(self.of)), **arrays)  # type: ignore[arg-type]
         write_whole(self.path, buffer.getvalue())
@@ -276,7 +276,8 @@ class _March:
         return replace(free, guide=guide, pull=pull)
 
     def _start(self) -> np.ndarray:
-        """At rest in the design position; where roll and pitch are held, these and their rates as measured."""
+        """Initial state: at rest in the design position; where roll and pitch are held, these and their rates as
+        measured."""
         n = self.job.vehicle.size
         state, held = np.zeros(2 * n), [ROLL, PITCH, n + ROLL, n + PITCH]
         if self.prescribed is not None:

@@ -134,14 +134,14 @@ def position(vehicle: CutVehicle, level: Level, period: float, times: np.ndarray
 class _Law:
     """Response of the rigid vehicle's angles at times (n,), equally spaced from 0."""
 
-    own: Rigid
+    rigid: Rigid
     frame: str
     times: np.ndarray
     _modes: tuple[np.ndarray, np.ndarray] = field(init=False)
 
     def __post_init__(self) -> None:
-        carried = -self.own.arms[:, 2].mean() * self.own.mass * GRAVITY if self.frame == "inertial" else 0.0
-        values, shapes = np.linalg.eig(np.linalg.solve(self.own.inertia, np.diag([carried, carried, 0.0])))
+        carried = -self.rigid.arms[:, 2].mean() * self.rigid.mass * GRAVITY if self.frame == "inertial" else 0.0
+        values, shapes = np.linalg.eig(np.linalg.solve(self.rigid.inertia, np.diag([carried, carried, 0.0])))
         object.__setattr__(self, "_modes", (np.sqrt(values.astype(complex)), shapes))
 
     @property

@@ -135,7 +135,7 @@ def check(vehicle: CutVehicle, virtual: VirtualTable, file: str = "") -> tuple[S
 
 
 def _signals(vehicle: CutVehicle, virtual: VirtualTable) -> tuple[Signal, ...]:
-    """Of hubs, motion and check channels, in the order of their columns."""
+    """Signals of hubs, motion and check channels, in the order of their columns."""
     body, units = vehicle.chassis, {element.name: element.unit for element in vehicle.elements}
     rows: list[tuple[str, Quantity, str, str, Frame]] = [
         (f"{hub}_{name.lower()}", what, hub, axis, virtual.frame) for hub in vehicle.hubs for name, what, axis, _ in HUB

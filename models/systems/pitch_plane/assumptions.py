@@ -141,10 +141,10 @@ def _artificial(assembly: Assembly) -> Assumption:
 def _shares(p: Parameters, heave: bool, run: Result) -> Watched:
     """Artificial moment, and the force where the heave is held, up to 15 Hz by the inertia's; nothing where the rows
     are too few or too far apart."""
-    from models.drift.score import own_figures
+    from models.drift.score import figures_of_run
 
     with suppress(InputError):
-        figures = own_figures(run, p)
+        figures = figures_of_run(run, p)
         force = {"force": np.array([figures.force_share_band])} if heave else {}
         return {"moment": np.array([figures.moment_share_band]), **force}
     return {}

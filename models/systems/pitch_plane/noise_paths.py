@@ -68,7 +68,7 @@ class NoisePaths:
         return build(self.engine, self.assembly(path), self.settings).run()
 
     def runs(self, paths: range) -> Iterator[Trajectory | RunFailed]:
-        """Every path's run, or why it failed; raises PathFailed for what is no failure of physics."""
+        """Every path's run, or its RunFailed; raises PathFailed for failures that are not of the simulated physics."""
         for path in paths:
             try:
                 yield self.trajectory(path)

@@ -66,7 +66,7 @@ class PitchStep:
         self._respond = responding(assembly.mode, assembly.vehicle.geometry)
 
     def advance(self, x: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Over one step from x (7,): x after it, and its derivatives.
+        """Advance the state x (7,) by a step: the new state, and its derivatives.
 
         x : (z1 - z3, z2 - z3, pitch), their rates, and the share by which 1/I is above the assembly's
         They are those to x, (7, 7), and to the two force samples at the step's start and at its end, (7, 2) per N.
@@ -161,7 +161,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _Steps:
-    """Of the step that ends at each time: its prediction (n, 7), transition and noise (n, 7, 7)."""
+    """Filter steps that end at each time: prediction (n, 7), transition and noise (n, 7, 7)."""
 
     predictions: np.ndarray
     transitions: np.ndarray

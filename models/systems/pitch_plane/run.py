@@ -100,7 +100,7 @@ def _with_error(run: Result, assembly: Assembly, settings: Settings, channels: C
 
 
 def _looser(again: Callable[[Settings], Series], settings: Settings) -> Series:
-    """With the longest step of the engine's own, too, twice as long, where its input allows that: it may be what bounds
+    """The run with also the engine's own longest step twice as long, where its input allows that: it may be what bounds
     the error."""
     try:
         return again(replace(settings, step=2.0 * settings.step))

@@ -173,15 +173,14 @@ class Path:
         return march_along(compile_march, self.assembly.mode, self.assembly.vehicle.geometry)
 
     def carry(
-        self, columns: np.ndarray, errors: np.ndarray | None = None, other: Parameters | None = None
+        self, columns: np.ndarray, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Path (n + 1, 8) and error columns (n + 1, m, 8) that begin as ``columns`` (m, 8).
 
-        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step; other :
-        the parameters of a wrong model, whose error forces every column.
-        """
+        errors : (3 steps, m, 2), errors of the forces (N) at the start, the middle and the end of each step;
+        wrong_parameters : the parameters of a wrong model, whose error forces every column."""
         count, p = self.steps, self.assembly.parameters.array()
-        wrong = p if other is None else p + SMALL * (other.array() - p)
+        wrong = p if wrong_parameters is None else p + SMALL * (wrong_parameters.array() - p)
         pushes = np.zeros((3 * count, len(columns), 2)) if errors is None else errors
         states, kept = np.empty((count + 1, 8)), np.empty((count + 1, *columns.shape))
         self.march(compile_carry)(
@@ -245,7 +244,8 @@ def swing(path: Path) -> float:
 
 @dataclass(frozen=True)
 class Covariance:
-    """times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the state, products of two."""
+    """Covariance of the state over time. times (n,) in s, those of the samples; matrices (n, 8, 8) in the units of the
+    state, products of two."""
 
     times: np.ndarray
     matrices: np.ndarray

@@ -116,22 +116,22 @@ def interpolation(assembly: Assembly, longest: float = STEP) -> Curve:
     return _carried(path, interpolation_error(path) if path.samples >= LEAST else None)
 
 
-def model(assembly: Assembly, other: Parameters, longest: float = STEP) -> Curve:
-    """Error of a run with the parameters ``other`` instead of the assembly's.
+def model(assembly: Assembly, wrong_parameters: Parameters, longest: float = STEP) -> Curve:
+    """Error of a run with the parameters ``wrong_parameters`` instead of the assembly's.
 
     What drifts is the moment of the inertia's error, dI beta''; stiffness and damping act through the cosine alone.
     The difference is carried along a run with the mean of both models, which leaves no error of second order.
     """
     parameters = assembly.parameters.model_dump()
-    change = {name: getattr(other, name) - value for name, value in parameters.items()}
+    change = {name: getattr(wrong_parameters, name) - value for name, value in parameters.items()}
     mean = Parameters(**{name: value + 0.5 * change[name] for name, value in parameters.items()})
     shifted = Parameters(**{name: value + change[name] for name, value in mean.model_dump().items()})
-    return _carried(path_of(replace(assembly, parameters=mean), longest), other=shifted)
+    return _carried(path_of(replace(assembly, parameters=mean), longest), wrong_parameters=shifted)
 
 
-def _carried(path: Path, errors: np.ndarray | None = None, other: Parameters | None = None) -> Curve:
+def _carried(path: Path, errors: np.ndarray | None = None, wrong_parameters: Parameters | None = None) -> Curve:
     pushes = None if errors is None else errors[:, None, :]
-    _, columns = path.carry(np.zeros((1, 8)), pushes, other)
+    _, columns = path.carry(np.zeros((1, 8)), pushes, wrong_parameters)
     return Curve(path.times, np.abs(columns[:, 0, 3]))
 
 

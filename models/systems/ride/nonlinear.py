@@ -57,7 +57,8 @@ class Sampling(Strict):
 
 @dataclass(frozen=True)
 class Nonlinear:
-    """By speed: the vehicle of small motion (N, p), the replaced one, and Monte Carlo where it was asked for.
+    """Results of nonlinear rides by speed: the vehicle of small motion (N, p), the statistically linearised one, and
+    Monte Carlo where it was asked for.
 
     shown : the replaced vehicle at the speed of the engines' runs; lifts : whether tyres may, in Monte Carlo alone.
     """
@@ -69,9 +70,9 @@ class Nonlinear:
     shown: StatisticallyLinear
     lifts: bool = False
 
-    def of(self, part: str) -> np.ndarray:
+    def of(self, name: str) -> np.ndarray:
         """One part (N, p) of what was found of the replaced vehicles."""
-        return np.array([getattr(each, part) for each in self.replaced])
+        return np.array([getattr(each, name) for each in self.replaced])
 
     @property
     def deviation(self) -> np.ndarray:

@@ -119,7 +119,8 @@ def _rolls(equations: Equations) -> Assumption:
 
 
 def _half_space() -> Assumption:
-    """Of a Hertzian contact the penetration by its shorter semi-axis is about that semi-axis by its radius."""
+    """Assumption that bodies are half-spaces: in a Hertzian contact the penetration by its shorter semi-axis is about
+    that semi-axis by its radius."""
 
     def watched(contacts: Array) -> Array:
         short = np.minimum(contacts["a"], contacts["b"])

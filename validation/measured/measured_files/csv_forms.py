@@ -41,7 +41,7 @@ class Form:
     beside: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """The whole file."""
+        """Text of the whole file."""
         rows = [self.row(i) for i in range(len(self.times))]
         lines = (*self.above, self.line(self.headings), *self.between, *rows, *self.below)
         return "".join(line + self.end for line in lines)

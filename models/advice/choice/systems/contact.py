@@ -31,8 +31,8 @@ def parts(scene: ContactScene) -> int:
 
 
 def shorten(table: dict[str, Any], scene: ContactScene, steps: int) -> None:
-    """Nothing."""
+    """Do nothing: a contact has no time steps to shorten."""
 
 
 def coarsen(table: dict[str, Any], scene: ContactScene, times: int) -> None:
-    """Nothing."""
+    """Do nothing: a contact has no time steps to coarsen."""

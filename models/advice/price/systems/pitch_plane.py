@@ -60,7 +60,7 @@ class OwnPitchPlane:
 
     @property
     def title(self) -> str:
-        """Of the scene."""
+        """Title of the scene."""
         return self.assembly.scene.title
 
     @property
@@ -116,7 +116,7 @@ class OwnPitchPlane:
         return Ladder("reference", "RK4", tuple(self.base / most / 2**k for k in range(16)), 4)
 
     def second(self, last: Setting) -> Setting | None:
-        """LSODA, unless it would restart at every sample."""
+        """The second method, LSODA, unless it would restart at every sample."""
         return None if self.sampled else Setting("reference", "LSODA", TIGHT, 0, adaptive=True)
 
     def solve(self, setting: Setting, duration: float) -> Result:
@@ -169,7 +169,7 @@ def _outside(setting: Setting) -> list[str]:
     )
 
 
-def own(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
+def priced_scene(scene: Scene, quantity: str | None, engines: tuple[str, ...]) -> OwnPitchPlane:
     """The scene with a quantity: channels of its result, with commas between them, of one unit."""
     assembly = assemble(scene)
     channels = tuple(name.strip() for name in (quantity or USUAL[assembly.mode]).split(","))

@@ -8,7 +8,7 @@ COUNTS = {"exudyn": {"native items": 10}}
 
 
 def named(scene: Any) -> bool:
-    """Whether a scene has it."""
+    """Whether a scene names the effect."""
     return bool(scene.vehicle.geometry == "exact")
 
 
